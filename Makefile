@@ -1,0 +1,50 @@
+# Two commands need nothing but Python >= 3.11 and make: `make bench` and `make test`.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: bench test lint format venv lock clean
+
+bench: venv  ## run Sitnikov through every integrator and write reports/sitnikov/
+	$(BIN)/hbvm-bench run sitnikov --report reports/sitnikov
+
+test: venv  ## the test suite
+	$(BIN)/python -m pytest
+
+lint: venv  ## ruff, pyright, import-linter
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
+	$(BIN)/lint-imports
+
+format: venv
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+venv: $(STAMP)
+
+# Each stamp holds the digest of what was installed from, so that a changed file
+# (and not a changed time stamp, as after a checkout) renews the environment.
+$(STAMP): FORCE
+	@lock="$$(sha256sum < requirements.lock)"; project="$$(sha256sum < pyproject.toml)"; \
+	if [ "$$(cat $(VENV)/.locked 2>/dev/null)" != "$$lock" ]; then \
+	  $(PYTHON) -c 'import sys; sys.exit("hbvm-bench needs Python 3.11 or newer: set PYTHON=" if sys.version_info < (3, 11) else 0)' && \
+	  echo "setting up $(VENV) from requirements.lock" && \
+	  rm -rf $(VENV) && $(PYTHON) -m venv $(VENV) && \
+	  $(PIP) --no-compile --require-hashes -r requirements.lock && \
+	  echo "$$lock" > $(VENV)/.locked || exit 1; \
+	fi; \
+	if [ "$$(cat $@ 2>/dev/null)" != "$$project" ]; then \
+	  $(PIP) --no-build-isolation --no-deps -e . && echo "$$project" > $@; \
+	fi
+.PHONY: FORCE
+FORCE:
+
+lock:  ## rewrite requirements.lock (needs uv)
+	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url \
+	  pyproject.toml --extra peers --group dev -o requirements.lock
+
+clean:
+	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,242 @@
+"""What every integrator, ours or a peer's, satisfies.
+
+Guide for implementers
+----------------------
+A **method** is a description; it holds options and nothing else.
+
+1. Derive a frozen, keyword-only dataclass from `MethodBase`; validate the
+   options in ``__post_init__`` and raise `problems.errors.InputError`.
+2. Set the class attributes ``library`` (the package that does the work) and
+   ``citation`` (how its authors ask to be cited); give ``order`` (``None``
+   where the order varies with the tolerance).
+3. ``accepts(problem)`` returns ``None`` or the reason why not, as a sentence.
+4. ``compile(system)`` does all compilation, imports the library (raising
+   `problems.errors.MissingLibraryError`) and returns a `Program`, which knows
+   the seconds that this took. Parameters are run-time values.
+5. ``program.start(y0, par, t0)`` returns a `Stepper` at ``t0``.
+6. A stepper's ``advance`` takes the bulk of the work in compiled code and
+   returns the samples it reached; ``step`` takes one step, for looking.
+7. A numerical failure is a `Status`, never an exception, never a silent NaN,
+   never an endless loop; the samples computed before it are returned.
+8. ``checkpoint`` returns all that makes the continuation bit for bit the same;
+   ``restore`` takes it back.
+9. Register the class under the entry point group ``hbvm_bench.integrators``;
+   `integrators.testing` then checks it against these sentences.
+"""
+
+import dataclasses
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+Array = NDArray[np.float64]
+
+SAMPLINGS = ("side", "steps", "land", "dense")
+
+
+class Status(StrEnum):
+    """How an integration stands, or how it ended."""
+
+    RUNNING = "running"
+    FINISHED = "finished"
+    EVENT = "event"
+    NONLINEAR_DIVERGENCE = "nonlinear_divergence"
+    STEP_UNDERFLOW = "step_underflow"
+    NOT_FINITE = "not_finite"
+    STALLED = "stalled"
+    MAX_STEPS = "max_steps"
+
+    @property
+    def failed(self) -> bool:
+        """Whether the integration ended before its time."""
+        return self not in (Status.RUNNING, Status.FINISHED, Status.EVENT)
+
+
+@dataclass
+class Stats:
+    """Counters of the work done; ``None`` where a library has no such counter.
+
+    Attributes
+    ----------
+    steps : int
+        Accepted steps.
+    rejections : int or None
+        Steps tried and rejected.
+    evaluations : int or None
+        Evaluations of the vector field at one state.
+    iterations : int or None
+        Iterations of the nonlinear solver, over all steps.
+    solver : str or None
+        Which nonlinear solver did the work.
+    extra : dict
+        Anything else worth telling, by name; arrays for histories such as
+        ``{"dt_history": (n, 2) array of t and dt}``.
+    """
+
+    steps: int = 0
+    rejections: int | None = None
+    evaluations: int | None = None
+    iterations: int | None = None
+    solver: str | None = None
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """States reached by one call of ``advance``.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        The times reached: a leading part of the times asked for, or the
+        method's own steps with ``sample="steps"``.
+    y : ndarray, shape (n, dim)
+        The states at these times, in the problem's coordinates.
+    status : Status
+        ``FINISHED`` when all times asked for were reached.
+    reason : str
+        One sentence on a failure; empty otherwise.
+    """
+
+    t: Array
+    y: Array
+    status: Status
+    reason: str = ""
+
+
+@runtime_checkable
+class Stepper(Protocol):
+    """A trajectory under way."""
+
+    @property
+    def t(self) -> float: ...
+    @property
+    def y(self) -> Array: ...
+    @property
+    def status(self) -> Status: ...
+    @property
+    def reason(self) -> str: ...
+    @property
+    def stats(self) -> Stats: ...
+
+    def step(self) -> Status:
+        """Take one step of the method's own length."""
+        ...
+
+    def advance(self, times: Array, *, sample: str | None = None) -> Samples:
+        """Integrate to ``times[-1]`` and return the states at ``times``.
+
+        Parameters
+        ----------
+        times : ndarray, shape (n,)
+            Finite, strictly monotone in the direction of integration; the
+            first may be the present time.
+        sample : {"side", "steps", "land", "dense"}, optional
+            How states between steps are made (``None``: the method's best
+            that leaves its own steps untouched, or landing where landing
+            costs it nothing). A method refuses what it cannot do.
+
+        Returns
+        -------
+        Samples
+
+        Raises
+        ------
+        problems.errors.InputError
+            For times that are not finite or not monotone, or a sampling the
+            method does not offer.
+        """
+        ...
+
+    def checkpoint(self) -> Any:
+        """Return all that the continuation depends on (a value, not a view)."""
+        ...
+
+    def restore(self, checkpoint: Any) -> None:
+        """Go back to a checkpoint of this program; the continuation is bit for bit the same."""
+        ...
+
+
+@runtime_checkable
+class Program(Protocol):
+    """A method compiled for one system; parameters stay run-time values."""
+
+    @property
+    def compile_seconds(self) -> float: ...
+    @property
+    def from_cache(self) -> bool | None:
+        """Whether compiled code came from a cache; ``None`` where nothing is compiled."""
+        ...
+
+    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> Stepper: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodBase:
+    """Base of all methods: a frozen description that prints as the call that makes it."""
+
+    library: ClassVar[str] = "hbvm-bench"
+    citation: ClassVar[str] = ""
+    family: ClassVar[str] = ""
+
+    @property
+    def order(self) -> int | None:
+        """Order of convergence; ``None`` where it varies with the tolerance."""
+        raise NotImplementedError
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Return ``None`` if the method can integrate ``problem``, else the reason."""
+        raise NotImplementedError
+
+    def compile(self, system: System) -> Program:
+        """Compile for ``system``; see the module's guide."""
+        raise NotImplementedError
+
+    def options(self, *, defaults: bool = False) -> dict[str, Any]:
+        """Return the options by name: those that differ from their default, or all."""
+        return {
+            f.name: getattr(self, f.name)
+            for f in dataclasses.fields(self)
+            if defaults or f.default is dataclasses.MISSING or getattr(self, f.name) != f.default
+        }
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{name}={value!r}" for name, value in self.options().items())
+        return f"{type(self).__name__}({inside})"
+
+
+def check_times(times: Array, t: float) -> Array:
+    """Return ``times`` as a float64 array, or raise for times no stepper can serve.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        Requested times; n >= 1, finite, strictly monotone; none behind ``t``
+        in the direction of integration.
+    t : float
+        The stepper's present time.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the times are empty, not finite, not strictly monotone or behind ``t``.
+    """
+    grid = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    if grid.ndim != 1 or grid.size == 0:
+        raise InputError(f"times must be a non-empty one-dimensional array, not of shape {grid.shape}.")
+    if not np.isfinite(grid).all():
+        raise InputError("times must be finite numbers.")
+    rest = grid if grid[0] != t else grid[1:]
+    path = np.concatenate([[t], rest])
+    gaps = np.diff(path)
+    if not (np.all(gaps > 0) or np.all(gaps < 0)):
+        raise InputError(
+            f"times must be strictly monotone and ahead of the present time {t!r}; got {grid[0]!r} ... {grid[-1]!r}."
+        )
+    return grid
