@@ -1,1 +1,1 @@
-"""placeholder"""
+"""The bench: which integrator keeps what, at what cost."""

@@ -1,1 +1,1 @@
-"""placeholder"""
+"""HBVM and Gauss integrators, and the established libraries behind one stepper protocol."""

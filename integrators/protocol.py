@@ -237,6 +237,7 @@ def check_times(times: Array, t: float) -> Array:
     gaps = np.diff(path)
     if not (np.all(gaps > 0) or np.all(gaps < 0)):
         raise InputError(
-            f"times must be strictly monotone and ahead of the present time {t!r}; got {grid[0]!r} ... {grid[-1]!r}."
+            f"times must be strictly monotone and ahead of the present time {t!r}; "
+            f"got {float(grid[0])!r} ... {float(grid[-1])!r}."
         )
     return grid
