@@ -1,1 +1,30 @@
-"""HBVM and Gauss integrators, and the established libraries behind one stepper protocol."""
+"""HBVM and Gauss integrators, and the established libraries behind one stepper protocol.
+
+``integrators.HBVM``, ``integrators.Gauss`` and every registered method
+(``integrators.IAS15``, ...) are attributes, imported when first used.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from integrators.integrate import Solution, integrate
+from integrators.protocol import MethodBase, Samples, Stats, Status
+
+if TYPE_CHECKING:
+    from integrators.gauss import Gauss as Gauss
+    from integrators.hbvm import HBVM as HBVM
+
+__all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate"]
+
+
+def __getattr__(name: str) -> Any:
+    from integrators import registry
+
+    if name.startswith("_") or name not in registry.names():
+        raise AttributeError(f"module 'integrators' has no attribute {name!r}")
+    return registry.get(name)
+
+
+def __dir__() -> list[str]:
+    from integrators import registry
+
+    return sorted({*globals(), *registry.names()})

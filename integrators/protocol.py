@@ -30,7 +30,7 @@ from enum import StrEnum
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -241,3 +241,20 @@ def check_times(times: Array, t: float) -> Array:
             f"got {float(grid[0])!r} ... {float(grid[-1])!r}."
         )
     return grid
+
+
+def check_state(y0: ArrayLike, dim: int) -> Array:
+    """Return ``y0`` as a fresh float64 array of shape (dim,), or refuse it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the shape is wrong or an entry is not finite.
+    """
+    y = np.array(y0, dtype=np.float64)
+    if y.shape != (dim,):
+        raise InputError(f"the initial state must have shape ({dim},), not {y.shape}.")
+    if not np.isfinite(y).all():
+        where = int(np.flatnonzero(~np.isfinite(y))[0])
+        raise InputError(f"the initial state must be finite numbers; y0[{where}] is {float(y[where])!r}.")
+    return y

@@ -1,0 +1,131 @@
+"""Integrate a problem with a method: the one function most users need."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.protocol import Array, MethodBase, Stats, Status
+from problems.errors import InputError
+from problems.problem import Problem
+
+DEFAULT_SAMPLES = 1001
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A trajectory and what it cost.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times reached; all that were asked for if ``status`` is ``FINISHED``.
+    y : ndarray, shape (n, dim)
+        States: q then p for Hamiltonian problems.
+    status : Status
+        How the integration ended; a failure is a value, not an exception.
+    reason : str
+        One sentence on a failure; empty otherwise.
+    t_stop : float
+        Where the method stopped: the last time asked for, or the time of the failure.
+    stats : Stats
+        Counters of the work done.
+    compile_seconds : float
+        Seconds spent compiling, before the first step.
+    from_cache : bool or None
+        Whether the compiled code came from a cache; ``None`` where nothing is compiled.
+    problem, method
+        What was integrated, and how.
+    """
+
+    t: Array
+    y: Array
+    status: Status
+    reason: str
+    t_stop: float
+    stats: Stats
+    compile_seconds: float
+    from_cache: bool | None
+    problem: Problem
+    method: MethodBase
+
+    @property
+    def v(self) -> Array | None:
+        """Velocities (n, dof) of a Hamiltonian problem with constant masses, else ``None``."""
+        return self.problem.velocity(self.y)
+
+    def invariants(self) -> dict[str, Array]:
+        """Return the problem's invariants along the trajectory, by name."""
+        return self.problem.invariants(self.y, self.t)
+
+    def errors(self) -> dict[str, Array]:
+        """Return the errors of the invariants along the trajectory, relative where that has a meaning."""
+        return self.problem.errors(self.y, self.t)
+
+    def guards(self) -> dict[str, Array]:
+        """Return the quantities that a symmetry keeps at exactly zero, by name."""
+        return self.problem.guards(self.y)
+
+
+def integrate(
+    problem: Problem, method: MethodBase, times: ArrayLike | None = None, sample: str | None = None
+) -> Solution:
+    """Integrate ``problem`` with ``method`` and return the states at ``times``.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate.
+    method : MethodBase
+        How: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ...
+    times : array_like, shape (n,), optional
+        Strictly monotone times, from the problem's ``t0`` on (or back). Default:
+        the problem's own grid, or else 1001 equidistant times to ``t_end``.
+    sample : {"side", "steps", "land", "dense"}, optional
+        How states between the method's steps are made; see `Stepper.advance`.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the method does not accept the problem, or for times, samplings and
+        initial states that cannot be used.
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(
+            f"problem must be a Problem, not {problem!r}; make one with problems.load or problems.Problem."
+        )
+    if not isinstance(method, MethodBase):
+        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {method!r}.")
+    reason = method.accepts(problem)
+    if reason is not None:
+        raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
+
+    program = method.compile(problem.system)
+    stepper = program.start(problem.y0, problem.par, problem.t0)
+    samples = stepper.advance(_grid(problem, times), sample=sample)
+    finished = samples.status is Status.FINISHED
+    return Solution(
+        t=samples.t,
+        y=samples.y,
+        status=samples.status,
+        reason=samples.reason,
+        t_stop=float(samples.t[-1]) if finished and samples.t.size else stepper.t,
+        stats=replace(stepper.stats),
+        compile_seconds=program.compile_seconds,
+        from_cache=program.from_cache,
+        problem=problem,
+        method=method,
+    )
+
+
+def _grid(problem: Problem, times: ArrayLike | None) -> Array:
+    """Return the times to sample at: the user's, the problem's, or the default."""
+    if times is None:
+        times = problem.times
+    if times is None:
+        times = np.linspace(problem.t0, problem.t_end, DEFAULT_SAMPLES)
+    return np.asarray(times, dtype=np.float64)
