@@ -1,0 +1,157 @@
+"""What makes two runs of a case the same: names, options, versions, sources.
+
+The id of a case is the sha256 of canonical JSON of all this. A rerun therefore
+does only what is missing or stale, and two stores can be merged by id.
+"""
+
+import hashlib
+import inspect
+import json
+import platform
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+import integrators.registry
+import problems
+from hbvm_bench.campaign import Case
+from hbvm_bench.spec import parse_spec
+from integrators.protocol import MethodBase
+from problems.errors import InputError
+from problems.problem import Problem
+
+OWN_PACKAGES = ("problems", "integrators")
+# The modules of this package whose change changes a measured number.
+MEASURING_MODULES = ("worker.py", "metrics.py", "measure.py", "timing.py")
+# A library's numbers also depend on what it computes with.
+COMPUTES_WITH = {
+    "hbvm-bench": ("numpy", "numba", "llvmlite"),
+    "diffrax": ("diffrax", "jax", "jaxlib", "equinox", "lineax", "optimistix"),
+    "scipy": ("scipy", "numpy", "numba"),
+}
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A case whose names and options have been checked.
+
+    Attributes
+    ----------
+    case : Case
+        With canonical texts.
+    problem : Problem
+        Made from the case's text.
+    method : MethodBase
+        Made from the case's text; its library may still be missing.
+    id : str
+        sha256 in hexadecimal.
+    key : dict
+        What was hashed.
+    """
+
+    case: Case
+    problem: Problem
+    method: MethodBase
+    id: str
+    key: dict[str, Any]
+
+
+def resolve(case: Case) -> Resolved:
+    """Check the names and options of a case and give it its id.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an unknown name or option, with the nearest names, or a value that
+        the problem or the method refuses.
+    """
+    problem = make_problem(case.problem)
+    method = make_method(case.method)
+    case.grid.times(problem)
+    canonical = msgspec.structs.replace(case, problem=repr(problem), method=repr(method))
+    key = case_key(canonical, problem, method)
+    text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return Resolved(canonical, problem, method, hashlib.sha256(text.encode()).hexdigest(), key)
+
+
+def make_problem(text: str) -> Problem:
+    """Make the problem that ``text`` specifies."""
+    spec = parse_spec(text)
+    return problems.load(spec.name, **spec.arguments)
+
+
+def make_method(text: str) -> MethodBase:
+    """Make the method that ``text`` specifies."""
+    spec = parse_spec(text)
+    try:
+        return integrators.registry.create(spec.name, **spec.arguments)
+    except InputError as error:
+        raise InputError(f"{spec}: {error}") from None
+
+
+def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]:
+    """Return everything the numbers of a case depend on, as JSON values.
+
+    Notes and settings labels are left out: they are words about the case.
+    """
+    grid = case.grid.times(problem)
+    return {
+        "problem": case.problem,
+        "field": problem.system.fingerprint,
+        "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
+        "parameters": [value.hex() for value in problem.par.tolist()],
+        "method": type(method).__name__,
+        "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
+        "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
+        "versions": versions_of(method),
+        "source": source_digest(),
+        "method_source": _module_digest(type(method)),
+    }
+
+
+def versions_of(method: MethodBase) -> dict[str, str]:
+    """Return the versions of Python and of the libraries that a method's numbers depend on."""
+    names = COMPUTES_WITH.get(method.library.lower(), (method.library,))
+    return {"python": platform.python_version()} | {name: _version(name) for name in names}
+
+
+def is_ours(method: MethodBase) -> bool:
+    """Whether this project, and not a peer, does the work of the method."""
+    return method.library.lower() == "hbvm-bench"
+
+
+@cache
+def source_digest() -> str:
+    """Return the sha256 of our own sources that decide about measured numbers."""
+    digest = hashlib.sha256()
+    paths: list[tuple[str, Path]] = []
+    for package in OWN_PACKAGES:
+        root = Path(str(files(package)))
+        paths += [(f"{package}/{p.relative_to(root).as_posix()}", p) for p in root.rglob("*.py")]
+    here = Path(str(files("hbvm_bench")))
+    paths += [(f"hbvm_bench/{name}", here / name) for name in MEASURING_MODULES]
+    for name, path in sorted(paths):
+        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+@cache
+def _module_digest(cls: type) -> str:
+    # a third party's method is not covered by source_digest
+    try:
+        return hashlib.sha256(Path(inspect.getfile(cls)).read_bytes()).hexdigest()
+    except (OSError, TypeError):
+        return ""
+
+
+@cache
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "not installed"

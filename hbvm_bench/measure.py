@@ -1,0 +1,192 @@
+"""From a solution to what is measured on it: error series, guards, distances."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.records import Compile, Counters, Result, Timing
+from hbvm_bench.reference import Reference
+from integrators.integrate import Solution
+from integrators.protocol import Status
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Everything that a metric may look at.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was integrated.
+    t, y : ndarray, shapes (n,) and (n, dim)
+        The samples.
+    errors : dict of ndarray, shape (n,)
+        Errors of the invariants by name, relative where that has a meaning.
+    guards : dict of ndarray, shape (n,)
+        Quantities that a symmetry keeps at exactly zero.
+    distance : ndarray, shape (n,)
+        Largest distance of a body (or of q) from the origin.
+    position_t, position : ndarray, shape (m,)
+        Times of the reference that were reached, and the error of the position there.
+    reference : Reference or None
+        The trusted solution, where there is one.
+    complete : bool
+        Whether the end time was reached.
+    t_stop : float
+        Where the method stopped.
+    counters, compile, timing
+        Work and time.
+    """
+
+    problem: Problem
+    t: Array
+    y: Array
+    errors: dict[str, Array]
+    guards: dict[str, Array]
+    distance: Array
+    position_t: Array
+    position: Array
+    reference: Reference | None
+    complete: bool
+    t_stop: float
+    counters: Counters = field(default_factory=Counters)
+    compile: Compile | None = None
+    timing: Timing | None = None
+    extra: dict[str, Array] = field(default_factory=dict)
+
+    def series(self) -> dict[str, Array]:
+        """Return the arrays that the store keeps beside the record."""
+        return {
+            "t": self.t,
+            "y": self.y,
+            "distance": self.distance,
+            "position_t": self.position_t,
+            "position": self.position,
+            **{f"error.{name}": values for name, values in self.errors.items()},
+            **{f"guard.{name}": values for name, values in self.guards.items()},
+            **{f"extra.{name}": values for name, values in self.extra.items()},
+        }
+
+
+def measure(solution: Solution, reference: Reference | None) -> Measured:
+    """Evaluate everything on the samples of a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+        As `integrators.integrate` returns it.
+    reference : Reference, optional
+        The trusted solution of the same problem.
+
+    Returns
+    -------
+    Measured
+    """
+    problem, t, y = solution.problem, solution.t, solution.y
+    # an overflow is a result here: it becomes a sentence in the metrics
+    with np.errstate(all="ignore"):
+        errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
+        guards = {name: np.asarray(values, float) for name, values in problem.guards(y).items()}
+        distance = largest_distance(problem, positions(problem, y))
+        position_t, position = _position_error(problem, t, y, reference)
+    stats = solution.stats
+    return Measured(
+        problem=problem,
+        t=t,
+        y=y,
+        errors=errors,
+        guards=guards,
+        distance=distance,
+        position_t=position_t,
+        position=position,
+        reference=reference,
+        complete=solution.status is Status.FINISHED,
+        t_stop=float(solution.t_stop),
+        counters=Counters(
+            steps=_count(stats.steps),
+            rejections=_count(stats.rejections),
+            evaluations=_count(stats.evaluations),
+            iterations=_count(stats.iterations),
+            solver=stats.solver,
+        ),
+        compile=Compile(seconds=float(solution.compile_seconds), cached=solution.from_cache),
+        extra={name: np.asarray(v) for name, v in stats.extra.items() if _is_history(v)},
+    )
+
+
+def restore(
+    problem: Problem,
+    series: dict[str, Array],
+    result: Result,
+    reference: Reference | None,
+    timing: Timing | None,
+) -> Measured:
+    """Put together again what was measured, from the store, with a timing."""
+
+    def named(prefix: str) -> dict[str, Array]:
+        return {name.removeprefix(prefix): v for name, v in series.items() if name.startswith(prefix)}
+
+    return Measured(
+        problem=problem,
+        t=series["t"],
+        y=series["y"],
+        errors=named("error."),
+        guards=named("guard."),
+        distance=series["distance"],
+        position_t=series["position_t"],
+        position=series["position"],
+        reference=reference,
+        complete=result.status == Status.FINISHED,
+        t_stop=float("nan") if result.t_stop is None else result.t_stop,
+        counters=result.counters,
+        compile=result.compile,
+        timing=timing,
+        extra=named("extra."),
+    )
+
+
+def positions(problem: Problem, y: Array) -> Array:
+    """Return the part of the states that says where things are, shape (n, dof) or (n, dim)."""
+    dof = problem.system.dof
+    return y if dof is None else y[:, :dof]
+
+
+def largest_distance(problem: Problem, q: Array) -> Array:
+    """Return the largest distance of a body from the origin, shape (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        Its bodies say how ``q`` is grouped; without bodies all of ``q`` is one vector.
+    q : ndarray, shape (n, dof)
+        Positions, or differences of positions.
+    """
+    bodies = getattr(problem.system, "bodies", None)
+    width = q.shape[1] if bodies is None else bodies.dimension
+    # scaled by hand: squares of 1e200 overflow, and such positions do occur
+    groups = np.abs(q.reshape(len(q), -1, width))
+    scale = groups.max(axis=2, initial=0.0)
+    safe = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
+    return (safe * np.sqrt(((groups / safe[:, :, None]) ** 2).sum(axis=2))).max(axis=1)
+
+
+def _position_error(problem: Problem, t: Array, y: Array, reference: Reference | None) -> tuple[Array, Array]:
+    if reference is None:
+        return np.empty(0), np.empty(0)
+    _, ours, theirs = np.intersect1d(t, reference.t, return_indices=True)
+    # the reference is a pair of doubles, so that its own rounding does not enter the difference
+    difference = (y[ours] - reference.high[theirs]) - reference.low[theirs]
+    return t[ours], largest_distance(problem, positions(problem, difference))
+
+
+def _count(value: Any) -> int | None:
+    return None if value is None else int(value)
+
+
+def _is_history(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu"

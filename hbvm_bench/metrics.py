@@ -1,0 +1,326 @@
+"""The one table of metrics: the command line, the reports and the documents read only this."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.measure import Measured
+from hbvm_bench.records import Value
+from problems.errors import unknown
+
+# A symmetry guard that left zero by less than this, relative to the size of the
+# trajectory, has not yet changed the trajectory; the row says so all the same.
+GUARD_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One thing that is measured on every case.
+
+    Attributes
+    ----------
+    key : str
+        The name on the command line and in JSON.
+    label, unit : str
+        For column heads and axes.
+    better : {"lower", None}
+        Which way is better; ``None`` where neither is.
+    scale : {"log", "linear"}
+        For axes and number formats.
+    function : callable
+        From `Measured` to the number, or to the sentence that says why there is none.
+    description : str
+        One sentence for readers.
+    same_trajectory : bool
+        Whether the number means something only on the trajectory that was asked
+        for, so that it is void where a symmetry guard is violated.
+    whole_span : bool
+        Whether the number needs the whole span, so that it is void for a case
+        that ended early.
+    problem : str or None
+        The only problem that has it, if it is not for all.
+    """
+
+    key: str
+    label: str
+    unit: str
+    better: Literal["lower"] | None
+    scale: Literal["log", "linear"]
+    function: Callable[[Measured], float | str]
+    description: str
+    same_trajectory: bool = False
+    whole_span: bool = True
+    problem: str | None = None
+
+
+def evaluate(measured: Measured, keys: Iterable[str] | None = None) -> dict[str, Value]:
+    """Return the metrics of a case by key.
+
+    Parameters
+    ----------
+    measured : Measured
+        What was measured.
+    keys : iterable of str, optional
+        Only these; all that apply to the problem by default.
+    """
+    chosen = METRICS.values() if keys is None else (find(key) for key in keys)
+    return {m.key: _value(m, measured) for m in chosen if m.problem in (None, measured.problem.name)}
+
+
+def find(key: str) -> Metric:
+    """Return the metric called ``key``; an unknown name fails with the nearest ones."""
+    if key not in METRICS:
+        raise unknown("metric", key, METRICS)
+    return METRICS[key]
+
+
+def guard_violation(measured: Measured) -> str:
+    """Return a sentence where the trajectory left the one that was asked for, else ``""``."""
+    size = float(np.max(measured.distance, initial=0.0))
+    for name, values in measured.guards.items():
+        worst = float(np.max(np.abs(values), initial=0.0))
+        if not worst <= GUARD_TOLERANCE * size:
+            return f"another trajectory: {name.replace('_', ' ')} reached {worst:.2g} instead of 0"
+    return ""
+
+
+def _value(metric: Metric, measured: Measured) -> Value:
+    with np.errstate(all="ignore"):
+        number = metric.function(measured)
+    if isinstance(number, str):
+        return Value(why=number)
+    if not np.isfinite(number):
+        return Value(why="not finite")
+    if metric.whole_span and not measured.complete:
+        return Value(value=float(number), void=True, why=f"only to t = {measured.t_stop:.4g}")
+    if metric.same_trajectory and (why := guard_violation(measured)):
+        return Value(value=float(number), void=True, why=why)
+    return Value(value=float(number))
+
+
+def _largest(values: NDArray[np.float64], t: NDArray[np.float64]) -> float | str:
+    if values.size == 0:
+        return "no samples"
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        return f"not finite from t = {t[bad[0]]:.4g}"
+    return float(np.max(np.abs(values)))
+
+
+def _error_max(name: str) -> Callable[[Measured], float | str]:
+    def largest(m: Measured) -> float | str:
+        if name not in m.errors:
+            return f"the problem declares no {name.replace('_', ' ')}"
+        return _largest(m.errors[name], m.t)
+
+    return largest
+
+
+def _energy_end(m: Measured) -> float | str:
+    if "energy" not in m.errors:
+        return "the problem declares no energy"
+    return float(m.errors["energy"][-1]) if m.t.size else "no samples"
+
+
+def _guard_max(m: Measured) -> float | str:
+    if not m.guards:
+        return "the problem declares no symmetry guard"
+    if not m.t.size:
+        return "no samples"
+    return max(float(np.max(np.abs(values))) for values in m.guards.values())
+
+
+def _distance_max(m: Measured) -> float | str:
+    return _largest(m.distance, m.t)
+
+
+def _no_reference(m: Measured) -> str:
+    return "" if m.reference is not None else "no stored reference for this problem"
+
+
+def _position_end(m: Measured) -> float | str:
+    if why := _no_reference(m):
+        return why
+    if not m.complete:
+        return f"ended at t = {m.t_stop:.4g}"
+    if m.position_t.size == 0 or m.position_t[-1] != m.t[-1]:
+        return "the reference does not reach the end time"
+    return float(m.position[-1])
+
+
+def _position_max(m: Measured) -> float | str:
+    return _no_reference(m) or _largest(m.position, m.position_t)
+
+
+def _axis_end(m: Measured) -> float | str:
+    if not m.complete:
+        return f"ended at t = {m.t_stop:.4g}"
+    return float(m.y[-1, 8])
+
+
+def _axis_error(m: Measured) -> float | str:
+    if why := _no_reference(m):
+        return why
+    if not m.complete or m.reference is None:
+        return f"ended at t = {m.t_stop:.4g}"
+    if m.reference.t[-1] != m.t[-1]:
+        return "the reference does not reach the end time"
+    return abs(float((m.y[-1, 8] - m.reference.high[-1, 8]) - m.reference.low[-1, 8]))
+
+
+def _counter(name: str, words: str) -> Callable[[Measured], float | str]:
+    def count(m: Measured) -> float | str:
+        number = getattr(m.counters, name)
+        return f"not applicable: the library counts no {words}" if number is None else float(number)
+
+    return count
+
+
+def _warm_seconds(m: Measured) -> float | str:
+    if m.timing is None:
+        return "not timed"
+    return m.timing.summary.get("median", m.timing.why or "not timed")
+
+
+def _compile_seconds(m: Measured) -> float | str:
+    compile_ = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
+    if compile_ is None or compile_.cached is None:
+        return "nothing is compiled at run time"
+    return compile_.seconds
+
+
+_TABLE = [
+    Metric(
+        key="energy_max",
+        label="energy error",
+        unit="relative",
+        better="lower",
+        scale="log",
+        function=_error_max("energy"),
+        description="Largest relative error of the energy over all samples, evaluated in double-double.",
+    ),
+    Metric(
+        key="energy_end",
+        label="energy error at the end",
+        unit="relative",
+        better="lower",
+        scale="log",
+        function=_energy_end,
+        description="Relative error of the energy at the last sample.",
+    ),
+    Metric(
+        key="angular_momentum_max",
+        label="angular momentum error",
+        unit="relative",
+        better="lower",
+        scale="log",
+        function=_error_max("angular_momentum"),
+        description="Largest 2-norm of the error of the angular momentum vector, relative to its length.",
+    ),
+    Metric(
+        key="guard_max",
+        label="off-axis distance",
+        unit="length",
+        better="lower",
+        scale="log",
+        function=_guard_max,
+        description="Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the "
+        "planetoid's distance from the axis). Where it is not 0 the run follows another trajectory.",
+    ),
+    Metric(
+        key="position_end",
+        label="position error at the end",
+        unit="length",
+        better="lower",
+        scale="log",
+        function=_position_end,
+        description="Largest distance of a body from where the 128-bit reference has it at the end time.",
+        same_trajectory=True,
+    ),
+    Metric(
+        key="position_max",
+        label="position error",
+        unit="length",
+        better="lower",
+        scale="log",
+        function=_position_max,
+        description="The same, the largest over the times of the stored reference.",
+        same_trajectory=True,
+    ),
+    Metric(
+        key="z_end",
+        label="z at the end",
+        unit="length",
+        better=None,
+        scale="linear",
+        function=_axis_end,
+        description="Where the planetoid is on the axis at the end time.",
+        same_trajectory=True,
+        problem="sitnikov",
+    ),
+    Metric(
+        key="z_error",
+        label="error of z at the end",
+        unit="length",
+        better="lower",
+        scale="log",
+        function=_axis_error,
+        description="Distance of z at the end time from the stored 128-bit reference.",
+        same_trajectory=True,
+        problem="sitnikov",
+    ),
+    Metric(
+        key="distance_max",
+        label="largest distance",
+        unit="length",
+        better=None,
+        scale="log",
+        function=_distance_max,
+        description="Largest distance of a body from the origin: shows what escaped.",
+    ),
+    Metric(
+        key="steps",
+        label="steps",
+        unit="",
+        better=None,
+        scale="log",
+        function=_counter("steps", "steps"),
+        description="Accepted steps.",
+    ),
+    Metric(
+        key="evaluations",
+        label="evaluations",
+        unit="",
+        better="lower",
+        scale="log",
+        function=_counter("evaluations", "right-hand-side evaluations"),
+        description="Evaluations of the vector field at one state; Taylor methods and maps have none.",
+        same_trajectory=True,
+    ),
+    Metric(
+        key="warm_seconds",
+        label="time",
+        unit="s",
+        better="lower",
+        scale="log",
+        function=_warm_seconds,
+        description="Median wall seconds of a whole integration without output, compiled before, alone.",
+        same_trajectory=True,
+    ),
+    Metric(
+        key="compile_seconds",
+        label="compile time",
+        unit="s",
+        better="lower",
+        scale="log",
+        function=_compile_seconds,
+        description="Seconds of compilation before the first step, from a cache where the library keeps one.",
+        whole_span=False,
+    ),
+]
+
+METRICS: dict[str, Metric] = {metric.key: metric for metric in _TABLE}
+TIMING_KEYS = ("warm_seconds", "compile_seconds")

@@ -1,0 +1,181 @@
+"""What the store keeps of a case: plain, typed, JSON.
+
+Not-a-number and infinity never enter a record: a value that does not exist is
+``None`` with a sentence saying why.
+"""
+
+import math
+from statistics import median, quantiles
+from typing import Literal
+
+import msgspec
+
+from hbvm_bench.campaign import Case, Limits, Role
+
+SCHEMA = 1
+
+Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
+
+
+class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One metric of one case.
+
+    Attributes
+    ----------
+    value : float or None
+        The number; ``None`` where there is none.
+    void : bool
+        Whether the number exists but must not be compared.
+    why : str
+        Why there is no number, or why it is void.
+    """
+
+    value: float | None = None
+    void: bool = False
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        if self.value is not None and not math.isfinite(self.value):
+            raise ValueError(f"a metric must be finite, not {self.value!r}")
+
+    @property
+    def counts(self) -> bool:
+        """Whether the number may be compared with other cases'."""
+        return self.value is not None and not self.void
+
+
+class Compile(msgspec.Struct, frozen=True, kw_only=True):
+    """Seconds of one compilation, and whether it came from a cache (``None``: nothing to compile)."""
+
+    seconds: float
+    cached: bool | None
+
+
+class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
+    """What one visit of the timing pass measured, in a process of its own.
+
+    Attributes
+    ----------
+    samples : list of float
+        Seconds per whole integration.
+    repeats : int
+        Integrations in one sample.
+    compile : Compile
+        The compilation in this process.
+    """
+
+    samples: list[float]
+    repeats: int
+    compile: Compile
+
+
+class Timing(msgspec.Struct, frozen=True, kw_only=True):
+    """All samples of the timing pass; nothing is thrown away.
+
+    Attributes
+    ----------
+    rounds : list of TimingRound
+        Round by round.
+    why : str
+        Why there are none, or fewer than planned.
+    """
+
+    rounds: list[TimingRound] = []
+    why: str = ""
+
+    @property
+    def samples(self) -> list[float]:
+        return [sample for one in self.rounds for sample in one.samples]
+
+    @property
+    def summary(self) -> dict[str, float]:
+        """Return ``median``, ``min``, ``q1``, ``q3`` in seconds; empty without samples."""
+        samples = sorted(self.samples)
+        if not samples:
+            return {}
+        q1, _, q3 = quantiles(samples, n=4, method="inclusive") if len(samples) > 1 else samples * 3
+        return {"median": median(samples), "min": samples[0], "q1": q1, "q3": q3}
+
+    @property
+    def compile(self) -> Compile | None:
+        """Return the compilation with the median seconds."""
+        compiles = sorted((one.compile for one in self.rounds), key=lambda c: c.seconds)
+        return compiles[(len(compiles) - 1) // 2] if compiles else None
+
+
+class Counters(msgspec.Struct, frozen=True, kw_only=True):
+    """Work done; ``None`` where a library has no such counter."""
+
+    steps: int | None = None
+    rejections: int | None = None
+    evaluations: int | None = None
+    iterations: int | None = None
+    solver: str | None = None
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """What a worker process reports of the case it ran.
+
+    Attributes
+    ----------
+    outcome : str
+        ``ok``, ``stalled``, ``refused`` or ``crashed``; the other outcomes are seen from outside.
+    status : str
+        The solution's own status; empty without a solution.
+    reason : str
+        One sentence where something did not go as asked.
+    t_stop : float or None
+        Where the integration stopped.
+    counters, metrics, compile
+        What was measured.
+    """
+
+    outcome: Outcome
+    status: str = ""
+    reason: str = ""
+    t_stop: float | None = None
+    counters: Counters = Counters()
+    metrics: dict[str, Value] = {}
+    compile: Compile | None = None
+
+
+class Record(msgspec.Struct, frozen=True, kw_only=True):
+    """One case in the store.
+
+    Attributes
+    ----------
+    id : str
+        See `hbvm_bench.identity`.
+    case : Case
+        What was run.
+    role, library, order
+        Of the method.
+    result : Result
+        What came out.
+    timing : Timing or None
+        From the serial timing pass.
+    limits : Limits
+        Under which it ran.
+    seconds, peak_memory_gib : float
+        Of the process of the accuracy run, start and imports included.
+    log : str
+        The end of what the process printed, where it crashed.
+    versions, machine, finished
+        Where and when it was measured.
+    """
+
+    id: str
+    case: Case
+    role: Role
+    library: str
+    order: int | None
+    result: Result
+    timing: Timing | None = None
+    limits: Limits = Limits()
+    seconds: float = 0.0
+    peak_memory_gib: float = 0.0
+    log: str = ""
+    versions: dict[str, str] = {}
+    machine: dict[str, str | int] = {}
+    finished: str = ""
+    schema: int = SCHEMA

@@ -1,0 +1,168 @@
+"""The store: one atomic JSON file per case, its series beside it, and an index.
+
+::
+
+    DIR/campaign.json        what was asked for: the campaign and the ids of its cases
+    DIR/cases/<id>.json      one record per case
+    DIR/cases/<id>.npz       its series
+
+A file is complete or not there, so that the store is also the cache: a rerun
+does what is missing. Nothing is pickled.
+"""
+
+import os
+import tempfile
+import threading
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign import Campaign
+from hbvm_bench.records import SCHEMA, Record
+from problems.errors import InputError
+
+INDEX = "campaign.json"
+CASES = "cases"
+NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
+
+
+class Index(msgspec.Struct, frozen=True, kw_only=True):
+    """What a run was asked to do.
+
+    Attributes
+    ----------
+    campaign : Campaign
+        As read.
+    ids : list of str
+        The ids of its cases, in order.
+    version : str
+        Of this package.
+    command : str
+        How to run it again.
+    """
+
+    campaign: Campaign
+    ids: list[str]
+    version: str
+    command: str
+    schema: int = SCHEMA
+
+
+class Store:
+    """Records and series in a directory; see the module's text."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = Path(directory)
+        self.cases = self.directory / CASES
+
+    def prepare(self) -> None:
+        """Make the directories, or refuse a place that cannot be written.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If nothing can be written there; nothing is left behind.
+        """
+        ensure_writable(self.cases)
+
+    def load(self, case_id: str) -> Record | None:
+        """Return the record of a case, or ``None`` if it is missing or unreadable."""
+        try:
+            record = msgspec.json.decode(self._record_path(case_id).read_bytes(), type=Record)
+        except (FileNotFoundError, msgspec.MsgspecError):
+            return None
+        return record if record.id == case_id and record.schema == SCHEMA else None
+
+    def save(self, record: Record, series: dict[str, NDArray[np.float64]] | None = None) -> None:
+        """Store a record, its series first so that a record never lacks them."""
+        if series is not None:
+            with atomic(self._series_path(record.id)) as path, path.open("wb") as stream:
+                np.savez_compressed(stream, allow_pickle=False, **series)  # pyright: ignore[reportArgumentType]
+        encoded = msgspec.json.format(msgspec.json.encode(record), indent=1)
+        with atomic(self._record_path(record.id)) as path:
+            path.write_bytes(encoded + b"\n")
+
+    def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
+        """Return the series of a case by name; empty where it has none."""
+        try:
+            with np.load(self._series_path(case_id), allow_pickle=False) as stored:
+                return {name: stored[name] for name in stored.files}
+        except (FileNotFoundError, ValueError, EOFError, zipfile.BadZipFile):
+            return {}
+
+    def write_index(self, index: Index) -> None:
+        """Store what the run was asked to do."""
+        with atomic(self.directory / INDEX) as path:
+            path.write_bytes(msgspec.json.format(msgspec.json.encode(index), indent=1) + b"\n")
+
+    def index(self) -> Index:
+        """Return what the run was asked to do.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the directory holds no run.
+        """
+        try:
+            content = (self.directory / INDEX).read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            there = "has no results" if self.directory.is_dir() else "does not exist"
+            raise InputError(
+                f"the directory {str(self.directory)!r} {there}; make some with: hbvm-bench run."
+            ) from None
+        except OSError as error:
+            raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
+        try:
+            return msgspec.json.decode(content, type=Index)
+        except (msgspec.MsgspecError, InputError) as error:
+            raise InputError(f"{self.directory / INDEX} is not the index of a run: {error}.") from None
+
+    def records(self) -> list[Record]:
+        """Return the records of the run that are there, in the order of the campaign."""
+        found = [self.load(case_id) for case_id in self.index().ids]
+        return [record for record in found if record is not None]
+
+    def _record_path(self, case_id: str) -> Path:
+        return self.cases / f"{case_id[:NAME_LENGTH]}.json"
+
+    def _series_path(self, case_id: str) -> Path:
+        return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
+
+
+@contextmanager
+def atomic(path: Path) -> Iterator[Path]:
+    """Yield a temporary path that becomes ``path`` if the block succeeds, and vanishes if not."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.part")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def ensure_writable(directory: Path) -> None:
+    """Make a directory and try to write in it; on failure leave nothing behind.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With the reason.
+    """
+    made: list[Path] = []
+    try:
+        missing = [path for path in (directory, *directory.parents) if not path.exists()]
+        for path in reversed(missing):
+            path.mkdir(exist_ok=True)
+            made.append(path)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+    except OSError as error:
+        for path in reversed(made):
+            path.rmdir()
+        raise InputError(f"cannot write to the directory {str(directory)!r}: {error.strerror}.") from None

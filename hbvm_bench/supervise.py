@@ -1,0 +1,166 @@
+"""A child process under hard limits of wall time and memory.
+
+Address-space limits are too blunt for libraries that compile at run time, so
+the resident memory is watched from outside and the child is killed when it
+passes its limit, whatever it is doing.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Literal
+
+from hbvm_bench.campaign import Limits
+
+POLL = 0.02  # seconds
+KEPT_OUTPUT = 64  # chunks of at most 4 KiB
+
+_children: set[subprocess.Popen[bytes]] = set()
+_lock = threading.Lock()
+_stopping = threading.Event()
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a child process ended.
+
+    Attributes
+    ----------
+    code : int
+        Its exit code; negative for a signal.
+    cause : {"exit", "timeout", "memory", "stopped"}
+        Whether it ended itself, or what it was killed for.
+    seconds : float
+        Wall time from start to end.
+    peak_gib : float
+        Largest resident memory.
+    output : str
+        The end of what it printed.
+    """
+
+    code: int
+    cause: Literal["exit", "timeout", "memory", "stopped"]
+    seconds: float
+    peak_gib: float
+    output: str
+
+    @property
+    def words(self) -> str:
+        """Say how it ended, as part of a sentence."""
+        if self.code < 0:
+            return f"ended by signal {_signal_name(-self.code)}"
+        return f"ended with exit code {self.code}"
+
+
+def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) -> Ended:
+    """Run a command to its end, or to its limits.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    environment : mapping of str
+        Added to this process's environment.
+    limits : Limits
+        Wall seconds and resident memory.
+
+    Returns
+    -------
+    Ended
+    """
+    start = time.monotonic()
+    child = subprocess.Popen(
+        list(command),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        env={**os.environ, **environment},
+        start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
+    )
+    with _lock:
+        _children.add(child)
+    kept: deque[bytes] = deque(maxlen=KEPT_OUTPUT)
+    assert child.stdout is not None
+    reader = threading.Thread(target=_drain, args=(child.stdout, kept), daemon=True)
+    reader.start()
+    cause: Literal["exit", "timeout", "memory", "stopped"] = "exit"
+    peak = 0.0
+    try:
+        while child.poll() is None:
+            peak = max(peak, _peak_gib(child.pid))
+            if _stopping.is_set():
+                cause = "stopped"
+            elif peak > limits.memory_gib:
+                cause = "memory"
+            elif time.monotonic() - start > limits.wall_seconds:
+                cause = "timeout"
+            if cause != "exit":
+                break
+            try:
+                child.wait(POLL)
+            except subprocess.TimeoutExpired:
+                continue
+    finally:
+        _kill(child)
+        with _lock:
+            _children.discard(child)
+    reader.join(timeout=5.0)
+    return Ended(
+        code=child.returncode,
+        cause="stopped" if _stopping.is_set() else cause,
+        seconds=time.monotonic() - start,
+        peak_gib=peak,
+        output=b"".join(kept).decode(errors="replace"),
+    )
+
+
+def stop_all() -> None:
+    """Kill all children; every `run` under way returns with the cause ``"stopped"``."""
+    _stopping.set()
+    with _lock:
+        children = list(_children)
+    for child in children:
+        _kill(child)
+
+
+def allow() -> None:
+    """Let `run` start children again after `stop_all`."""
+    _stopping.clear()
+
+
+def _kill(child: subprocess.Popen[bytes]) -> None:
+    # its session too: a child may have started processes of its own
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(child.pid, signal.SIGKILL)
+    child.wait()
+
+
+def _drain(stream: IO[bytes], kept: deque[bytes]) -> None:
+    with stream:
+        while chunk := os.read(stream.fileno(), 4096):
+            kept.append(chunk)
+
+
+def _peak_gib(pid: int) -> float:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return 0.0
+    for line in status.splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) / 2**20
+    return 0.0
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return str(number)

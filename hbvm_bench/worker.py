@@ -1,0 +1,156 @@
+"""The process that runs one case: ``python -m hbvm_bench.worker REQUEST.json``.
+
+It writes ``result.json`` (and ``series.npz`` or ``timing.json``) beside the
+request and leaves the store alone; whatever happens to it, the runner that
+started it says what.
+"""
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from hbvm_bench import reference, timing
+from hbvm_bench.campaign import Case, TimingPlan
+from hbvm_bench.identity import Resolved, resolve
+from hbvm_bench.measure import measure
+from hbvm_bench.metrics import evaluate
+from hbvm_bench.records import Result, TimingRound
+from hbvm_bench.store import atomic
+from integrators import integrate
+from integrators.integrate import Solution
+from integrators.protocol import Status
+from problems.errors import InputError
+
+LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
+ENVIRONMENT = {
+    # one thread each, whatever does the linear algebra
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+    "JAX_PLATFORMS": "cpu",
+}
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """What a worker is asked to do.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    id : str
+        The id that the runner gave it.
+    mode : {"measure", "time"}
+        The accuracy run, or one round of the timing pass.
+    plan : TimingPlan
+        For the timing pass.
+    core : int or None
+        The core to stay on.
+    """
+
+    case: Case
+    id: str
+    mode: Literal["measure", "time"] = "measure"
+    plan: TimingPlan = TimingPlan()
+    core: int | None = None
+
+
+class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
+    """One round of samples, or why there are none."""
+
+    round: TimingRound | None = None
+    why: str = ""
+
+
+def main(path: Path) -> None:
+    """Do what the request at ``path`` asks."""
+    _live_and_die_with_parent()
+    request = msgspec.json.decode(path.read_bytes(), type=Request)
+    if request.core is not None:
+        os.sched_setaffinity(0, {request.core})
+    work = _time if request.mode == "time" else _measure
+    name = "timing.json" if request.mode == "time" else "result.json"
+    reply = work(request, path.parent)
+    with atomic(path.parent / name) as temporary:
+        temporary.write_bytes(msgspec.json.encode(reply))
+
+
+def _live_and_die_with_parent() -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
+    if sys.platform == "linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+
+
+def _measure(request: Request, directory: Path) -> Result:
+    try:
+        resolved = _resolved(request)
+        if reason := resolved.method.accepts(resolved.problem):
+            return Result(outcome="refused", reason=reason)
+        grid = resolved.case.grid.times(resolved.problem)
+        solution = integrate(resolved.problem, resolved.method, grid)
+    except InputError as error:  # a missing library among them
+        return Result(outcome="refused", reason=str(error))
+    except Exception as error:
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
+    if wrong := _garbage(solution, grid):
+        return Result(outcome="crashed", reason=wrong, status=solution.status.value)
+    measured = measure(solution, reference.find(resolved.problem))
+    with atomic(directory / "series.npz") as temporary, temporary.open("wb") as stream:
+        np.savez(stream, allow_pickle=False, **measured.series())  # pyright: ignore[reportArgumentType]
+    return Result(
+        outcome="stalled" if solution.status is Status.STALLED else "ok",
+        status=solution.status.value,
+        reason=solution.reason,
+        t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
+        counters=measured.counters,
+        metrics=evaluate(measured),
+        compile=measured.compile,
+    )
+
+
+def _time(request: Request, directory: Path) -> TimingReply:
+    del directory
+    resolved = _resolved(request)
+    answer = timing.time_round(resolved.problem, resolved.method, request.plan)
+    return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
+
+
+def _resolved(request: Request) -> Resolved:
+    resolved = resolve(request.case)
+    if resolved.id != request.id:
+        raise InputError(
+            "this process does not see the versions and sources that the runner saw; start the run again."
+        )
+    return resolved
+
+
+def _garbage(solution: Solution, grid: np.ndarray) -> str:
+    """Return what is wrong with a solution that breaks the protocol, else ``""``."""
+    t, y = solution.t, solution.y
+    if t.ndim != 1 or y.shape != (t.size, solution.problem.system.dim):
+        return f"the method returned times of shape {t.shape} and states of shape {y.shape}"
+    if t.size > grid.size or not np.array_equal(t, grid[: t.size]):
+        return "the method returned times that were not asked for"
+    if solution.status is Status.FINISHED and t.size != grid.size:
+        return f"the method says it finished but returned {t.size} of {grid.size} samples"
+    if solution.status is Status.FINISHED and not np.isfinite(y).all():
+        first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
+        return f"the method says it finished but its state is not finite from t = {first:.4g}"
+    return ""
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
