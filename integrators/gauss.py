@@ -1,0 +1,79 @@
+"""Gauss-Legendre collocation, which is HBVM(s, s)."""
+
+from dataclasses import dataclass
+
+from integrators.hbvm import HBVM, HBVMProgram
+from integrators.protocol import MethodBase
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+CITATION = """\
+@book{HairerLubichWanner2006,
+  author = {Hairer, Ernst and Lubich, Christian and Wanner, Gerhard},
+  title = {Geometric Numerical Integration},
+  edition = {2},
+  publisher = {Springer},
+  year = {2006}
+}
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gauss(MethodBase):
+    """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
+
+    The very same code as ``HBVM(k=s, s=s, h)``, bit for bit: with k = s the
+    polynomial's derivative equals f at the nodes (equations: see `HBVM`).
+
+    Properties, each asserted in ``tests/integrators``: order 2s (`test_order`);
+    symmetric and perfectly A-stable (`test_tableau`, `test_hbvm`); keeps every
+    quadratic invariant to round-off (`test_energy`). Symplectic, as every method
+    that keeps all quadratic invariants is.
+
+    Limits: a Hamiltonian of degree 3 or more is conserved only up to O(h^{2s}),
+    and at large steps, or with changing steps, not at all.
+
+    Parameters
+    ----------
+    s : int
+        Number of stages, s >= 1; the order is 2s. s = 1 is the implicit midpoint rule.
+    h : float
+        Length of a step, > 0; integration backwards takes steps of -h.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values outside these ranges.
+    """
+
+    s: int
+    h: float
+
+    library = "hbvm-bench"
+    citation = CITATION
+    family = "gauss"
+
+    def __post_init__(self) -> None:
+        try:
+            twin = self.as_hbvm()
+        except InputError as error:
+            raise InputError(str(error).replace("HBVM", "Gauss")) from None
+        object.__setattr__(self, "s", twin.s)
+        object.__setattr__(self, "h", twin.h)
+
+    @property
+    def order(self) -> int:
+        """Order of convergence, 2s."""
+        return 2 * self.s
+
+    def as_hbvm(self) -> HBVM:
+        """Return the HBVM that this method is."""
+        return HBVM(k=self.s, s=self.s, h=self.h)
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Accept every system of ordinary differential equations."""
+        return None
+
+    def compile(self, system: System) -> HBVMProgram:
+        """Compile as `HBVM.compile` does."""
+        return self.as_hbvm().compile(system)
