@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from integrators.legendre import tables
 from integrators.protocol import Array
 
-# Measured for all s <= k <= 40: row sums are within 7e-16 of c, the weights' sum within 5e-16 of 1.
+# Measured for all s <= k <= 40: the rows' sums are within 3.4e-16 of c, the weights' sum within 2.3e-16 of 1.
 CONSISTENT = 1e-13
 
 
@@ -42,7 +42,9 @@ class Tableau:
     def __post_init__(self) -> None:
         k = self.b.size
         if self.A.shape != (k, k) or self.c.shape != (k,):
-            raise ValueError(f"A, b, c of shapes {self.A.shape}, {self.b.shape}, {self.c.shape} do not fit together.")
+            raise ValueError(
+                f"A, b, c of shapes {self.A.shape}, {self.b.shape}, {self.c.shape} do not fit together."
+            )
         if np.abs(self.A.sum(axis=1) - self.c).max() > CONSISTENT:
             raise ValueError("the rows of A must sum to c.")
         if abs(self.b.sum() - 1.0) > CONSISTENT:
