@@ -288,7 +288,7 @@ class HBVMStepper:
         if code == self._kernel.NOT_FINITE:
             return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {self.t!r}."
         return Status.NONLINEAR_DIVERGENCE, (
-            f"the fixed-point iteration did not converge in the step from t = {self.t!r} with h = {self._h!r} "
+            f"the fixed-point iteration did not converge in the step from t = {self.t!r}, h = {self._h!r} "
             f"(relative change {change:.1e} after {self._kernel.MAX_ITERATIONS} iterations at most); "
             "take a smaller h."
         )
@@ -376,5 +376,7 @@ def _length(method: str, h: Any) -> float:
     except (TypeError, ValueError):
         length = math.nan
     if not (length > 0.0 and math.isfinite(length)):
-        raise InputError(f"{method} needs a finite step h > 0, not h={h!r}; the sign of time is that of the times.")
+        raise InputError(
+            f"{method} needs a finite step h > 0, not h={h!r}; the sign of time is that of the times."
+        )
     return length

@@ -58,7 +58,7 @@ def _call(typingctx: Any, field: Any, t: Any, y: Any, par: Any, out: Any) -> Any
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _evaluate(field, par, t, h, y, e, integrals, nodes, gamma, stage, values):
-    """values[l] = f(t + c_l h, y + (e + h sum_j integrals[l, j] gamma[j]))."""
+    """Set values[l] = f(t + c_l h, y + (e + h sum_j integrals[l, j] gamma[j]))."""
     k, s = integrals.shape
     dim = y.size
     for i in range(k):
@@ -75,7 +75,7 @@ def _evaluate(field, par, t, h, y, e, integrals, nodes, gamma, stage, values):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _project(projection, values, gamma):
-    """gamma = projection @ values, added in the order of the stages."""
+    """Set gamma = projection @ values, added in the order of the stages."""
     s, k = projection.shape
     dim = values.shape[1]
     for j in range(s):
@@ -169,7 +169,9 @@ def _iterate(field, par, t, h, y, e, integrals, projection, nodes, block, group,
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _solve(field, par, t, h, y, e, integrals, projection, nodes, block, group, previous, length, gamma, counters):
+def _solve(
+    field, par, t, h, y, e, integrals, projection, nodes, block, group, previous, length, gamma, counters
+):
     """Find gamma of the step of length h at t; length is the previous step's (0: there is none)."""
     if length != 0.0 and abs(h / length) <= FARTHEST:
         values = np.empty((nodes.size, y.size))
@@ -190,7 +192,7 @@ def _solve(field, par, t, h, y, e, integrals, projection, nodes, block, group, p
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _add(y, e, h, slope):
-    """(y, e) <- (y, e) + h slope, exactly but for the rounding of the increment (two-sum)."""
+    """Add h slope to (y, e), exactly but for the rounding of the increment (two-sum)."""
     for d in range(y.size):
         increment = h * slope[d] + e[d]
         total = y[d] + increment
@@ -201,7 +203,7 @@ def _add(y, e, h, slope):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _interpolate(y, e, h, c, gamma, out):
-    """out = y + h sum_j gamma_j int_0^c P_j, the collocation polynomial inside the step."""
+    """Set out = y + h sum_j gamma_j int_0^c P_j, the collocation polynomial inside the step."""
     s, dim = gamma.shape
     out[:] = 0.0
     x = 2.0 * c - 1.0
