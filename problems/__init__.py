@@ -1,1 +1,19 @@
 """Hamiltonian and other systems, written down once and given to every engine alike."""
+
+from problems.errors import InputError, MissingLibraryError, UnknownNameError
+from problems.hamiltonian import Bodies, Hamiltonian, System, VectorField
+from problems.problem import Problem
+from problems.registry import load, names
+
+__all__ = [
+    "Bodies",
+    "Hamiltonian",
+    "InputError",
+    "MissingLibraryError",
+    "Problem",
+    "System",
+    "UnknownNameError",
+    "VectorField",
+    "load",
+    "names",
+]

@@ -1,0 +1,65 @@
+"""Errors in a user's function, told with the line that caused them and the remedy."""
+
+import linecache
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType, TracebackType
+from typing import Any, NoReturn
+
+from problems.errors import InputError
+
+# Modules that run between the user's line and the error; their frames are never the user's.
+_MACHINERY = frozenset(
+    f"problems.{name}" for name in ("blame", "tracing", "sums", "arguments", "hamiltonian", "problem")
+)
+
+
+def _is_users(frame: FrameType) -> bool:
+    module = str(frame.f_globals.get("__name__", ""))
+    return module not in _MACHINERY and module.split(".")[0] not in ("numpy", "math", "builtins")
+
+
+def _describe(filename: str, line: int) -> str:
+    text = linecache.getline(filename, line).strip()
+    place = f"{Path(filename).name}:{line}"
+    return f"{place}: `{text}`" if text else place
+
+
+def users_line() -> str:
+    """Return the user's line now running, as ``"file.py:12: `code`"`` (empty when there is none)."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None:
+        if _is_users(frame):
+            return _describe(frame.f_code.co_filename, frame.f_lineno)
+        frame = frame.f_back
+    return ""
+
+
+def line_of_traceback(traceback: TracebackType | None) -> str:
+    """Return the innermost line of the user's in a traceback (empty when there is none)."""
+    found = ""
+    while traceback is not None:
+        if _is_users(traceback.tb_frame):
+            found = _describe(traceback.tb_frame.f_code.co_filename, traceback.tb_lineno)
+        traceback = traceback.tb_next
+    return found
+
+
+def line_of_function(function: Callable[..., Any]) -> str:
+    """Return the line where a function is defined (empty for one without Python code)."""
+    code = getattr(function, "__code__", None)
+    return _describe(code.co_filename, code.co_firstlineno) if code is not None else ""
+
+
+def refuse(what: str, remedy: str) -> NoReturn:
+    """Raise `InputError` for the user's line now running.
+
+    Parameters
+    ----------
+    what : str
+        What the line does, as the start of a sentence: ``"this branches on a symbol"``.
+    remedy : str
+        What to write instead.
+    """
+    raise InputError(f"{users_line()}: {what}; {remedy}")

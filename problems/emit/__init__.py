@@ -1,0 +1,206 @@
+"""One traced system to source for numpy, numba, JAX and heyoka: the same operations in the same order."""
+
+import hashlib
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from problems.emit import cache
+from problems.emit.array import jax_text, numpy_text
+from problems.emit.plan import SMALL, Plan, make_plan
+from problems.emit.scalar import heyoka_text, numba_text
+from problems.errors import InputError, MissingLibraryError, unknown
+from problems.hamiltonian import System
+
+_WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
+BACKENDS = tuple(_WRITERS)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Generated source.
+
+    Attributes
+    ----------
+    text : str
+        One function, preceded by its index tables (``TABLE_0 = np.array(...)``)
+        where a declared sum is a loop over a list.
+    name : str
+        The function's name.
+    sha256 : str
+        Hash of the text.
+    """
+
+    text: str
+    name: str
+    sha256: str
+
+
+_texts: WeakKeyDictionary[System, dict[tuple[str, str, int | None], Source]] = WeakKeyDictionary()
+_compiled: dict[tuple[str, str], Any] = {}
+
+
+def function_name(system: System, what: str) -> str:
+    """Return the name of an emitted function."""
+    return re.sub(r"\W+", "_", f"{system.name}_{what}")
+
+
+def source(system: System, what: str, backend: str, *, limit: int | None = SMALL) -> Source:
+    """Return the source of one of a system's functions.
+
+    Parameters
+    ----------
+    system : System
+        The traced system.
+    what : str
+        ``"field"`` (dim outputs: q' then p'), ``"force"`` (dof outputs -dH/dq from
+        positions alone; separable systems), ``"velocity_scale"`` (dof outputs c
+        with q'_i = c_i p_i; separable systems), ``"hamiltonian"``,
+        ``"invariant:<name>"``, ``"guard:<name>"``.
+    backend : {"numpy", "numba", "jax", "heyoka"}
+        numba: ``def name(t, y, par, out)`` on scalars, with the functions of
+        `math` as globals; works unchanged on lanes. numpy: the same signature
+        on arrays. jax: ``def name(t, y, par)``. heyoka: ``def name(t, y, par, hy)``.
+    limit : int or None
+        Largest number of operations of a declared sum that is written out term
+        by term; ``None``: all (always so for heyoka), 0: none.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an unknown backend, or a function that the system does not have.
+    """
+    if backend not in _WRITERS:
+        raise unknown("backend", backend, BACKENDS)
+    if backend == "heyoka":
+        limit = None
+    texts = _texts.setdefault(system, {})
+    key = (what, backend, limit)
+    if key not in texts:
+        function = system.function(what)
+        name = function_name(system, what)
+        text = _WRITERS[backend](make_plan(function, limit=limit), name)
+        texts[key] = Source(text, name, hashlib.sha256(text.encode()).hexdigest())
+    return texts[key]
+
+
+def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
+    code = compile(made.text, f"<{made.name}>", "exec")
+    exec(code, namespace)  # noqa: S102 -- text made by this package from a graph, never from the user's text
+    return namespace[made.name]
+
+
+def numpy(system: System, what: str) -> Callable[..., np.ndarray]:
+    """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
+
+    ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
+    the like give inf and nan, in silence, as in compiled code.
+    """
+    made = source(system, what, "numpy")
+    key = ("numpy", made.sha256)
+    if key not in _compiled:
+        inner = _executed(made, {"np": np})
+        n_out = len(system.function(what).outputs)
+
+        def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
+            y = np.asarray(y, dtype=np.float64)
+            par = np.asarray(par, dtype=np.float64)
+            if par.ndim == 1 and y.ndim == 2:
+                par = par[:, np.newaxis]
+            out = np.empty((n_out, *y.shape[1:]))
+            with np.errstate(all="ignore"):
+                inner(t, y, par, out)
+            return out
+
+        evaluate.__name__ = made.name
+        _compiled[key] = evaluate
+    return _compiled[key]
+
+
+def numba(system: System, what: str) -> Any:
+    """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
+
+    No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not overlap.
+    """
+    made = source(system, what, "numba")
+    key = ("numba", made.sha256)
+    if key not in _compiled:
+        head = "from math import copysign, cos, exp, fabs, log, sin, sqrt, tan\n\nimport numba\nimport numpy as np\n\n"
+        cut = made.text.index(f"def {made.name}(")
+        decorator = '@numba.njit(cache=True, error_model="numpy")\n'
+        text = head + made.text[:cut] + "\n" + decorator + made.text[cut:]
+        _compiled[key] = getattr(cache.module(text, made.name), made.name)
+    return _compiled[key]
+
+
+def jax(system: System, what: str) -> Callable[..., Any]:
+    """Return ``f(t, y, par)`` on JAX arrays; y is (dim,); switches JAX to double precision.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        If JAX is not installed.
+    """
+    try:
+        import jax as library
+        import jax.numpy as jnp
+    except ImportError as error:
+        raise _missing("jax") from error
+    library.config.update("jax_enable_x64", True)
+    made = source(system, what, "jax")
+    key = ("jax", made.sha256)
+    if key not in _compiled:
+        _compiled[key] = _executed(made, {"np": np, "jnp": jnp})
+    return _compiled[key]
+
+
+def heyoka(system: System, what: str = "field") -> list[Any]:
+    """Return heyoka expressions: pairs of variable and right-hand side for ``"field"``.
+
+    Variables are ``q0.., p0..`` (``y0..`` for a vector field), parameters
+    ``hy.par[i]``, time ``hy.time``. For other functions of the system, the list
+    of expressions.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        If heyoka is not installed.
+    """
+    try:
+        import heyoka as hy
+    except ImportError as error:
+        raise _missing("heyoka") from error
+    made = source(system, what, "heyoka")
+    width = len(str(system.dim))
+    if system.dof is None:
+        names = [f"y{i:0{width}d}" for i in range(system.dim)]
+    else:
+        names = [f"{x}{i:0{width}d}" for x in "qp" for i in range(system.dof)]
+    variables = list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
+    expressions = _executed(made, {})(hy.time, variables, hy.par, hy)
+    expressions = [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
+    return list(zip(variables, expressions, strict=True)) if what == "field" else expressions
+
+
+def _missing(library: str) -> MissingLibraryError:
+    return MissingLibraryError(
+        f"{library} is not installed; install it with: pip install 'hbvm-bench[peers]'."
+    )
+
+
+__all__ = [
+    "BACKENDS",
+    "InputError",
+    "Plan",
+    "Source",
+    "function_name",
+    "heyoka",
+    "jax",
+    "numba",
+    "numpy",
+    "source",
+]

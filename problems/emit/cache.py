@@ -1,0 +1,119 @@
+"""Generated source kept in files, so that compiled code is found again by later processes.
+
+numba finds its compiled code again only for functions that live in a file, and
+loads it only if the module's name is the file's and stands in ``sys.modules``
+(it pickles references to it). Files are named by a hash of everything that goes
+into them, written to a temporary name and moved into place.
+"""
+
+import contextlib
+import functools
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+from problems.errors import InputError
+
+VARIABLE = "HBVM_BENCH_CACHE"
+
+
+@functools.cache
+def _prepared(explicit: str | None, xdg: str | None) -> Path:
+    if explicit:
+        folder = Path(explicit).expanduser()
+    else:
+        folder = (Path(xdg) if xdg else Path.home() / ".cache") / "hbvm-bench"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        if explicit:
+            raise InputError(
+                f"{VARIABLE}={explicit} is not a folder that can be written: {error}."
+            ) from error
+        # Without a home to write to, the code is compiled anew in each process.
+        folder = Path(tempfile.mkdtemp(prefix="hbvm-bench-"))
+    return folder
+
+
+def directory() -> Path:
+    """Return the folder of generated source, made if it is missing.
+
+    ``HBVM_BENCH_CACHE``, else ``$XDG_CACHE_HOME/hbvm-bench``, else
+    ``~/.cache/hbvm-bench``; where none of the latter two can be written, a
+    folder of this process.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If ``HBVM_BENCH_CACHE`` names a folder that cannot be written.
+    """
+    return _prepared(os.environ.get(VARIABLE), os.environ.get("XDG_CACHE_HOME"))
+
+
+def versions() -> str:
+    """Return what compiled code depends on besides its source."""
+    import numba
+
+    python = ".".join(map(str, sys.version_info[:3]))
+    return f"python {python} numba {numba.__version__}"
+
+
+def module(text: str, stem: str) -> ModuleType:
+    """Import generated source as a module from the cache folder.
+
+    Parameters
+    ----------
+    text : str
+        The module's source, complete with its imports.
+    stem : str
+        Start of the module's name; the hash of the text and of `versions` follows.
+
+    Returns
+    -------
+    ModuleType
+        The same module object for the same text, within a process.
+    """
+    full = f"# {versions()}\n{text}"
+    name = f"{stem}_{hashlib.sha256(full.encode()).hexdigest()[:20]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    path = directory() / f"{name}.py"
+    # Left alone when it is right: numba takes a newer file for a changed one.
+    if not _holds(path, full):
+        _write(path, full)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[name] = made
+    try:
+        spec.loader.exec_module(made)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return made
+
+
+def _holds(path: Path, text: str) -> bool:
+    try:
+        return path.read_text(encoding="utf-8") == text
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _write(path: Path, text: str) -> None:
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".tmp")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).replace(path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(temporary).unlink()
+        raise

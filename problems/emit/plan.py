@@ -1,0 +1,308 @@
+"""From a function's graph to the statements that every emitter prints.
+
+Small declared sums are written out term by term, large ones stay loops; powers
+become products; statements are ordered so that one pair of bodies is finished
+before the next begins. The order of additions is the same in all cases.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from problems.differentiate import LoopTerm, Term, reachable
+from problems.functions import Function
+from problems.sums import Affine, Loop
+from problems.tracing import Graph, Node
+
+# Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
+SMALL = 700
+
+
+@dataclass(frozen=True, eq=False)
+class Let:
+    """A value to be computed."""
+
+    node: Node
+
+
+@dataclass(frozen=True, eq=False)
+class Store:
+    """An output is complete."""
+
+    place: int
+    node: Node
+
+
+@dataclass(frozen=True, eq=False)
+class Reduce:
+    """``node``, a declared sum, to be computed by a loop over ``body``."""
+
+    node: Node
+    loop: Loop
+    body: tuple[Node, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """A loop over ``body`` that adds onto outputs.
+
+    Attributes
+    ----------
+    unique : tuple of bool
+        For each entry, whether its outputs receive nothing else from any loop,
+        so that they are stored rather than added to.
+    """
+
+    loop: Loop
+    body: tuple[Node, ...]
+    entries: tuple[LoopTerm, ...]
+    unique: tuple[bool, ...]
+
+
+@dataclass
+class Plan:
+    """Statements in order.
+
+    Attributes
+    ----------
+    n_out : int
+        Number of outputs.
+    first, last : list
+        Statements before and after the loops that add onto outputs.
+    zeros : list of int
+        Outputs that the loops add to, so that they start from (negative) zero.
+    scatters : list of Scatter
+        The loops that add onto outputs.
+    uses : dict
+        How often each node is used; one used once is printed in place.
+    """
+
+    n_out: int
+    first: list[Let | Reduce | Store] = field(default_factory=list)
+    zeros: list[int] = field(default_factory=list)
+    scatters: list[Scatter] = field(default_factory=list)
+    last: list[Let | Reduce | Store] = field(default_factory=list)
+    uses: dict[int, int] = field(default_factory=dict)
+
+
+def _body(roots: Sequence[Node], loop: Loop) -> list[Node]:
+    """Return the nodes inside a loop that ``roots`` depend on, arguments first."""
+    seen: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        node = stack.pop()
+        if node.loop is loop and node.id not in seen:
+            seen[node.id] = node
+            stack.extend(node.args)
+    return [seen[key] for key in sorted(seen)]
+
+
+class _Rewriter:
+    """Expands powers, and the declared sums that are small enough."""
+
+    def __init__(self, graph: Graph, limit: int | None, roots: Sequence[Node]) -> None:
+        self.graph = graph
+        self.limit = limit
+        self.done: dict[int, Node] = {}
+        self._uses: dict[int, int] = {}
+        for arg in [arg for node in reachable(list(roots)) for arg in node.args] + list(roots):
+            self._uses[arg.id] = self._uses.get(arg.id, 0) + 1
+        self.rewrite(roots)
+
+    def small(self, loop: Loop, roots: Sequence[Node]) -> bool:
+        return self.limit is None or len(loop) * len(_body(roots, loop)) <= self.limit
+
+    def rewrite(self, roots: Sequence[Node]) -> None:
+        for node in reachable(list(roots)):
+            if node.id in self.done or node.loop is not None:
+                continue
+            if node.op == "sum":
+                self.done[node.id] = self._sum(node)
+            else:
+                self.done[node.id] = self._apply(node, self.done)
+
+    def _apply(self, node: Node, done: dict[int, Node]) -> Node:
+        args = tuple(done[arg.id] if arg.id in done else self.done[arg.id] for arg in node.args)
+        if node.op == "pow":
+            return self.graph.expanded(args[0], node.data)
+        if node.op == "neg" and args[0].op == "sub" and self._uses[node.args[0].id] == 1:
+            return self.graph.sub(*args[0].args[::-1])  # -(a - b), used here only
+        return self.graph.apply(node, args)
+
+    def _sum(self, node: Node) -> Node:
+        loop, root = node.data, node.args[0]
+        if not self.small(loop, [root]):
+            return self.graph.sum(self.inside([root], loop)[0], loop)
+        total: Node | None = None
+        for (term,) in self.written_out([root], loop):
+            total = term if total is None else total + term
+        assert total is not None
+        return total
+
+    def inside(self, roots: Sequence[Node], loop: Loop) -> list[Node]:
+        """Rewrite nodes inside a loop that stays one."""
+        done: dict[int, Node] = {}
+        for node in _body(roots, loop):
+            done[node.id] = node if node.op in ("symbol", "index") else self._apply(node, done)
+        return [done[root.id] if root.id in done else self.done[root.id] for root in roots]
+
+    def written_out(self, roots: Sequence[Node], loop: Loop) -> list[list[Node]]:
+        """Return the roots at every term of a loop."""
+        body = _body(roots, loop)
+        places = {n.id: _affine(n).values(loop) for n in body if n.op in ("symbol", "index")}
+        rows: list[list[Node]] = []
+        for k in range(len(loop)):
+            done: dict[int, Node] = {}
+            for node in body:
+                if node.op == "symbol":
+                    place = int(places[node.id][k])
+                    done[node.id] = self.graph.symbol(node.data[0], place, flags=node.flags)
+                elif node.op == "index":
+                    done[node.id] = self.graph.const(float(places[node.id][k]))
+                else:
+                    done[node.id] = self._apply(node, done)
+            rows.append([done[root.id] if root.id in done else self.done[root.id] for root in roots])
+        return rows
+
+
+def _affine(node: Node) -> Affine:
+    return node.data[1] if node.op == "symbol" else node.data
+
+
+def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
+    """Order the operations of a function.
+
+    Parameters
+    ----------
+    function : Function
+        What to compute.
+    limit : int or None
+        Largest number of operations of a declared sum that is written out;
+        ``None`` writes out all of them, 0 none.
+    """
+    graph = function.graph
+    loop_roots = [entry.node for _, entries in function.loops for entry in entries]
+    scalar_roots = [term.node for terms in function.outputs for term in terms]
+    rewriter = _Rewriter(graph, limit, loop_roots + scalar_roots)
+
+    chains: list[list[Term]] = [[] for _ in function.outputs]
+    kept: list[tuple[Loop, list[LoopTerm]]] = []
+    step = -1_000_000_000  # written-out loops come before the other summands
+    for loop, entries in function.loops:
+        roots = [entry.node for entry in entries]
+        if not rewriter.small(loop, roots):
+            inside = rewriter.inside(roots, loop)
+            kept.append((loop, [LoopTerm(e.index, n) for e, n in zip(entries, inside, strict=True)]))
+            continue
+        places = [entry.index.values(loop) for entry in entries]
+        for k, nodes in enumerate(rewriter.written_out(roots, loop)):
+            for place, node in zip(places, nodes, strict=True):
+                step += 1
+                chains[int(place[k])].append(Term(node, step))
+    for chain, terms in zip(chains, function.outputs, strict=True):
+        chain.extend(Term(rewriter.done[term.node.id], term.key) for term in terms)
+
+    plan = Plan(len(chains))
+    covered = _scatters(plan, kept)
+    finals, hints = _chains(graph, chains, covered)
+    _schedule(plan, finals, hints)
+    return plan
+
+
+def _scatters(plan: Plan, kept: list[tuple[Loop, list[LoopTerm]]]) -> set[int]:
+    hits = np.zeros(plan.n_out, dtype=np.int64)
+    for loop, entries in kept:
+        for entry in entries:
+            np.add.at(hits, entry.index.values(loop), 1)
+    for loop, entries in kept:
+        unique = tuple(bool((hits[entry.index.values(loop)] == 1).all()) for entry in entries)
+        body = _body([entry.node for entry in entries], loop)
+        plan.scatters.append(Scatter(loop, tuple(body), tuple(entries), unique))
+        for entry, alone in zip(entries, unique, strict=True):
+            if not alone:
+                plan.zeros.extend(int(place) for place in entry.index.values(loop))
+    plan.zeros = sorted(set(plan.zeros))
+    return {int(place) for place in np.flatnonzero(hits)}
+
+
+def _chains(
+    graph: Graph, chains: list[list[Term]], covered: set[int]
+) -> tuple[list[tuple[int, Node]], list[Node]]:
+    """Add up the summands of each output; return the sums and the partial sums in order of use."""
+    finals: list[tuple[int, Node]] = []
+    partial: list[tuple[int, Node]] = []
+    for place, chain in enumerate(chains):
+        total = graph.symbol("out", place, flags=0) if place in covered else None
+        for term in chain:
+            total = term.node if total is None else total + term.node
+            partial.append((term.key, total))
+        if chain or place not in covered:
+            finals.append((place, graph.const(0.0) if total is None else total))
+    return finals, [node for _, node in sorted(partial, key=lambda item: item[0])]
+
+
+def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> None:
+    outputs: dict[int, list[int]] = {}
+    for place, node in finals:
+        outputs.setdefault(node.id, []).append(place)
+    done: set[int] = set()
+    captured = [
+        arg for scatter in plan.scatters for node in scatter.body for arg in node.args if arg.loop is None
+    ] + [e.node for scatter in plan.scatters for e in scatter.entries if e.node.loop is None]
+
+    def emit(roots: Sequence[Node], statements: list[Let | Reduce | Store]) -> None:
+        for root in roots:
+            for node in _demanded(root, done):
+                if node.op == "sum":
+                    statements.append(Reduce(node, node.data, tuple(_body(node.args, node.data))))
+                else:
+                    statements.append(Let(node))
+                for place in outputs.pop(node.id, ()):
+                    statements.append(Store(place, node))
+
+    emit(captured, plan.first)
+    # An output that a loop adds to cannot be finished before it.
+    emit(hints + [node for _, node in finals], plan.last)
+    if not plan.scatters:
+        plan.first, plan.last = plan.first + plan.last, []
+
+    uses = plan.uses
+    for statement in plan.first + plan.last:
+        if isinstance(statement, Let):
+            for arg in statement.node.args:
+                uses[arg.id] = uses.get(arg.id, 0) + 1
+        elif isinstance(statement, Store):
+            uses[statement.node.id] = uses.get(statement.node.id, 0) + 1
+        else:
+            _count_body(uses, statement.body, [statement.node.args[0]])
+    for scatter in plan.scatters:
+        _count_body(uses, scatter.body, [entry.node for entry in scatter.entries])
+
+
+def _count_body(uses: dict[int, int], body: Sequence[Node], roots: Sequence[Node]) -> None:
+    for arg in [arg for node in body for arg in node.args] + list(roots):
+        # What a loop takes from outside is computed once, before the loop.
+        uses[arg.id] = uses.get(arg.id, 0) + (1 if arg.loop is not None else 2)
+
+
+def _demanded(root: Node, done: set[int]) -> list[Node]:
+    """Return what ``root`` needs and is not done yet, arguments first, depth first."""
+    ordered: list[Node] = []
+    stack: list[tuple[Node, bool]] = [(root, False)]
+    while stack:
+        node, ready = stack.pop()
+        if node.id in done:
+            continue
+        if ready:
+            done.add(node.id)
+            ordered.append(node)
+            continue
+        stack.append((node, True))
+        if node.op == "sum":
+            inner = _body(node.args, node.data)
+            needed = [arg for n in inner for arg in n.args if arg.loop is None]
+        else:
+            needed = list(node.args)
+        stack.extend((arg, False) for arg in reversed(needed) if arg.id not in done)
+    return ordered

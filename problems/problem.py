@@ -1,0 +1,233 @@
+"""A problem: a system, a start, parameters and a span of time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from problems import measure
+from problems.errors import InputError
+from problems.hamiltonian import System, Value
+
+Array = NDArray[np.float64]
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, init=False, repr=False, eq=False)
+class Problem:
+    """What is integrated; frozen, hashable, printed as the call that makes it.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    q0, p0, v0, y0 : array_like
+        The start: positions with momenta or (for systems with H = sum c_i p_i^2/2
+        + V) with velocities v = c p; or the whole state ``y0``.
+    parameters : mapping of str to float or sequence of float
+        Values that differ from the system's defaults.
+    t0, t_end : float
+        Span of time; ``t_end`` may lie before ``t0``.
+    name : str, optional
+        The name under which `problems.load` knows it.
+    title : str, optional
+        One line for reports.
+    arguments : mapping
+        What the name is called with, for printing: ``{"e": 0.75}``.
+    times : array_like, optional
+        A grid on which the solution is usually looked at.
+    references : sequence of str
+        Where the problem comes from.
+    notes : str
+        What to know about it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a value is missing, not finite or of the wrong length.
+
+    Examples
+    --------
+    >>> from problems import Hamiltonian
+    >>> def H(q, p, m):
+    ...     return p[0]**2/2 - m.cos(q[0])
+    >>> Problem(Hamiltonian(H, dof=1), q0=[0.0], p0=[1.9], t_end=1000.0)
+    Problem(Hamiltonian(H, dof=1), q0=[0.0], p0=[1.9], t_end=1000.0)
+    """
+
+    system: System
+    y0: Array
+    par: Array
+    t0: float
+    t_end: float
+    name: str | None
+    title: str
+    arguments: Mapping[str, Any]
+    times: Array | None
+    references: tuple[str, ...]
+    notes: str
+    _made_with: str
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        q0: ArrayLike | None = None,
+        p0: ArrayLike | None = None,
+        v0: ArrayLike | None = None,
+        y0: ArrayLike | None = None,
+        parameters: Mapping[str, Value] = _NOTHING,
+        t0: float = 0.0,
+        t_end: float,
+        name: str | None = None,
+        title: str | None = None,
+        arguments: Mapping[str, Any] = _NOTHING,
+        times: ArrayLike | None = None,
+        references: Sequence[str] = (),
+        notes: str = "",
+    ) -> None:
+        if not isinstance(system, System):
+            raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {system!r}.")
+        par = system.pack(parameters)
+        state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
+        span = _numbers("t0 and t_end", [t0, t_end], 2)
+        if span[0] == span[1]:
+            raise InputError(f"t_end={t_end!r} must differ from t0={t0!r}.")
+        grid = None if times is None else _numbers("times", times, None)
+        given = {"q0": q0, "p0": p0, "v0": v0, "y0": y0}
+        shown = [f"{key}={_shown(value)}" for key, value in given.items() if value is not None]
+        if parameters:
+            shown.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
+        shown += [f"t0={t0!r}"] if t0 != 0.0 else []
+        values = {
+            "system": system,
+            "y0": _frozen(state),
+            "par": _frozen(par),
+            "t0": float(span[0]),
+            "t_end": float(span[1]),
+            "name": name,
+            "title": title or name or system.name,
+            "arguments": MappingProxyType(dict(arguments)),
+            "times": None if grid is None else _frozen(grid),
+            "references": tuple(references),
+            "notes": notes,
+            "_made_with": ", ".join([repr(system), *shown, f"t_end={t_end!r}"]),
+        }
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+    def __repr__(self) -> str:
+        if self.name is None:
+            return f"Problem({self._made_with})"
+        inside = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
+        return f"{self.name}({inside})"
+
+    def _identity(self) -> tuple[Any, ...]:
+        return (
+            repr(self),
+            self.system.fingerprint,
+            self.y0.tobytes(),
+            self.par.tobytes(),
+            self.t0,
+            self.t_end,
+            None if self.times is None else self.times.tobytes(),
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return self._identity() == other._identity() if isinstance(other, Problem) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._identity())
+
+    def invariants(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
+        """Evaluate the invariants in double-double from double states, rounded once at the end.
+
+        Parameters
+        ----------
+        y : array_like, shape (n, dim)
+            States, one per row.
+        t : array_like, shape (n,), optional
+            Their times, where an invariant depends on time.
+
+        Returns
+        -------
+        dict of str to ndarray
+            Shape (n,), or (n, k) for a vector; the energy first.
+        """
+        return measure.invariants(self, y, t)
+
+    def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
+        """Return how far each invariant is from its value at the start, relative to its size there.
+
+        The difference is formed in double-double, before rounding. Vectors are
+        measured in the 2-norm. An invariant that is 0 at the start has an
+        absolute error.
+
+        Parameters
+        ----------
+        y, t
+            As for `invariants`.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+        """
+        return measure.errors(self, y, t)
+
+    def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
+        """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
+        return measure.guards(self, y, t)
+
+    def velocity(self, y: ArrayLike) -> Array | None:
+        """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
+        return measure.velocity(self, y)
+
+
+def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:
+    names = tuple(name for name, value in given.items() if value is not None)
+    if names == ("y0",):
+        return _numbers("y0", given["y0"], system.dim)
+    if system.dof is None:
+        raise InputError(
+            f"a {type(system).__name__} starts from y0=, of length {system.dim}; got {_listed(names)}."
+        )
+    if names not in (("q0", "p0"), ("q0", "v0")):
+        raise InputError(f"give the start as q0= and p0=, or q0= and v0=, or y0=; got {_listed(names)}.")
+    q = _numbers("q0", given["q0"], system.dof)
+    if "p0" in names:
+        return np.concatenate([q, _numbers("p0", given["p0"], system.dof)])
+    v = _numbers("v0", given["v0"], system.dof)
+    return np.concatenate([q, measure.momentum(system, par, v)])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if names else "nothing"
+
+
+def _numbers(what: str, value: ArrayLike | None, size: int | None) -> Array:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} must be numbers, not {value!r}.") from error
+    if array.ndim != 1 or (size is not None and array.size != size):
+        wanted = "a flat list" if size is None else f"{size} numbers"
+        raise InputError(f"{what} must be {wanted}, not an array of shape {array.shape}.")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite, not {array.tolist()!r}.")
+    return array
+
+
+def _frozen(array: Array) -> Array:
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
+def _shown(value: ArrayLike) -> str:
+    return repr(np.asarray(value, dtype=np.float64).tolist())
+
+
+__all__ = ["Problem", "System"]
