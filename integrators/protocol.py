@@ -194,6 +194,10 @@ class MethodBase:
         """Return ``None`` if the method can integrate ``problem``, else the reason."""
         raise NotImplementedError
 
+    def caveat(self, problem: Problem) -> str | None:
+        """Return why ``problem`` is outside what the method was made for although it runs, if it is."""
+        return None
+
     def compile(self, system: System) -> Program:
         """Compile for ``system``; see the module's guide."""
         raise NotImplementedError

@@ -1,0 +1,274 @@
+"""SciPy's DOP853 and Radau, with compiled vector fields."""
+
+import copy
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from types import FunctionType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.peers.options import load, number
+from integrators.peers.stepper import Crawl, PeerProgram, PeerStepper
+from integrators.protocol import Array, MethodBase, Status
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+RTOL_FLOOR = 100 * float(np.finfo(np.float64).eps)
+"""SciPy silently raises a smaller rtol to this (`scipy.integrate._ivp.common.validate_tol`)."""
+
+SCIPY = """\
+@article{Virtanen2020,
+  author = {Virtanen, Pauli and Gommers, Ralf and Oliphant, Travis E. and others},
+  title = {{SciPy} 1.0: fundamental algorithms for scientific computing in {Python}},
+  journal = {Nature Methods},
+  volume = {17},
+  pages = {261--272},
+  year = {2020},
+  doi = {10.1038/s41592-019-0686-2}
+}
+"""
+
+HAIRER_I = """\
+@book{HairerNorsettWanner1993,
+  author = {Hairer, Ernst and N{\\o}rsett, Syvert P. and Wanner, Gerhard},
+  title = {Solving Ordinary Differential Equations {I}: Nonstiff Problems},
+  edition = {Second},
+  publisher = {Springer},
+  year = {1993}
+}
+"""
+
+HAIRER_II = """\
+@book{HairerWanner1996,
+  author = {Hairer, Ernst and Wanner, Gerhard},
+  title = {Solving Ordinary Differential Equations {II}: Stiff and Differential-Algebraic Problems},
+  edition = {Second},
+  publisher = {Springer},
+  year = {1996}
+}
+"""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class _SciPyMethod(MethodBase):
+    """What SciPy's methods share; see `SciPyStepper` for the sampling.
+
+    The tolerances hold for the local error: ``atol + rtol |y|`` in each component.
+    """
+
+    rtol: float
+    atol: float
+
+    solver: ClassVar[str]
+    library = "scipy"
+
+    def __post_init__(self) -> None:
+        number(self, "rtol", below=1.0)
+        number(self, "atol", strict=False)
+        if self.rtol < RTOL_FLOOR:
+            raise InputError(
+                f"rtol={self.rtol!r} is below what SciPy attains (100 times the double's epsilon); "
+                f"the least is rtol={RTOL_FLOOR!r}."
+            )
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Accept every system."""
+        return None
+
+    def compile(self, system: System) -> "SciPyProgram":
+        """Compile the vector field of ``system``."""
+        return SciPyProgram(system, self)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DOP853(_SciPyMethod):
+    """SciPy's explicit Runge-Kutta method of order 8(5,3) of Dormand and Prince, adaptive.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
+    atol : float
+        Absolute tolerance, >= 0.
+
+    Notes
+    -----
+    The step loop is SciPy's and runs in Python: 13 evaluations of the compiled
+    field a step at about 3 microseconds each, most of it not the field.
+    """
+
+    solver = "DOP853"
+    citation = SCIPY + HAIRER_I
+    family = "runge-kutta"
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 8
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Radau(_SciPyMethod):
+    """SciPy's implicit Radau IIA method of order 5, adaptive, for stiff systems.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
+    atol : float
+        Absolute tolerance, >= 0.
+
+    Notes
+    -----
+    The Jacobian is taken by SciPy's finite differences. It is L-stable, so it damps
+    oscillations: no method for conserving energy.
+    """
+
+    solver = "Radau"
+    citation = SCIPY + HAIRER_II
+    family = "runge-kutta"
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 5
+
+
+class SciPyProgram(PeerProgram):
+    """A vector field compiled for SciPy's solvers."""
+
+    def __init__(self, system: System, method: _SciPyMethod):
+        super().__init__(system)
+        integrate = load("scipy", "scipy.integrate")
+        from problems import emit
+
+        started = perf_counter()
+        self.method, self.solver = method, getattr(integrate, method.solver)
+        self.field = emit.numba(system, "field")
+        # The first call compiles for these types.
+        self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
+        self.from_cache = None
+        self.compile_seconds = perf_counter() - started
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "SciPyStepper":
+        """Return a stepper at ``t0``; see the protocol."""
+        return SciPyStepper(self, *self.arguments(y0, par, t0))
+
+
+class SciPyStepper(PeerStepper):
+    """A trajectory of one of SciPy's solvers.
+
+    ``"side"`` (default)
+        The solver's own steps are untouched. A time between two of them is reached
+        by a throw-away solver from the earlier one, with the same tolerances; its
+        evaluations are counted apart, in ``stats.extra["side_evaluations"]``.
+    ``"steps"``
+        The solver's own steps, up to the last time.
+
+    SciPy's own interpolants are not offered: they are of lower order than the method.
+    """
+
+    samplings = ("side", "steps")
+
+    def __init__(self, program: SciPyProgram, y: Array, par: Array, t: float):
+        super().__init__(y, t)
+        self._program, self._par = program, par
+        self._stats.evaluations = 0
+        self._stats.extra["side_evaluations"] = 0
+        self._solver = self._make(self._evaluate, t, y, math.inf)
+
+    def _evaluate(self, t: float, y: Array) -> Array:
+        # SciPy's own count, nfev, leaves out the evaluations of its finite differences.
+        self._stats.evaluations = (self._stats.evaluations or 0) + 1
+        return self._field(t, y)
+
+    def _evaluate_aside(self, t: float, y: Array) -> Array:
+        self._stats.extra["side_evaluations"] += 1
+        return self._field(t, y)
+
+    def _field(self, t: float, y: Array) -> Array:
+        out = np.empty(y.size)
+        self._program.field(t, y, self._par, out)
+        return out
+
+    def _make(
+        self, fun: Callable[[float, Array], Array], t: float, y: Array, end: float, first: float | None = None
+    ) -> Any:
+        method = self._program.method
+        with np.errstate(all="ignore"):
+            return self._program.solver(fun, t, y, end, rtol=method.rtol, atol=method.atol, first_step=first)
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        sign = self._towards(float(grid[-1]))
+        states = np.empty((grid.size, self._y.size))
+        watch = Crawl(self._solver.t, float(grid[-1]))
+        for i, t in enumerate(grid.tolist()):
+            while sign * (self._solver.t - t) < 0.0:
+                if not self._step(watch):
+                    return grid[:i], states[:i]
+            states[i] = self._solver.y if self._solver.t == t else self._aside(t)
+            if not np.isfinite(states[i]).all():
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
+
+    def _own_steps(self, end: float) -> tuple[Array, Array]:
+        sign = self._towards(end)
+        watch = Crawl(self._solver.t, end)
+        times, states = [self._t], [self._y]
+        while self._solver.t != times[-1] or self._step(watch):
+            if sign * (self._solver.t - end) > 0.0:
+                break
+            times.append(float(self._solver.t))
+            states.append(self._solver.y)
+        return np.array(times[1:]), np.array(states)[1:]
+
+    def _one(self) -> tuple[float, Array] | None:
+        if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
+            return None
+        return float(self._solver.t), self._solver.y
+
+    def _towards(self, end: float) -> float:
+        """Return the sign of the direction to ``end``, with a solver that goes that way."""
+        sign = 1.0 if end > self._t else -1.0
+        if self._solver.direction != sign:
+            self._solver = self._make(self._evaluate, self._t, self._y, sign * math.inf)
+        return sign
+
+    def _step(self, watch: "Crawl") -> bool:
+        """Take one own step; return whether it succeeded."""
+        solver, stats = self._solver, self._stats
+        before, jacobians, factorizations = float(solver.t), solver.njev, solver.nlu
+        with np.errstate(all="ignore"):
+            message = solver.step()
+        for name, count in (("jacobians", solver.njev - jacobians), ("factorizations", solver.nlu - factorizations)):
+            if count:
+                stats.extra[name] = stats.extra.get(name, 0) + count
+        if solver.status == "failed":
+            self._fail(Status.STEP_UNDERFLOW, before, f"SciPy gave up at t = {before!r}: {message}")
+            return False
+        stats.steps += 1
+        stalled = watch.sees(float(solver.t))
+        if stalled:
+            self._fail(Status.STALLED, float(solver.t), stalled)
+        return not stalled
+
+    def _aside(self, t: float) -> Array:
+        """Return the state at ``t``, within the last own step, from a throw-away solver."""
+        start = float(self._solver.t_old)
+        aside = self._make(self._evaluate_aside, start, self._solver.y_old, t, abs(t - start))
+        with np.errstate(all="ignore"):
+            while aside.status == "running":
+                aside.step()
+        return aside.y if aside.status == "finished" else np.full(self._y.size, np.nan)
+
+    def _save(self) -> Any:
+        # A solver's functions are bound to it, and K, K_extended hold nothing from step to step.
+        held = {k: v for k, v in vars(self._solver).items() if not isinstance(v, FunctionType)}
+        return copy.deepcopy({k: v for k, v in held.items() if k not in ("K", "K_extended")})
+
+    def _load(self, inner: Any) -> None:
+        vars(self._solver).update(copy.deepcopy(inner))
