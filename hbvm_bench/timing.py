@@ -1,18 +1,81 @@
 """Warm seconds of whole integrations, honestly: compiled before, without output, samples kept."""
 
+import gc
 import math
 import time
-from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hbvm_bench.campaign import TimingPlan
 from hbvm_bench.records import Compile, TimingRound
-from integrators.protocol import MethodBase, Status
+from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.problem import Problem
 
 WARM_UP = 0.01  # of the span: everything has run once
 SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
+CALIBRATION_LOOPS = 800_000
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A whole integration that returns its end state only, ready to be timed.
+
+    Attributes
+    ----------
+    program : Program
+        Compiled.
+    y0, par : ndarray
+        Where it starts, and the parameters.
+    t0, t_end : float
+        The span.
+    sample : str or None
+        How the end time is met; see `integrators.protocol.Stepper.advance`.
+    """
+
+    program: Program
+    y0: NDArray[np.float64]
+    par: NDArray[np.float64]
+    t0: float
+    t_end: float
+    sample: str | None = None
+
+    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+        """Return the mean seconds of ``repeats`` runs one after the other, and what the last returned.
+
+        Only ``advance`` is timed: making a stepper belongs to setting up. Garbage
+        collection is off meanwhile.
+        """
+        end = np.array([self.t_end])
+        spent, samples = 0.0, None
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            for _ in range(repeats):
+                stepper = self.program.start(self.y0, self.par, self.t0)
+                start = time.perf_counter()
+                samples = stepper.advance(end, sample=self.sample)
+                spent += time.perf_counter() - start
+        finally:
+            if collecting:
+                gc.enable()
+        if samples is None:
+            raise ValueError(f"repeats must be at least 1, not {repeats!r}")
+        return spent / repeats, samples
+
+    def until(self, share: float) -> "Run":
+        """Return the run over the first ``share`` of the span."""
+        return Run(
+            self.program, self.y0, self.par, self.t0, self.t0 + share * (self.t_end - self.t0), self.sample
+        )
+
+
+def repeats_for(seconds: float, shortest: float) -> int:
+    """Return how many runs of ``seconds`` make a sample that lasts ``shortest``, with a reserve."""
+    return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1
 
 
 def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> TimingRound | str:
@@ -31,23 +94,18 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
         A sentence where the integration does not reach the end.
     """
     program = method.compile(problem.system)
-    end = np.array([problem.t_end])
-    early = np.array([problem.t0 + WARM_UP * (problem.t_end - problem.t0)])
-
-    def integrate(times: np.ndarray = end) -> Status:
-        return program.start(problem.y0, problem.par, problem.t0).advance(times).status
-
-    integrate(early)
-    first, status = _seconds(integrate, 1)
-    if status is not Status.FINISHED:
-        return f"not timed: the integration ended as {status.value}"
-    repeats = max(1, math.ceil(1.2 * plan.shortest / max(first, 1e-9)))
+    run = Run(program, problem.y0, problem.par, problem.t0, problem.t_end)
+    run.until(WARM_UP).seconds()
+    first, reached = run.seconds()
+    if reached.status is not Status.FINISHED:
+        return f"not timed: the integration ended as {reached.status.value}"
+    repeats = repeats_for(first, plan.shortest)
     samples = [first] if first > SLOW else []
     spent = sum(samples)
     while len(samples) < plan.samples and (not samples or spent + first * repeats <= plan.budget):
-        total, _ = _seconds(integrate, repeats)
-        samples.append(total / repeats)
-        spent += total
+        mean, _ = run.seconds(repeats)
+        samples.append(mean)
+        spent += mean * repeats
     return TimingRound(
         samples=samples,
         repeats=repeats,
@@ -55,9 +113,31 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
     )
 
 
-def _seconds(integrate: Callable[[], Status], repeats: int) -> tuple[float, Status]:
-    status = Status.RUNNING
+def calibrate() -> float:
+    """Return the seconds of a fixed computation that has nothing to do with any integrator.
+
+    It divides out how fast the machine is at the moment: square roots, divisions and
+    multiply-adds in four independent chains, compiled, about 10 ms.
+    """
+    loop = _calibration_loop()
+    loop(1000)
     start = time.perf_counter()
-    for _ in range(repeats):
-        status = integrate()
-    return time.perf_counter() - start, status
+    loop(CALIBRATION_LOOPS)
+    return time.perf_counter() - start
+
+
+@cache
+def _calibration_loop() -> Any:
+    import numba
+
+    @numba.njit
+    def loop(n: int) -> float:
+        a, b, c, d = 1.1, 1.2, 1.3, 1.4
+        for _ in range(n):
+            a = 1.0 / math.sqrt(1.0 + a * a) + 0.5
+            b = 1.0 / math.sqrt(1.0 + b * b) + 0.5
+            c = 1.0 / math.sqrt(1.0 + c * c) + 0.5
+            d = 1.0 / math.sqrt(1.0 + d * d) + 0.5
+        return a + b + c + d
+
+    return loop

@@ -1,0 +1,285 @@
+"""From an error over time to its law: bounded, square root, linear or exponential.
+
+Round-off that is unbiased makes the error of a conserved quantity walk at random,
+like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
+makes it grow like t; a fixed amplitude is what a symplectic method at a step that
+resolves the motion shows before its round-off does. Several laws can act at once,
+so each is fitted together with a floor, in logarithms, to the rms over windows of
+time that are equally long in log t, and over trajectories from perturbed starts.
+
+D. Brouwer, "On the accumulation of errors in numerical integration",
+The Astronomical Journal 46 (1937) 149-153.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from problems.errors import InputError
+
+Array = NDArray[np.float64]
+
+PER_DECADE = 4  # windows
+FEWEST_WINDOWS = 6
+SHORTEST = 1.2  # decades
+NOISE = 0.05  # of the logarithm: no fit is taken to be better than this
+CONFIDENCE = 0.95
+STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
+
+LAWS: dict[str, str] = {
+    "bounded": "stays within a bound",
+    "square root": "grows like t^(1/2), as unbiased round-off does",
+    "linear": "grows like t",
+    "power": "grows like another power of t",
+    "exponential": "grows like exp(t)",
+}
+
+
+@dataclass(frozen=True)
+class Drift:
+    """The law of an error, as far as the samples show it.
+
+    Attributes
+    ----------
+    law : str or None
+        A key of `LAWS`; ``None`` where the samples do not say, with the reason in ``why``.
+    why : str
+        Why there is no law.
+    slope, slope_low, slope_high : float
+        Power of t with its 95 % interval (from leaving out one start at a time, or from
+        the scatter about the fit where there are fewer than three starts); infinite
+        interval where neither is possible.
+    floor : float
+        What is there before the growth: the smallest rms that the fit sees.
+    growth : float
+        With the exponential law, the rate in 1/t; else 0.
+    rate, rate_low, rate_high : float
+        Mean signed drift per unit of time, end value over span, with the 95 % Student
+        interval over the starts; infinite interval for one start, not-a-number for
+        errors without a sign.
+    starts : int
+        Number of trajectories.
+    """
+
+    law: str | None
+    why: str
+    slope: float
+    slope_low: float
+    slope_high: float
+    floor: float
+    growth: float
+    rate: float
+    rate_low: float
+    rate_high: float
+    starts: int
+
+
+def rms(errors: ArrayLike) -> Array:
+    """Return the root mean square over trajectories, shape (n,), of errors of shape (starts, n)."""
+    rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))
+    largest = np.max(np.abs(rows), axis=0)
+    scale = np.where(largest > 0.0, largest, 1.0)
+    return scale * np.sqrt(np.mean((rows / scale) ** 2, axis=0))
+
+
+def rate(t: ArrayLike, errors: ArrayLike) -> tuple[float, float, float]:
+    """Return the mean drift per unit of time and its 95 % interval over the starts.
+
+    For each trajectory the end value over the span, which is the maximum-likelihood
+    estimate of the drift of a random walk.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Times since the start, ascending.
+    errors : array_like, shape (starts, n)
+        Signed errors.
+    """
+    rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))
+    each = rows[:, -1] / float(np.asarray(t, dtype=np.float64)[-1])
+    mean, n = float(np.mean(each)), each.size
+    error = math.sqrt(float(np.sum((each - mean) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
+    return (mean, *_interval(mean, error, n))
+
+
+def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
+    """Find the law of an error.
+
+    A law with a name is preferred to an arbitrary power of t, unless the interval of
+    the power excludes both 1/2 and 1.
+
+    Parameters
+    ----------
+    t : array_like, shape (n,)
+        Times since the start, positive and ascending; best log-spaced.
+    errors : array_like, shape (n,) or (starts, n)
+        Errors, one row per trajectory.
+    signed : bool
+        Whether the errors have a sign, so that a mean drift has a meaning.
+
+    Returns
+    -------
+    Drift
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the shapes do not fit, the times are not positive and ascending, or a number
+        is not finite.
+    """
+    times, rows = _checked(t, errors)
+    drift = rate(times, rows) if signed else (math.nan,) * 3
+    middle, label = _windows(times)
+    values = _windowed(rows, label)
+    if not np.any(values):
+        return _drift("bounded", "", (0.0, 0.0, 0.0), 0.0, 0.0, drift, len(rows))
+    kept = values > 0.0
+    decades = math.log10(times[-1] / times[0])
+    if kept.sum() < FEWEST_WINDOWS or decades < SHORTEST:
+        why = f"the law needs samples in {FEWEST_WINDOWS} windows over {SHORTEST} decades of time"
+        return _drift(
+            None, why, (math.nan, -math.inf, math.inf), float(values[kept].min()), 0.0, drift, len(rows)
+        )
+    fits = {law: _fitted(law, middle[kept], values[kept]) for law in LAWS}
+    slope = _slope(times, rows, fits["power"])
+    named = [
+        name for name in LAWS if name != "power" or not any(slope[1] <= a <= slope[2] for a in (0.5, 1.0))
+    ]
+    law = min(named, key=lambda name: fits[name].score)
+    return _drift(
+        law,
+        "",
+        slope,
+        math.exp(fits[law].parameters[0]),
+        fits[law].parameters[2] if law == "exponential" else 0.0,
+        drift,
+        len(rows),
+    )
+
+
+@dataclass(frozen=True)
+class _Fit:
+    parameters: tuple[float, ...]
+    score: float  # Bayesian information criterion
+    spread: float  # standard error of the last parameter
+
+
+def _growth(law: str, t: Array) -> Callable[[Array], Array]:
+    """Return ln g(t) as a function of the parameters after the floor; at the end of the span it is p[0]."""
+    ratio = np.log(t / t[-1])
+    share = t / t[-1] - 1.0
+    match law:
+        case "square root":
+            return lambda p: p[0] + 0.5 * ratio
+        case "linear":
+            return lambda p: p[0] + ratio
+        case "power":
+            return lambda p: p[0] + p[1] * ratio
+    return lambda p: p[0] + p[1] * share
+
+
+def _fitted(law: str, t: Array, values: Array) -> _Fit:
+    """Fit ln sqrt(floor^2 + g(t)^2) to ln of the values by least squares."""
+    logs = np.log(values)
+    n = logs.size
+    if law == "bounded":
+        return _Fit((float(np.mean(logs)),), _score(logs - np.mean(logs), 1), 0.0)
+    low, high = float(logs.min()), float(logs.max())
+    grown = _growth(law, t)
+
+    def residual(p: Array) -> Array:
+        return 0.5 * np.logaddexp(2.0 * p[0], 2.0 * grown(p[1:])) - logs
+
+    # The floor lies not far below the least value: below that it has no effect and no meaning.
+    bounds = [(low - 3.0, high + 1e-9), (low - 3.0, high + 3.0)]
+    guesses = [[low - 1.0, float(logs[-1])], [low, float(logs[-1])]]
+    if law in ("power", "exponential"):
+        bounds.append((0.0, STEEPEST) if law == "power" else (0.0, 40.0 * STEEPEST))
+        steep = (0.5, 1.5) if law == "power" else (2.0, 20.0)
+        guesses = [[*guess, value] for guess in guesses for value in steep]
+    lower, upper = (np.array(side) for side in zip(*bounds, strict=True))
+    found = min(
+        (least_squares(residual, np.clip(g, lower, upper), bounds=(lower, upper)) for g in guesses),
+        key=lambda one: one.cost,
+    )
+    parameters = found.x.tolist()
+    normal = found.jac.T @ found.jac + 1e-12 * np.eye(found.x.size)
+    variance = max(2.0 * found.cost / max(n - found.x.size, 1), NOISE**2) * np.linalg.inv(normal)[-1, -1]
+    if law == "exponential":
+        parameters[2] /= t[-1]
+    return _Fit(tuple(parameters), _score(residual(found.x), found.x.size), math.sqrt(max(variance, 0.0)))
+
+
+def _score(residual: NDArray[np.floating], parameters: int) -> float:
+    n = residual.size
+    return n * math.log(float(np.mean(residual**2)) + NOISE**2) + parameters * math.log(n)
+
+
+def _slope(t: Array, rows: Array, whole: _Fit) -> tuple[float, float, float]:
+    """Return the power of t and its interval, by the jackknife over starts where there are three."""
+    slope = whole.parameters[2]
+    starts = len(rows)
+    if starts < 3:
+        return (slope, slope - 2.0 * whole.spread, slope + 2.0 * whole.spread)
+    middle, label = _windows(t)
+    each = []
+    for left_out in range(starts):
+        values = _windowed(np.delete(rows, left_out, axis=0), label)
+        kept = values > 0.0
+        if kept.sum() >= FEWEST_WINDOWS:
+            each.append(_fitted("power", middle[kept], values[kept]).parameters[2])
+    if len(each) < 3:
+        return (slope, -math.inf, math.inf)
+    n = len(each)
+    return (
+        slope,
+        *_interval(slope, math.sqrt((n - 1) / n * float(np.sum((np.array(each) - np.mean(each)) ** 2))), n),
+    )
+
+
+def _interval(mean: float, error: float, count: int) -> tuple[float, float]:
+    if count < 2:
+        return -math.inf, math.inf
+    half = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1)) * error
+    return mean - half, mean + half
+
+
+def _windows(t: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return the middle of each window that has samples, and the number of the window of each sample."""
+    number = np.floor((np.log10(t) - math.log10(t[0])) * PER_DECADE + 1e-9).astype(np.intp)
+    present, label = np.unique(number, return_inverse=True)
+    middle = np.array([math.exp(np.mean(np.log(t[label == i]))) for i in range(present.size)])
+    return middle, label
+
+
+def _windowed(rows: Array, label: NDArray[np.intp]) -> Array:
+    return np.array([rms(rows[:, label == i].reshape(-1, 1))[0] for i in range(int(label.max()) + 1)])
+
+
+def _checked(t: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
+    times = np.asarray(t, dtype=np.float64)
+    rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))
+    if times.ndim != 1 or times.size < 2 or rows.ndim != 2 or rows.shape[1] != times.size:
+        raise InputError(f"errors of shape {rows.shape} do not belong to times of shape {times.shape}.")
+    if not (np.isfinite(times).all() and np.isfinite(rows).all()):
+        raise InputError("the law of an error needs finite numbers; cut the series before it is not finite.")
+    if times[0] <= 0.0 or np.any(np.diff(times) <= 0.0):
+        raise InputError(f"times since the start must be positive and ascending; the first is {times[0]:g}.")
+    return times, rows
+
+
+def _drift(
+    law: str | None,
+    why: str,
+    slope: tuple[float, float, float],
+    floor: float,
+    growth: float,
+    drift: tuple[float, ...],
+    starts: int,
+) -> Drift:
+    return Drift(law, why, *slope, floor, growth, drift[0], drift[1], drift[2], starts)
