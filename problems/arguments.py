@@ -91,7 +91,8 @@ class Vector:
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _whole
     __pow__ = __neg__ = __matmul__ = __rmatmul__ = __abs__ = __array__ = __array_ufunc__ = _whole
-    __float__ = __lt__ = __le__ = __gt__ = __ge__ = _whole
+    __float__ = __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _whole  # type: ignore[assignment]
+    __hash__ = object.__hash__
     __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
 
 
@@ -232,7 +233,7 @@ def call(
     except InputError:
         raise
     except NameError as error:
-        name = getattr(error, "name", None) or "?"
+        name = error.name or "?"
         if name in _PUBLIC or name in ("sum", "pi", "math", "np", "numpy"):
             remedy = "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.sum, m.pi"
         elif name in layout:
@@ -242,7 +243,7 @@ def call(
         else:
             remedy = f"make it a parameter, parameters={{{name!r}: value}}, and write par.{name}"
         raise InputError(
-            f"{line_of_traceback(error.__traceback__)}: the name {name!r} is not known here; {remedy}"
+            f"{line_of_traceback(error.__traceback__)}: the name {name!r} is not known here; {remedy}."
         ) from error
     except Exception as error:
         line = line_of_traceback(error.__traceback__) or place

@@ -62,4 +62,5 @@ def refuse(what: str, remedy: str) -> NoReturn:
     remedy : str
         What to write instead.
     """
-    raise InputError(f"{users_line()}: {what}; {remedy}")
+    joint = " " if what.endswith("?") else "; "
+    raise InputError(f"{users_line()}: {what}{joint}{remedy}.")

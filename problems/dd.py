@@ -6,9 +6,9 @@ The Art of Computer Programming 2, 4.2.2; arithmetic and elementary functions
 along Y. Hida, X. S. Li, D. H. Bailey, "Library for double-double and
 quad-double arithmetic" (QD). No fused multiply-add is assumed.
 
-Relative errors, asserted in the tests: + - * / sqrt and powers about 1e-31;
-sin, cos, exp, log 1e-29 (of max(1, size) where the argument is large or the
-result passes through 0). Numbers above 1e300 overflow in products.
+Relative errors, asserted in the tests: 1e-31 for + - * / sqrt and small powers,
+1e-30 for sin, cos, tan, exp and log, near their zeros too. Beyond 1e300 products
+overflow; below 1e-290 the second half of a number is lost.
 """
 
 from fractions import Fraction
@@ -207,7 +207,7 @@ def _reduced(a: DD, step: Fraction) -> tuple[DD, Array]:
     k = np.rint(a.hi / float(step))
     r = a
     for part in _parts(step, 4):
-        product, error = two_prod(k, np.float64(part))
+        product, error = two_prod(k, np.asarray(part))
         r = r - DD(product, error)
     return r, k
 

@@ -213,7 +213,7 @@ def _numbers(what: str, value: ArrayLike | None, size: int | None) -> Array:
     except (TypeError, ValueError) as error:
         raise InputError(f"{what} must be numbers, not {value!r}.") from error
     if array.ndim != 1 or (size is not None and array.size != size):
-        wanted = "a flat list" if size is None else f"{size} numbers"
+        wanted = "a flat list" if size is None else f"a flat list of length {size}"
         raise InputError(f"{what} must be {wanted}, not an array of shape {array.shape}.")
     if not np.isfinite(array).all():
         raise InputError(f"{what} must be finite, not {array.tolist()!r}.")

@@ -117,10 +117,12 @@ class Node:
         return self.graph.call("abs", self)
 
     def __pow__(self, exponent: Any) -> "Node":
-        twice = None
-        if isinstance(exponent, numbers.Real) and not isinstance(exponent, bool):
-            twice = 2 * float(exponent)
-        if twice is None or not twice.is_integer() or abs(twice) > 2000:
+        if isinstance(exponent, Node):
+            refuse("a symbol stands in an exponent", "write x**y as m.exp(y*m.log(x))")
+        if not isinstance(exponent, numbers.Real) or isinstance(exponent, bool):
+            refuse(f"the exponent {exponent!r} is not a number", "give an integer or half an integer")
+        twice = 2 * float(exponent)
+        if not twice.is_integer() or abs(twice) > 2000:
             refuse(
                 f"the exponent {exponent!r} is not an integer or half an integer (up to 1000)",
                 "write x**a as m.exp(a*m.log(x))",
@@ -151,7 +153,11 @@ class Node:
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
-    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = _number
+
+    def _whole(self, *_: Any) -> NoReturn:
+        refuse("this takes // or % of a symbol", "write a smooth formula: m.sin and m.cos are periodic")
+
+    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = __rdivmod__ = _whole
 
     def __array__(self, *_: Any, **__: Any) -> NoReturn:
         refuse(
@@ -172,7 +178,12 @@ class Node:
         name = ufunc.__name__
         better = {"absolute": "abs"}.get(name, name)
         remedy = f"use m.{better}" if better in FUNCTIONS else "write it with + - * / and the functions of m"
-        refuse(f"this applies numpy's {name} to a symbol", f"declare the argument m and {remedy}")
+        return refuse(f"this applies numpy's {name} to a symbol", f"declare the argument m and {remedy}")
+
+
+def _described(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    return f"an array of shape {shape}" if shape else f"{value!r:.40}"
 
 
 class Graph:
@@ -263,7 +274,7 @@ class Graph:
                 refuse(f"the constant {value!r} is not finite", "use finite numbers only")
             return self.const(number)
         return refuse(
-            f"this calculates with a {type(value).__name__} as if it were one number",
+            f"this calculates with {_described(value)} as if it were one number",
             "write the formula in components, such as q[0]*p[1] - q[1]*p[0]",
         )
 

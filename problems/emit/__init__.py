@@ -18,6 +18,12 @@ from problems.hamiltonian import System
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
+_NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
+
+import numba
+import numpy as np
+
+"""
 
 
 @dataclass(frozen=True)
@@ -129,10 +135,9 @@ def numba(system: System, what: str) -> Any:
     made = source(system, what, "numba")
     key = ("numba", made.sha256)
     if key not in _compiled:
-        head = "from math import copysign, cos, exp, fabs, log, sin, sqrt, tan\n\nimport numba\nimport numpy as np\n\n"
         cut = made.text.index(f"def {made.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
-        text = head + made.text[:cut] + "\n" + decorator + made.text[cut:]
+        text = _NUMBA_HEAD + made.text[:cut] + "\n" + decorator + made.text[cut:]
         _compiled[key] = getattr(cache.module(text, made.name), made.name)
     return _compiled[key]
 

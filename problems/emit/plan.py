@@ -76,6 +76,8 @@ class Plan:
         The loops that add onto outputs.
     uses : dict
         How often each node is used; one used once is printed in place.
+    spare : dict
+        For each declared sum, an output that is not yet in use when the sum is computed.
     """
 
     n_out: int
@@ -84,6 +86,7 @@ class Plan:
     scatters: list[Scatter] = field(default_factory=list)
     last: list[Let | Reduce | Store] = field(default_factory=list)
     uses: dict[int, int] = field(default_factory=dict)
+    spare: dict[int, int] = field(default_factory=dict)
 
 
 def _body(roots: Sequence[Node], loop: Loop) -> list[Node]:
@@ -261,12 +264,20 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
                 for place in outputs.pop(node.id, ()):
                     statements.append(Store(place, node))
 
+    if plan.scatters:
+        # Sums first: they need an output that is not in use yet.
+        captured += [n for n in reachable([node for _, node in finals]) if n.op == "sum"]
     emit(captured, plan.first)
-    # An output that a loop adds to cannot be finished before it.
     emit(hints + [node for _, node in finals], plan.last)
     if not plan.scatters:
         plan.first, plan.last = plan.first + plan.last, []
 
+    used: set[int] = set()
+    for statement in plan.first + plan.last:
+        if isinstance(statement, Store):
+            used.add(statement.place)
+        elif isinstance(statement, Reduce):
+            plan.spare[statement.node.id] = next(i for i in range(plan.n_out) if i not in used)
     uses = plan.uses
     for statement in plan.first + plan.last:
         if isinstance(statement, Let):

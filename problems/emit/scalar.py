@@ -98,17 +98,21 @@ class _NumbaWriter:
 
     def _add(self, entry: LoopTerm, unique: bool, variables: list[str]) -> None:
         place = _affine(entry.index, variables)
+        node = entry.node
         if unique:
-            self.printer.line(f"out[{place}] = {self.printer.text(entry.node)}")
-        elif entry.node.op == "neg" and entry.node.id not in self.printer.names:
-            self.printer.line(f"out[{place}] = out[{place}] + ({self.printer.text(entry.node)})")
+            self.printer.line(f"out[{place}] = {self.printer.text(node)}")
+        elif node.op == "neg" and self.printer.waiting(node):
+            text = self.printer.text(node).removeprefix("-")
+            self.printer.line(f"out[{place}] = out[{place}] - {text}")
         else:
-            self.printer.line(f"out[{place}] = out[{place}] + {self.printer.text(entry.node, 2)}")
+            self.printer.line(f"out[{place}] = out[{place}] + {self.printer.text(node, 2)}")
 
     def _reduce(self, statement: Reduce) -> None:
         printer = self.printer
-        total = f"s{statement.node.id}"
-        printer.assign(statement.node, "-0.0")
+        # By way of an output not yet in use, so that the sum starts as a lane where outputs are lanes.
+        spare = self.plan.spare[statement.node.id]
+        printer.line(f"out[{spare}] = -0.0")
+        printer.assign(statement.node, f"out[{spare}]")
         total = printer.names[statement.node.id]
         variables, depth = self._loop(statement.loop)
         outer, printer.indent = printer.indent, printer.indent + "    " * depth

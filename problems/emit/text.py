@@ -49,6 +49,10 @@ class Printer:
         else:
             self.assign(node, text)
 
+    def waiting(self, node: Node) -> bool:
+        """Whether a value's text waits for the one place that uses it."""
+        return node.id in self._pending
+
     def text(self, node: Node, level: int = _SUM) -> str:
         """Return the text of a value, in parentheses if it binds less tightly than ``level``."""
         if node.op == "const":
