@@ -4,7 +4,7 @@ import re
 import tomllib
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 
-Settings = Literal["default", "recommended", "outside its domain"]
+Settings = Literal["default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
 Positive = Annotated[float, Meta(gt=0)]
@@ -102,7 +102,8 @@ class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         The method as it prints, such as ``"Taylor(tol=1e-15)"``.
     settings : str
         Whether these are the library's defaults, what its authors recommend for
-        such a problem, or a use that they advise against.
+        such a problem, the settings of a published experiment, or a use that the
+        method was not made for.
     note : str
         A sentence that the report prints beside the row.
     """
@@ -227,7 +228,8 @@ def parse(text: str, source: str = "campaign") -> Campaign:
     try:
         return msgspec.convert(data, Campaign)
     except msgspec.ValidationError as error:
-        raise InputError(f"{source}: {error}.") from None
+        what = str(error).replace(" - at `$.", ", at `").replace(".,", ",").rstrip(".")
+        raise InputError(f"{source}: {what}.") from None
 
 
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:
@@ -235,6 +237,8 @@ def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str)
     for key, value in data.items():
         if key not in struct.__struct_fields__:
             raise InputError(f"{source}: {unknown('key', key, struct.__struct_fields__)}")
+        if key == "settings" and value not in get_args(Settings):
+            raise InputError(f"{source}: {unknown('settings', str(value), get_args(Settings))}")
         if key in nested:
             for item in value if isinstance(value, list) else [value]:
                 if isinstance(item, dict):

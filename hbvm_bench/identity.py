@@ -90,7 +90,7 @@ def make_method(text: str) -> MethodBase:
     spec = parse_spec(text)
     try:
         return integrators.registry.create(spec.name, **spec.arguments)
-    except InputError as error:
+    except (InputError, ImportError) as error:
         raise InputError(f"{spec}: {error}") from None
 
 
@@ -118,6 +118,11 @@ def versions_of(method: MethodBase) -> dict[str, str]:
     """Return the versions of Python and of the libraries that a method's numbers depend on."""
     names = COMPUTES_WITH.get(method.library.lower(), (method.library,))
     return {"python": platform.python_version()} | {name: _version(name) for name in names}
+
+
+def version_of_library(library: str) -> str:
+    """Return the installed version of a method's library, or ``"not installed"``."""
+    return _version(library.lower())
 
 
 def is_ours(method: MethodBase) -> bool:

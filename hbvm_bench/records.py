@@ -126,6 +126,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         One sentence where something did not go as asked.
     t_stop : float or None
         Where the integration stopped.
+    violation : str
+        Where a symmetry guard says that this is another trajectory than the one asked for.
     counters, metrics, compile
         What was measured.
     """
@@ -134,6 +136,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     status: str = ""
     reason: str = ""
     t_stop: float | None = None
+    violation: str = ""
     counters: Counters = Counters()
     metrics: dict[str, Value] = {}
     compile: Compile | None = None

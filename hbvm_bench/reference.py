@@ -87,11 +87,22 @@ def find(problem: Problem, where: Path | None = None) -> Reference | None:
     where : Path, optional
         The folder to look in; the package's own by default.
     """
+    path = _path(problem, where)
+    return None if path is None else _parsed(path)
+
+
+def find_file(problem: Problem, where: Path | None = None) -> ReferenceFile | None:
+    """Return the stored reference of a problem with all its digits, or ``None``; see `find`."""
+    path = _path(problem, where)
+    return None if path is None else _read(path)
+
+
+def _path(problem: Problem, where: Path | None) -> Path | None:
     start, parameters = _start(problem), _hex(problem.par)
     for path in sorted((where or folder()).glob(f"{problem.name}*.json")):
         stored = _read(path)
         if (stored.start, stored.parameters) == (start, parameters):
-            return _parsed(path)
+            return path
     return None
 
 

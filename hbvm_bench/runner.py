@@ -169,6 +169,13 @@ def time_cases(
             store.save(_with_timing(store, record, resolved, timing))
 
 
+def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:
+    """Return how many visits `time_cases` has to make at most."""
+    records = [store.load(resolved.id) for resolved in cases]
+    timings = [record.timing or Timing() for record in records if record and timeable(record)]
+    return sum(max(0, plan.rounds - len(timing.rounds)) for timing in timings if not timing.why)
+
+
 def timeable(record: Record) -> bool:
     """Whether a case reached its end, so that its time has a meaning."""
     return record.result.outcome == "ok" and record.result.status == "finished"

@@ -21,7 +21,7 @@ from hbvm_bench import reference, timing
 from hbvm_bench.campaign import Case, TimingPlan
 from hbvm_bench.identity import Resolved, resolve
 from hbvm_bench.measure import measure
-from hbvm_bench.metrics import evaluate
+from hbvm_bench.metrics import evaluate, guard_violation
 from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.store import atomic
 from integrators import integrate
@@ -115,6 +115,7 @@ def _measure(request: Request, directory: Path) -> Result:
         status=solution.status.value,
         reason=solution.reason,
         t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
+        violation=guard_violation(measured),
         counters=measured.counters,
         metrics=evaluate(measured),
         compile=measured.compile,

@@ -1,0 +1,159 @@
+"""Figures as files: deterministic SVG and PNG, and SVG that takes the colours of the page."""
+
+import io
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from hbvm_bench.report.style import GRID, INK, MUTED, NEUTRALS, PAPER
+
+FONT = "DejaVu Sans"
+SETTINGS = {
+    "svg.fonttype": "none",  # text stays text: it can be read aloud, searched and selected
+    "svg.hashsalt": "hbvm-bench",
+    "font.family": FONT,
+    "font.size": 9,
+    "text.color": INK,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 2.6,
+    "figure.facecolor": PAPER,
+    "axes.facecolor": PAPER,
+    "savefig.facecolor": PAPER,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+}
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a report.
+
+    Attributes
+    ----------
+    key : str
+        Its file name without the ending, and its anchor.
+    title, caption : str
+        For readers.
+    summary : str
+        What it shows, for those who do not see it.
+    svg : str
+        Self-contained.
+    png : bytes
+        The same picture.
+    """
+
+    key: str
+    title: str
+    caption: str
+    summary: str
+    svg: str
+    png: bytes
+
+
+def picture(figure: Figure, key: str, title: str, caption: str, summary: str) -> Picture:
+    """Render a figure; the same figure gives the same bytes."""
+    svg, png = io.StringIO(), io.BytesIO()
+    with mpl.rc_context(SETTINGS | {"svg.hashsalt": f"hbvm-bench-{key}"}):
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(png, format="png", dpi=160, metadata={"Software": None})
+    text = svg.getvalue()
+    text = text[text.index("<svg") :]
+    # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
+    text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
+    return Picture(key, title, caption, summary, text, png.getvalue())
+
+
+def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
+    """Return the SVG for a page: its colours are the page's variables, its size is the page's.
+
+    Parameters
+    ----------
+    picture : Picture
+        A rendered figure.
+    colours : mapping of str to str
+        From colour to name of the variable, for the cases.
+    """
+    variables = {**NEUTRALS, **colours}
+    text = re.sub(
+        r"#[0-9a-f]{6}\b",
+        lambda match: f"var({variables[match[0]]})" if match[0] in variables else match[0],
+        picture.svg,
+    )
+    width, height = re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)[0]
+    head = (
+        f'<svg role="img" aria-labelledby="{picture.key}-title {picture.key}-desc" '
+        f'viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg" '
+        'xmlns:xlink="http://www.w3.org/1999/xlink">'
+    )
+    # ids are unique in a file; in a page they must be unique among all its figures
+    text = re.sub(r'\bid="', f'id="{picture.key}-', text)
+    text = re.sub(r'(xlink:href="|url\()#', rf"\1#{picture.key}-", text)
+    return re.sub(r"<svg[^>]*>", lambda _: head, text, count=1)
+
+
+def new(width: float, height: float) -> Figure:
+    """Return an empty figure of ``width`` × ``height`` inches."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def log_axis(axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None) -> None:
+    """Make an axis logarithmic from 10^low to 10^high with its labels written as powers.
+
+    Parameters
+    ----------
+    axes : Axes
+        Whose axis.
+    which : {"x", "y"}
+        Which axis.
+    low, high : int
+        Powers of ten.
+    most : int
+        At most this many labels.
+    zero : float, optional
+        Where values that are exactly 0 are drawn; labelled so.
+    """
+    stride = max(1, -(-(high - low) // most))
+    ticks = [10.0**power for power in range(low, high + 1) if (power - high) % stride == 0]
+    labels = {tick: power_label(tick) for tick in ticks}
+    if zero is not None:
+        labels = {tick: text for tick, text in labels.items() if tick > zero * 10.0 ** (stride / 2)}
+        labels[zero] = "exactly 0"
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+    (axes.set_xlim if which == "x" else axes.set_ylim)(10.0**low, 10.0**high)
+    axis.set_major_locator(FixedLocator(sorted(labels)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, power_label(value))))
+
+
+def power_label(value: float) -> str:
+    """Write a power of ten: ``10⁻¹⁵``."""
+    exponent = round(math.log10(value))
+    return "1" if exponent == 0 else "10" if exponent == 1 else "10" + str(exponent).translate(_SUPERSCRIPT)
+

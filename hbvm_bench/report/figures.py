@@ -1,0 +1,249 @@
+"""The figures that every problem has: work and precision, and errors over time."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from hbvm_bench.metrics import METRICS
+from hbvm_bench.records import Record
+from hbvm_bench.report.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.style import INK, Look, options, panels
+from hbvm_bench.table import group_of
+
+Array = NDArray[np.float64]
+
+BINS = 240  # an error series is drawn as its largest value in each of so many bins
+COLUMNS = 3
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case with what is needed to draw it."""
+
+    record: Record
+    look: Look
+    series: dict[str, Array]
+
+    @property
+    def legend(self) -> str:
+        mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
+        return f"{self.look.number}  {options(self.record)}{mark}"
+
+
+@dataclass(frozen=True)
+class OverTime:
+    """What a figure of an error over time shows.
+
+    Attributes
+    ----------
+    key, title, caption, label : str
+        The label is the axis's.
+    get : callable
+        From the series of a case to times and values; ``None`` where it has none.
+    low, high : int
+        Powers of ten of the axis.
+    zero : bool
+        Whether "exactly 0" is a place on the axis.
+    joined : bool
+        Whether the samples are joined and binned (else: drawn as markers).
+    """
+
+    key: str
+    title: str
+    caption: str
+    label: str
+    get: Callable[[dict[str, Array]], tuple[Array, Array] | None]
+    low: int
+    high: int
+    zero: bool = False
+    joined: bool = True
+
+
+def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
+    """Draw an error over time, a panel per family; ``None`` if no case has it."""
+    shown = [case for case in cases if what.get(case.series) is not None]
+    if not shown:
+        return None
+    by_id = {case.record.id: case for case in shown}
+    groups = panels([case.record for case in shown])
+    figure, grid = panel_grid(len(groups))
+    for axes, (name, members) in zip(grid, groups, strict=False):
+        axes.set_title(name, color=INK)
+        _error_axis(axes, what)
+        for record in members:
+            _draw_error(axes, by_id[record.id], what)
+        panel_legend(axes, [by_id[record.id] for record in members], markers=not what.joined)
+    label_outer(grid, len(groups), "time", what.label)
+    return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what))
+
+
+def panel_grid(count: int, *, height: float = 2.75, columns: int = COLUMNS) -> tuple[Figure, list[Axes]]:
+    """Return a figure with at least ``count`` panels in rows; the surplus is blank."""
+    rows = -(-count // columns)
+    figure = new(10.4, height * rows)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    return figure, grid
+
+
+def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -> None:
+    """Put the legend under its panel, where it covers no data."""
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=case.look.light,
+            dashes=case.look.dash or (None, None),
+            marker=case.look.marker if markers else "",
+            markersize=4,
+            label=case.legend,
+        )
+        for case in cases
+    ]
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=1, borderaxespad=0.0)
+
+
+def label_outer(grid: Sequence[Axes], count: int, x: str, y: str, columns: int = COLUMNS) -> None:
+    """Label the axes at the left edge and under every column's last panel."""
+    for index, axes in enumerate(grid[:count]):
+        if index % columns == 0:
+            axes.set_ylabel(y)
+        axes.set_xlabel(x, labelpad=1, fontsize=8, loc="right")
+
+
+def work_precision(cases: Sequence[Drawn]) -> Picture | None:
+    """Draw position error and energy error against time, side by side; energy is not shown alone."""
+    keys = ("position_end", "energy_max")
+    shown = [
+        case
+        for case in cases
+        if all(_counts(case.record, key) for key in (*keys, "warm_seconds")) and group_of(case.record) == "on"
+    ]
+    if len(shown) < 2:
+        return None
+    figure = new(10.4, 4.7)
+    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.62])
+    times = [_number(case.record, "warm_seconds") for case in shown]
+    for axes, key in ((left, keys[0]), (right, keys[1])):
+        values = [_number(case.record, key) for case in shown]
+        floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
+        top = min(max(values), 1e3)
+        log_axis(axes, "x", math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
+        log_axis(axes, "y", round(math.log10(floor)), math.ceil(math.log10(top * 3)), most=9)
+        placed: list[tuple[float, float]] = []
+        for case, seconds, value in zip(shown, times, values, strict=True):
+            y = min(max(value, floor), top * 2)
+            marker = case.look.marker if value <= top else "^"
+            axes.plot(seconds, y, marker, color=case.look.light, markersize=6.5, clip_on=False)
+            _tag(axes, case, seconds, y, placed)
+        axes.set_xlabel("seconds for the whole span (median)")
+        axes.set_title(METRICS[key].label, color=INK)
+    side.set_axis_off()
+    handles = [
+        Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
+        for c in sorted(shown, key=lambda case: case.look.number)
+    ]
+    side.legend(handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1)
+    best = min(shown, key=lambda case: _number(case.record, "position_end"))
+    left_out = len(cases) - len(shown)
+    return picture(
+        figure,
+        "work-precision",
+        "Work and precision",
+        "Lower left is better. The same cases in both panels: energy is never shown without position. "
+        f"{left_out} cases that left the trajectory or did not reach the end are not in this picture; "
+        "points beyond the upper edge are drawn on it.",
+        f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
+        f"is that of {best.record.case.method}.",
+    )
+
+
+def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
+    """Return the largest value in each of ``bins`` equal spans of time, at the place where it is."""
+    if t.size <= bins:
+        return t, values
+    edges = np.linspace(t[0], t[-1], bins + 1)
+    which = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, bins - 1)
+    order = np.lexsort((values, which))
+    last = np.flatnonzero(np.diff(which[order], append=bins))
+    chosen = np.sort(order[last])
+    return t[chosen], values[chosen]
+
+
+def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
+    got = what.get(case.series)
+    assert got is not None
+    t, values = got
+    finite = np.isfinite(values)
+    t, values = t[finite], np.abs(values[finite])
+    if t.size == 0:
+        return
+    if what.joined:
+        t, values = envelope(t, values)
+    bottom = 10.0**what.low
+    clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
+    drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
+    (line,) = axes.plot(t, drawn, color=case.look.light, clip_on=False)
+    if case.look.dash:
+        line.set_dashes(case.look.dash)
+    if not what.joined:
+        line.set_linewidth(0.7)
+        line.set_marker(case.look.marker)
+        line.set_markersize(2.6)
+
+
+def _error_axis(axes: Axes, what: OverTime) -> None:
+    log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
+    axes.grid(visible=False, axis="x")
+
+
+def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
+    parts = []
+    for case in cases:
+        got = what.get(case.series)
+        assert got is not None
+        values = np.abs(got[1][np.isfinite(got[1])])
+        worst = f"{values.max():.1e}" if values.size else "none finite"
+        parts.append(f"{case.record.case.method}: {worst}")
+    return f"{what.title}, largest values. " + "; ".join(parts) + "."
+
+
+def _tag(axes: Axes, case: Drawn, x: float, y: float, placed: list[tuple[float, float]]) -> None:
+    # numbers of close points go to different sides
+    spot = (math.log10(x), math.log10(y))
+    crowd = sum(abs(spot[0] - a) < 0.12 and abs(spot[1] - b) < 0.5 for a, b in placed)
+    placed.append(spot)
+    offset, align = [((6, 4), "left"), ((-6, -9), "right"), ((6, -9), "left"), ((-6, 4), "right")][crowd % 4]
+    axes.annotate(
+        str(case.look.number),
+        (x, y),
+        xytext=offset,
+        textcoords="offset points",
+        ha=align,
+        fontsize=7.5,
+        color=INK,
+        annotation_clip=False,
+    )
+
+
+def _full(case: Drawn) -> str:
+    return f"{case.look.number}  {case.record.case.method}"
+
+
+def _counts(record: Record, key: str) -> bool:
+    value = record.result.metrics.get(key)
+    return value is not None and value.counts
+
+
+def _number(record: Record, key: str) -> float:
+    value = record.result.metrics[key].value
+    assert value is not None
+    return value
+

@@ -1,0 +1,177 @@
+"""Figures that belong to one problem, and step sizes where a library tells them."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from hbvm_bench.reference import Reference
+from hbvm_bench.report.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures import Drawn, label_outer, panel_grid, panel_legend
+from hbvm_bench.report.style import INK, MUTED, TRUTH, options, panels
+from hbvm_bench.table import status_of
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+View = Callable[[Problem, Sequence[Drawn], Reference | None], Picture | None]
+
+LAST = 100.0  # time units at the end that the picture of z shows
+REACH = 3.2  # of its vertical axis; the planetoid stays within 1.69
+PLANETOID_Z = 8  # component of y
+REVOLUTION = 21.46  # of the primaries
+
+
+def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
+    """Draw the planetoid's z over the last part of the span, a panel per family."""
+    start = problem.t_end - LAST
+    shown = [case for case in cases if case.series["t"].size and case.series["t"][-1] > start]
+    if not shown:
+        return None
+    by_id = {case.record.id: case for case in shown}
+    groups = panels([case.record for case in shown])
+    figure, grid = panel_grid(len(groups), height=2.6)
+    for axes, (name, members) in zip(grid, groups, strict=False):
+        axes.set_title(name, color=INK)
+        for record in members:
+            case = by_id[record.id]
+            t, z = case.series["t"], case.series["y"][:, PLANETOID_Z]
+            kept = (t >= start) & (np.abs(z) <= REACH)
+            (line,) = axes.plot(t[kept], z[kept], color=case.look.light)
+            if case.look.dash:
+                line.set_dashes(case.look.dash)
+        if reference is not None:
+            late = reference.t >= start
+            axes.plot(
+                reference.t[late],
+                reference.high[late, PLANETOID_Z],
+                "o",
+                mfc="none",
+                color=INK,
+                markersize=5,
+                clip_on=False,
+                zorder=5,
+            )
+        axes.set_xlim(start, problem.t_end)
+        axes.set_ylim(-REACH, REACH)
+        panel_legend(axes, [by_id[record.id] for record in members])
+    label_outer(grid, len(groups), "time", "z of the planetoid")
+    ends = "; ".join(
+        f"{case.record.case.method}: {case.series['y'][-1, PLANETOID_Z]:.4g}"
+        for case in shown
+        if case.series["t"][-1] == problem.t_end
+    )
+    return picture(
+        figure,
+        "axis-motion",
+        f"The planetoid on the axis, the last {LAST:.0f} time units",
+        "Rings: the stored 128-bit reference. A line that is not in the picture has left it: that planetoid is "
+        "far away. A curve that misses the rings conserves, at best, the energy of another motion.",
+        f"z at t = {problem.t_end:g}. {ends}.",
+    )
+
+
+def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
+    """Draw the paths of the two primaries at the beginning and at the end, a square per case."""
+    del reference
+    shown = [case for case in cases if case.series["t"].size > 2]
+    if not shown:
+        return None
+    columns = 7
+    rows = -(-len(shown) // columns)
+    figure = new(10.4, 1.72 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axes in grid[len(shown) :]:
+        axes.set_axis_off()
+    for axes, case in zip(grid, shown, strict=False):
+        t = case.series["t"]
+        first = t <= REVOLUTION
+        last = t >= t[-1] - 3 * REVOLUTION
+        for body in (0, 1):
+            _path(axes, problem, case, first, body, color=TRUTH, linewidth=2.6)
+            _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
+        axes.set_xlim(-6, 6)
+        axes.set_ylim(-6, 6)
+        axes.set_aspect("equal")
+        axes.set_xticks([-5, 0, 5], labels=[])
+        axes.set_yticks([-5, 0, 5], labels=[])
+        axes.set_title(f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK)
+        words = options(case.record)
+        axes.set_xlabel(words if len(words) < 31 else words[:29] + "…", fontsize=5.5, color=MUTED, labelpad=1)
+    return picture(
+        figure,
+        "primaries",
+        "The paths of the primaries in their plane",
+        "Grey: the first revolution, which is the right one for all times: the true orbits keep their place. "
+        "Colour: the last three revolutions that the run reached. Grid lines at −5, 0 and 5.",
+        "An orbit that has turned against the grey one is the sham rotation of a method that keeps the energy "
+        "but neither the angular momentum nor the apsidal direction at this step.",
+    )
+
+
+def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
+    """Draw the step sizes of the cases that stalled, against time and against the step's number."""
+    shown = [
+        case
+        for case in cases
+        if "extra.dt_history" in case.series and case.record.result.outcome == "stalled"
+    ]
+    if not shown:
+        return None
+    figure = new(10.4, 3.2)
+    left, right = figure.subplots(1, 2)
+    low = 0
+    for case in shown:
+        history = case.series["extra.dt_history"]
+        history = history[np.abs(history[:, 1]) > 0]
+        dt = np.abs(history[:, 1])
+        low = min(low, int(np.floor(np.log10(dt.min()))) - 1)
+        for axes, x in ((left, history[:, 0]), (right, np.arange(1, len(dt) + 1))):
+            axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2)
+        left.annotate(
+            f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}",
+            (history[-1, 0], dt.min()),
+            xytext=(-8, 4),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            color=INK,
+        )
+    for axes in (left, right):
+        log_axis(axes, "y", low, 1)
+        axes.set_ylabel("step size dt")
+    left.set_xlabel("time")
+    right.set_xlabel("recorded step")
+    return picture(
+        figure,
+        "step-sizes",
+        "Step sizes of what stalled",
+        "The run was ended by a watchdog that saw the time stand still while steps were taken, not by a time limit.",
+        "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
+    )
+
+
+VIEWS: dict[str, tuple[View, ...]] = {"sitnikov": (axis_motion, primaries)}
+
+
+def _path(
+    axes: Axes, problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int, *, color: str, linewidth: float
+) -> None:
+    # cubic Hermite pieces: the samples know their velocities, straight lines would cut the pericentres
+    t, y = case.series["t"][chosen], case.series["y"][chosen]
+    velocity = problem.velocity(y)
+    if velocity is None or len(t) < 2 or not np.isfinite(y).all():
+        return
+    here = slice(3 * body, 3 * body + 2)
+    q, v = y[:, here], velocity[:, here]
+    h = np.diff(t)[:, None, None]
+    u = np.linspace(0, 1, 5)[None, :-1, None]
+    q0, q1, v0, v1 = q[:-1, None], q[1:, None], v[:-1, None], v[1:, None]
+    curve = (
+        (1 + 2 * u) * (1 - u) ** 2 * q0
+        + u * (1 - u) ** 2 * h * v0
+        + u**2 * (3 - 2 * u) * q1
+        + u**2 * (u - 1) * h * v1
+    ).reshape(-1, 2)
+    curve = curve[np.abs(curve).max(axis=1) < 30]
+    axes.plot(curve[:, 0], curve[:, 1], color=color, linewidth=linewidth)

@@ -1,0 +1,130 @@
+"""What the command line shows: progress while it runs, tables afterwards."""
+
+import time
+from collections.abc import Sequence
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from hbvm_bench.records import Record
+from hbvm_bench.table import GROUPS, Row, columns, rows, seconds, status_of
+
+PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded at 80
+
+
+def console(*, stderr: bool = False) -> Console:
+    """Return a console that does not fold tables when its output is a file or a pipe."""
+    made = Console(stderr=stderr, highlight=False)
+    if not made.is_terminal:
+        made.width = PIPE_WIDTH
+    return made
+
+
+class Live:
+    """Progress of a run: a bar on a terminal, a line per case elsewhere."""
+
+    def __init__(self, total: int) -> None:
+        self._console = console(stderr=True)
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("[dim]{task.fields[now]}"),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        self._task: TaskID | None = None
+        self._total = total
+        self._count = 0
+        self._start = time.monotonic()
+
+    def __enter__(self) -> "Live":
+        self._bar.start()
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._bar.stop()
+
+    def phase(self, title: str, total: int, done: int = 0) -> None:
+        """Begin a phase of ``total`` visits."""
+        if self._task is not None:
+            self._bar.remove_task(self._task)
+        self._task = self._bar.add_task(title, total=total, completed=done, now="")
+        self._total, self._count = total, done
+        kept = f", {done} already there" if done else ""
+        self._console.print(f"{title}: {total} to do{kept}" if not done else f"{title}: {total}{kept}")
+
+    def case(self, record: Record) -> None:
+        """Report a case that has ended."""
+        self._advance()
+        mark = "[green]ok[/]" if status_of(record) == "ok" else f"[yellow]{escape(status_of(record))}[/]"
+        self._console.print(
+            f"  [{self._count}/{self._total}]".replace("[", "\\[", 1)
+            + f" {escape(record.case.method)}  {mark}  [dim]{seconds(record.seconds)}[/]"
+        )
+
+    def now(self, words: str) -> None:
+        """Say what is being done, and count it."""
+        self._advance()
+        if self._task is not None:
+            self._bar.update(self._task, now=words)
+
+    def say(self, words: str) -> None:
+        """Print a sentence."""
+        self._console.print(escape(words))
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.monotonic() - self._start
+
+    def _advance(self) -> None:
+        self._count += 1
+        if self._task is not None:
+            self._bar.advance(self._task)
+
+
+def results(
+    records: Sequence[Record], keys: Sequence[str] | None = None, sort: str | None = None
+) -> list[Table]:
+    """Return one table per problem."""
+    problems = list(dict.fromkeys(record.case.problem for record in records))
+    return [
+        _table(problem, [r for r in records if r.case.problem == problem], keys, sort) for problem in problems
+    ]
+
+
+def _table(problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None) -> Table:
+    shown = columns(records, keys)
+    made = Table(title=Text(problem), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made.add_column("method", no_wrap=True)
+    for metric in shown:
+        made.add_column(metric.label, justify="right")
+    made.add_column("remark", overflow="fold", ratio=1, min_width=24)
+    group = ""
+    for row in rows(records, sort):
+        if row.group != group:
+            if group:
+                made.add_section()
+            group = row.group
+            made.add_row(Text(GROUPS[group], style="bold italic"))
+        made.add_row(
+            _method(row), *(_cell(row, metric.key) for metric in shown), Text(row.remark, style="dim")
+        )
+    return made
+
+
+def _method(row: Row) -> Text:
+    return Text(row.record.case.method, style="bold cyan" if row.record.role == "ours" else "")
+
+
+def _cell(row: Row, key: str) -> Text:
+    if key not in row.cells:
+        return Text("–", style="dim")
+    cell = row.cells[key]
+    return Text(f"({cell.text})", style="dim") if cell.void else Text(cell.text)
