@@ -6,6 +6,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from integrators import registry
 from integrators.integrate import Solution, integrate
 from integrators.protocol import MethodBase, Samples, Stats, Status
 
@@ -13,18 +14,14 @@ if TYPE_CHECKING:
     from integrators.gauss import Gauss as Gauss
     from integrators.hbvm import HBVM as HBVM
 
-__all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate"]
+__all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", "registry"]
 
 
 def __getattr__(name: str) -> Any:
-    from integrators import registry
-
     if name.startswith("_") or name not in registry.names():
         raise AttributeError(f"module 'integrators' has no attribute {name!r}")
     return registry.get(name)
 
 
 def __dir__() -> list[str]:
-    from integrators import registry
-
     return sorted({*globals(), *registry.names()})

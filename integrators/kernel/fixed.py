@@ -14,9 +14,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from problems import System, emit
 
 # How a call of `advance` ended.
 DONE, BUDGET, DIVERGED, NOT_FINITE = range(4)
@@ -30,7 +32,7 @@ STEPS, ITERATIONS, EVALUATIONS, PARTIAL, RESTARTS = range(5)
 MAX_ITERATIONS = 1000
 CONVERGED = 1e-16
 STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
-PATIENCE = 2  # iterations without a new smallest change that count as stagnation
+PATIENCE, SLOWNESS = 2, 16  # stagnation is 2 + (iterations so far)/16 without a new smallest change
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
@@ -146,7 +148,7 @@ def _iterate(field, par, t, h, y, e, integrals, projection, nodes, block, group,
     change = np.empty(group.size)
     largest = np.empty(group.size)
     best, last, stalled = np.inf, 0.0, 0
-    for _ in range(MAX_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         _evaluate(field, par, t, h, y, e, integrals, nodes, gamma, stage, values)
         _project(projection, values, new)
         counters[ITERATIONS] += 1
@@ -163,7 +165,7 @@ def _iterate(field, par, t, h, y, e, integrals, projection, nodes, block, group,
             best, stalled = floored, 0
         else:
             stalled += 1
-        if stalled >= PATIENCE and best < STAGNATION:
+        if stalled >= PATIENCE + iteration // SLOWNESS and best < STAGNATION:
             return DONE, strict
     return DIVERGED, last
 
@@ -319,6 +321,25 @@ def advance(
         if between == LAND:
             t0, n = times[i], 0
     return DONE, 0.0, t0, n, length, times.size
+
+
+_fields: dict[str, Any] = {}
+
+
+def compile_field(system: System) -> tuple[int, bool]:
+    """Compile a vector field; return the address of its C function, and whether it came from a cache."""
+    key = system.fingerprint
+    if key in _fields:
+        return _fields[key].address, True
+    function = emit.numba(system, "field")
+    number = types.CPointer(types.float64)
+
+    @cfunc(types.void(types.float64, number, number, number))
+    def field(t: Any, y: Any, par: Any, out: Any) -> None:
+        function(t, y, par, out)
+
+    _fields[key] = field
+    return field.address, not function.stats.cache_misses
 
 
 def compile_kernel() -> bool:
