@@ -10,9 +10,10 @@ from typing import Any, NoReturn
 from problems.errors import InputError
 
 # Modules that run between the user's line and the error; their frames are never the user's.
-_MACHINERY = frozenset(
-    f"problems.{name}" for name in ("blame", "tracing", "sums", "arguments", "hamiltonian", "problem")
-)
+_MACHINERY = {
+    f"problems.{name}"
+    for name in ["blame", "node", "tracing", "sums", "arguments", "system", "hamiltonian", "problem"]
+}
 
 
 def _is_users(frame: FrameType) -> bool:

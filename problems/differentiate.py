@@ -17,10 +17,9 @@ the same whether a sum is emitted as a loop or term by term.
 from dataclasses import dataclass
 from fractions import Fraction
 
+from problems.adjoint import ONE, Adjoint, added, merged
 from problems.sums import Affine, Loop
-from problems.tracing import STATE, Graph, Node, is_power_of_two
-
-_ONE = Fraction(1)
+from problems.tracing import STATE, Node
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,91 +63,6 @@ class Gradient:
     loops: tuple[tuple[Loop, tuple[LoopTerm, ...]], ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Adjoint:
-    """``factor * num / den`` (``None`` is 1); ``key`` is the node it comes from."""
-
-    factor: Fraction
-    num: Node | None
-    den: Node | None
-    key: int
-
-    def times(self, node: Node, key: int, *, factor: Fraction = _ONE) -> "_Adjoint":
-        """Multiply; constants and powers of two go into the exact factor."""
-        factor = factor * self.factor
-        if node.op == "const":
-            return _Adjoint(factor * Fraction(node.data), self.num, self.den, key)
-        if node.op == "neg":
-            factor, node = -factor, node.args[0]
-        if node.op == "mul" and node.args[0].op == "const" and is_power_of_two(node.args[0].data):
-            factor, node = factor * Fraction(node.args[0].data), node.args[1]
-        return _Adjoint(factor, node if self.num is None else self.num * node, self.den, key)
-
-    def over(self, node: Node, key: int, *, factor: Fraction = _ONE) -> "_Adjoint":
-        """Divide; constants and powers of two go into the exact factor."""
-        factor = factor * self.factor
-        if node.op == "const":
-            return _Adjoint(factor / Fraction(node.data), self.num, self.den, key)
-        if node.op == "mul" and node.args[0].op == "const" and is_power_of_two(node.args[0].data):
-            factor, node = factor / Fraction(node.args[0].data), node.args[1]
-        return _Adjoint(factor, self.num, node if self.den is None else self.den * node, key)
-
-    def scaled(self, factor: Fraction, key: int) -> "_Adjoint":
-        return _Adjoint(self.factor * factor, self.num, self.den, key)
-
-    def divided(self, graph: Graph) -> "_Adjoint":
-        """Carry out the division, once, before the adjoint is used several times."""
-        if self.den is None:
-            return self
-        num = graph.const(1.0) if self.num is None else self.num
-        return _Adjoint(self.factor, num / self.den, None, self.key)
-
-    def node(self, graph: Graph) -> Node:
-        """Return the value as one node."""
-        size = abs(self.factor)
-        num, den = self.num, self.den
-        up, down = float(size), 1.0
-        if Fraction(up) != size and max(size.numerator, size.denominator) < 2**53:
-            up, down = float(size.numerator), float(size.denominator)
-        value = graph.const(up) if num is None else graph.mul(graph.const(up), num)
-        if down != 1.0:
-            den = graph.const(down) if den is None else graph.mul(graph.const(down), den)
-        if den is not None:
-            value = value / den
-        return -value if self.factor < 0 else value
-
-
-def _merged(parts: list[_Adjoint]) -> list[_Adjoint]:
-    """Join contributions that differ in their factor only: x + x is 2 x, exactly."""
-    kept: dict[tuple[int, int], _Adjoint] = {}
-    for part in parts:
-        name = (-1 if part.num is None else part.num.id, -1 if part.den is None else part.den.id)
-        other = kept.get(name)
-        if other is None:
-            kept[name] = part
-        else:
-            kept[name] = _Adjoint(other.factor + part.factor, part.num, part.den, other.key)
-    return [part for part in kept.values() if part.factor != 0]
-
-
-def _total(parts: list[_Adjoint], graph: Graph) -> _Adjoint | None:
-    """Add contributions in order; a common factor and a common denominator stay outside."""
-    parts = _merged(parts)
-    if len(parts) <= 1:
-        return parts[0] if parts else None
-    size = abs(parts[0].factor)
-    common = size if all(abs(part.factor) == size for part in parts) else _ONE
-    den = parts[0].den
-    if any(part.den is not den for part in parts):
-        den = None
-    else:
-        parts = [_Adjoint(part.factor, part.num, None, part.key) for part in parts]
-    total = parts[0].scaled(1 / common, 0).node(graph)
-    for part in parts[1:]:
-        total = total + part.scaled(1 / common, 0).node(graph)
-    return _Adjoint(common, total, den, parts[0].key)
-
-
 def reachable(roots: list[Node]) -> list[Node]:
     """Return all nodes that ``roots`` depend on, arguments first."""
     seen: dict[int, Node] = {}
@@ -165,7 +79,7 @@ class _Sweep:
     def __init__(self, root: Node) -> None:
         self.graph = root.graph
         self.nodes = reachable([root])
-        self.parts: dict[int, list[_Adjoint]] = {}
+        self.parts: dict[int, list[Adjoint]] = {}
         self._needed: set[int] = set()
         self._inverse: dict[int, Node] = {}
         self._survey()
@@ -191,26 +105,26 @@ class _Sweep:
                 if a.op == "const" and a.data == 1.0:
                     self._inverse[b.id] = node
 
-    def _over(self, part: _Adjoint, node: Node, key: int, factor: Fraction = _ONE) -> _Adjoint:
+    def _over(self, part: Adjoint, node: Node, key: int, factor: Fraction = ONE) -> Adjoint:
         """Divide by ``node``, or multiply by its reciprocal where that is known."""
         inverse = self._inverse.get(node.id)
         if inverse is not None:
             return part.times(inverse, key, factor=factor)
         return part.over(node, key, factor=factor)
 
-    def _give(self, node: Node, part: _Adjoint) -> None:
+    def _give(self, node: Node, part: Adjoint) -> None:
         if node.flags & STATE and part.factor != 0:
             self.parts.setdefault(node.id, []).append(part)
 
-    def collected(self, node: Node) -> list[_Adjoint]:
+    def collected(self, node: Node) -> list[Adjoint]:
         """Return the contributions to a node in the user's order, those from loops summed up."""
         parts = self.parts.pop(node.id, [])[::-1]
         return self._out_of_loops(parts) if node.loop is None else parts
 
-    def _out_of_loops(self, parts: list[_Adjoint]) -> list[_Adjoint]:
+    def _out_of_loops(self, parts: list[Adjoint]) -> list[Adjoint]:
         graph = self.graph
-        outside: list[_Adjoint] = []
-        inside: dict[int, tuple[Loop, list[_Adjoint]]] = {}
+        outside: list[Adjoint] = []
+        inside: dict[int, tuple[Loop, list[Adjoint]]] = {}
         for part in parts:
             loop = next((n.loop for n in (part.num, part.den) if n is not None and n.loop is not None), None)
             # A contribution from inside a loop that does not vary there still occurs once per term.
@@ -219,15 +133,15 @@ class _Sweep:
                 outside.append(part)
             else:
                 inside.setdefault(loop.id, (loop, []))[1].append(part)
-        sums: list[_Adjoint] = []
+        sums: list[Adjoint] = []
         for loop, loop_parts in inside.values():
-            total = _total(loop_parts, graph)
+            total = added(loop_parts, graph)
             if total is not None:
-                body = _Adjoint(_ONE, total.num, total.den, 0).node(graph)
-                sums.append(_Adjoint(total.factor, graph.sum(body, loop), None, total.key))
+                body = Adjoint(ONE, total.num, total.den, 0).node(graph)
+                sums.append(Adjoint(total.factor, graph.sum(body, loop), None, total.key))
         return sums + outside
 
-    def pull(self, node: Node, adjoint: _Adjoint) -> None:
+    def pull(self, node: Node, adjoint: Adjoint) -> None:
         """Pass the adjoint of ``node`` on to its arguments."""
         graph, key = self.graph, node.id
         active = [arg for arg in node.args if arg.flags & STATE]
@@ -236,12 +150,12 @@ class _Sweep:
         match node.op:
             case "add":
                 for arg in reversed(node.args):
-                    self._give(arg, adjoint.scaled(_ONE, key))
+                    self._give(arg, adjoint.scaled(ONE, key))
             case "sub":
-                self._give(node.args[1], adjoint.scaled(-_ONE, key))
-                self._give(node.args[0], adjoint.scaled(_ONE, key))
+                self._give(node.args[1], adjoint.scaled(-ONE, key))
+                self._give(node.args[0], adjoint.scaled(ONE, key))
             case "neg":
-                self._give(node.args[0], adjoint.scaled(-_ONE, key))
+                self._give(node.args[0], adjoint.scaled(-ONE, key))
             case "mul":
                 a, b = node.args
                 if a is b:
@@ -260,32 +174,32 @@ class _Sweep:
                 self._give(node.args[0], self._over(adjoint, node, key, Fraction(1, 2)))
             case "sum":
                 adjoint = adjoint.divided(graph)
-                self._give(node.args[0], adjoint.scaled(_ONE, key))
+                self._give(node.args[0], adjoint.scaled(ONE, key))
             case _:
                 self._give(node.args[0], self._pull_function(node, adjoint))
 
-    def _pull_quotient(self, node: Node, adjoint: _Adjoint) -> None:
+    def _pull_quotient(self, node: Node, adjoint: Adjoint) -> None:
         a, b = node.args
         key = node.id
         if b.flags & STATE:
             if node.id in self._needed:
-                part = self._over(adjoint.times(node, key), b, key, -_ONE)
+                part = self._over(adjoint.times(node, key), b, key, -ONE)
             elif b.op == "sqrt":
-                part = adjoint.times(a, key, factor=-_ONE).over(b.args[0], key)
+                part = adjoint.times(a, key, factor=-ONE).over(b.args[0], key)
             else:
-                part = adjoint.times(a, key, factor=-_ONE).over(self.graph.mul(b, b), key)
+                part = adjoint.times(a, key, factor=-ONE).over(self.graph.mul(b, b), key)
             self._give(b, part)
         if a.flags & STATE:
             self._give(a, self._over(adjoint, b, key))
 
-    def _pull_function(self, node: Node, adjoint: _Adjoint) -> _Adjoint:
+    def _pull_function(self, node: Node, adjoint: Adjoint) -> Adjoint:
         graph, key = self.graph, node.id
         x = node.args[0]
         match node.op:
             case "sin":
                 return adjoint.times(graph.call("cos", x), key)
             case "cos":
-                return adjoint.times(graph.call("sin", x), key, factor=-_ONE)
+                return adjoint.times(graph.call("sin", x), key, factor=-ONE)
             case "tan":
                 return adjoint.times(graph.node(1.0) + node * node, key)
             case "exp":
@@ -318,21 +232,21 @@ def gradient(root: Node) -> Gradient:
     if not root.flags & STATE:
         return Gradient({}, ())
     sweep = _Sweep(root)
-    sweep.parts[root.id] = [_Adjoint(_ONE, None, None, root.id)]
+    sweep.parts[root.id] = [Adjoint(ONE, None, None, root.id)]
     for node in reversed(sweep.nodes):
         if not node.flags & STATE or node.id not in sweep.parts:
             continue
         parts = sweep.collected(node)
         if node.op != "symbol":
-            total = _total(parts, graph)
+            total = added(parts, graph)
             if total is not None:
                 sweep.pull(node, total)
             continue
         place = node.data[1]
         if node.loop is None:
-            terms[place] = tuple(Term(part.node(graph), part.key) for part in _merged(parts))
+            terms[place] = tuple(Term(part.node(graph), part.key) for part in merged(parts))
         else:
-            total = _total(parts, graph)
+            total = added(parts, graph)
             if total is not None:
                 entry = LoopTerm(place, total.node(graph))
                 loops.setdefault(node.loop.id, (node.loop, []))[1].append(entry)

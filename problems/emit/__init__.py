@@ -12,7 +12,8 @@ import numpy as np
 from problems.emit import cache
 from problems.emit.array import jax_text, numpy_text
 from problems.emit.plan import SMALL, Plan, make_plan
-from problems.emit.scalar import heyoka_text, numba_text
+from problems.emit.scalar import numba_text
+from problems.emit.symbolic import heyoka_text
 from problems.errors import InputError, MissingLibraryError, unknown
 from problems.hamiltonian import System
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from problems.differentiate import LoopTerm, Term, reachable
+from problems.emit.rewrite import Rewriter, body_of
 from problems.functions import Function
-from problems.sums import Affine, Loop
+from problems.sums import Loop
 from problems.tracing import Graph, Node
 
 # Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
@@ -89,90 +90,6 @@ class Plan:
     spare: dict[int, int] = field(default_factory=dict)
 
 
-def _body(roots: Sequence[Node], loop: Loop) -> list[Node]:
-    """Return the nodes inside a loop that ``roots`` depend on, arguments first."""
-    seen: dict[int, Node] = {}
-    stack = list(roots)
-    while stack:
-        node = stack.pop()
-        if node.loop is loop and node.id not in seen:
-            seen[node.id] = node
-            stack.extend(node.args)
-    return [seen[key] for key in sorted(seen)]
-
-
-class _Rewriter:
-    """Expands powers, and the declared sums that are small enough."""
-
-    def __init__(self, graph: Graph, limit: int | None, roots: Sequence[Node]) -> None:
-        self.graph = graph
-        self.limit = limit
-        self.done: dict[int, Node] = {}
-        self._uses: dict[int, int] = {}
-        for arg in [arg for node in reachable(list(roots)) for arg in node.args] + list(roots):
-            self._uses[arg.id] = self._uses.get(arg.id, 0) + 1
-        self.rewrite(roots)
-
-    def small(self, loop: Loop, roots: Sequence[Node]) -> bool:
-        return self.limit is None or len(loop) * len(_body(roots, loop)) <= self.limit
-
-    def rewrite(self, roots: Sequence[Node]) -> None:
-        for node in reachable(list(roots)):
-            if node.id in self.done or node.loop is not None:
-                continue
-            if node.op == "sum":
-                self.done[node.id] = self._sum(node)
-            else:
-                self.done[node.id] = self._apply(node, self.done)
-
-    def _apply(self, node: Node, done: dict[int, Node]) -> Node:
-        args = tuple(done[arg.id] if arg.id in done else self.done[arg.id] for arg in node.args)
-        if node.op == "pow":
-            return self.graph.expanded(args[0], node.data)
-        if node.op == "neg" and args[0].op == "sub" and self._uses[node.args[0].id] == 1:
-            return self.graph.sub(*args[0].args[::-1])  # -(a - b), used here only
-        return self.graph.apply(node, args)
-
-    def _sum(self, node: Node) -> Node:
-        loop, root = node.data, node.args[0]
-        if not self.small(loop, [root]):
-            return self.graph.sum(self.inside([root], loop)[0], loop)
-        total: Node | None = None
-        for (term,) in self.written_out([root], loop):
-            total = term if total is None else total + term
-        assert total is not None
-        return total
-
-    def inside(self, roots: Sequence[Node], loop: Loop) -> list[Node]:
-        """Rewrite nodes inside a loop that stays one."""
-        done: dict[int, Node] = {}
-        for node in _body(roots, loop):
-            done[node.id] = node if node.op in ("symbol", "index") else self._apply(node, done)
-        return [done[root.id] if root.id in done else self.done[root.id] for root in roots]
-
-    def written_out(self, roots: Sequence[Node], loop: Loop) -> list[list[Node]]:
-        """Return the roots at every term of a loop."""
-        body = _body(roots, loop)
-        places = {n.id: _affine(n).values(loop) for n in body if n.op in ("symbol", "index")}
-        rows: list[list[Node]] = []
-        for k in range(len(loop)):
-            done: dict[int, Node] = {}
-            for node in body:
-                if node.op == "symbol":
-                    place = int(places[node.id][k])
-                    done[node.id] = self.graph.symbol(node.data[0], place, flags=node.flags)
-                elif node.op == "index":
-                    done[node.id] = self.graph.const(float(places[node.id][k]))
-                else:
-                    done[node.id] = self._apply(node, done)
-            rows.append([done[root.id] if root.id in done else self.done[root.id] for root in roots])
-        return rows
-
-
-def _affine(node: Node) -> Affine:
-    return node.data[1] if node.op == "symbol" else node.data
-
-
 def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
     """Order the operations of a function.
 
@@ -187,7 +104,7 @@ def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
     graph = function.graph
     loop_roots = [entry.node for _, entries in function.loops for entry in entries]
     scalar_roots = [term.node for terms in function.outputs for term in terms]
-    rewriter = _Rewriter(graph, limit, loop_roots + scalar_roots)
+    rewriter = Rewriter(graph, limit, loop_roots + scalar_roots)
 
     chains: list[list[Term]] = [[] for _ in function.outputs]
     kept: list[tuple[Loop, list[LoopTerm]]] = []
@@ -220,7 +137,7 @@ def _scatters(plan: Plan, kept: list[tuple[Loop, list[LoopTerm]]]) -> set[int]:
             np.add.at(hits, entry.index.values(loop), 1)
     for loop, entries in kept:
         unique = tuple(bool((hits[entry.index.values(loop)] == 1).all()) for entry in entries)
-        body = _body([entry.node for entry in entries], loop)
+        body = body_of([entry.node for entry in entries], loop)
         plan.scatters.append(Scatter(loop, tuple(body), tuple(entries), unique))
         for entry, alone in zip(entries, unique, strict=True):
             if not alone:
@@ -258,7 +175,7 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
         for root in roots:
             for node in _demanded(root, done):
                 if node.op == "sum":
-                    statements.append(Reduce(node, node.data, tuple(_body(node.args, node.data))))
+                    statements.append(Reduce(node, node.data, tuple(body_of(node.args, node.data))))
                 else:
                     statements.append(Let(node))
                 for place in outputs.pop(node.id, ()):
@@ -268,7 +185,8 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
         # Sums first: they need an output that is not in use yet.
         captured += [n for n in reachable([node for _, node in finals]) if n.op == "sum"]
     emit(captured, plan.first)
-    emit(hints + [node for _, node in finals], plan.last)
+    needed = {node.id for node in reachable([node for _, node in finals])}
+    emit([node for node in hints if node.id in needed] + [node for _, node in finals], plan.last)
     if not plan.scatters:
         plan.first, plan.last = plan.first + plan.last, []
 
@@ -311,7 +229,7 @@ def _demanded(root: Node, done: set[int]) -> list[Node]:
             continue
         stack.append((node, True))
         if node.op == "sum":
-            inner = _body(node.args, node.data)
+            inner = body_of(node.args, node.data)
             needed = [arg for n in inner for arg in n.args if arg.loop is None]
         else:
             needed = list(node.args)

@@ -1,14 +1,17 @@
-"""Emission to targets that calculate with scalars in loops: numba, and heyoka, which has none."""
+"""Emission to numba: scalars (or lanes) in straight code and in plain loops."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from problems.differentiate import LoopTerm
+from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
 from problems.emit.text import Printer
 from problems.sums import Affine, Loop
 from problems.tracing import Node
 
-_MATH = {
+FUNCTIONS = {
     "sqrt": "sqrt",
     "sin": "sin",
     "cos": "cos",
@@ -18,27 +21,27 @@ _MATH = {
     "abs": "fabs",
     "sign": "copysign(1.0, {})",
 }
-_PREFIX = {"y": "y", "par": "c", "out": "a"}
+PREFIX = {"y": "y", "par": "c", "out": "a"}
 
 
-class _NumbaWriter:
+class _Writer:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.printer = Printer(plan.uses, _MATH)
-        self.tables: list[str] = []
-        self._table_names: dict[int, str] = {}
+        self.printer = Printer(plan.uses, FUNCTIONS)
+        self.tables: dict[int, tuple[str, str]] = {}
 
     def write(self) -> None:
         self._statements(self.plan.first)
-        for low, high in _ranges(self.plan.zeros):
+        for low, high in _runs(self.plan.zeros):
+            # -0.0 is what leaves the first summand as it is, its sign included.
             if high - low <= 3:
                 for place in range(low, high):
                     self.printer.line(f"out[{place}] = -0.0")
             else:
-                self.printer.line(f"for i in range({low}, {high}):")
-                self.printer.line("    out[i] = -0.0")
+                self.printer.line(f"for k in range({low}, {high}):")
+                self.printer.line("    out[k] = -0.0")
         for scatter in self.plan.scatters:
-            self._scatter(scatter)
+            self._loop(scatter.loop, scatter.body, scatter)
         self._statements(self.plan.last)
 
     def _statements(self, statements: list[Let | Reduce | Store]) -> None:
@@ -48,111 +51,177 @@ class _NumbaWriter:
                     self._let(node)
                 case Store(place, node):
                     self.printer.line(f"out[{place}] = {self.printer.text(node)}")
-                case Reduce():
-                    self._reduce(statement)
+                case Reduce(node, loop, body):
+                    # By way of an output not yet in use: the sum is a lane where outputs are lanes.
+                    spare = self.plan.spare[node.id]
+                    self.printer.line(f"out[{spare}] = -0.0")
+                    self.printer.assign(node, f"out[{spare}]")
+                    self._loop(loop, body, node)
 
-    def _let(self, node: Node, variables: list[str] | None = None) -> None:
+    def _let(self, node: Node, header: Range | Nest | Table | None = None) -> None:
         if node.op == "symbol":
             space, place = node.data
             if space == "t":
                 self.printer.names[node.id] = "t"
             elif isinstance(place, int):
-                self.printer.assign(node, f"{space}[{place}]", f"{_PREFIX[space]}{place}")
+                self.printer.assign(node, f"{space}[{place}]", f"{PREFIX[space]}{place}")
             else:
-                self.printer.assign(node, f"{space}[{_affine(place, variables or [])}]")
+                assert header is not None
+                self.printer.assign(node, f"{space}[{header.index(place)}]")
         elif node.op == "index":
-            self.printer.assign(node, f"float({_affine(node.data, variables or [])})")
+            assert header is not None
+            self.printer.assign(node, f"float({header.index(node.data)})")
         else:
             self.printer.let(node)
 
-    def _loop(self, loop: Loop) -> tuple[list[str], int]:
-        """Open the loop; return the names of its integers and its depth."""
-        variables = [f"i{k}" for k in range(loop.width)]
-        first, steps = _progression(loop)
-        n = _all_pairs(loop)
-        if steps is not None:
-            self.printer.line(f"for k in range({len(loop)}):")
-            variables = [_affine(Affine((int(b),), int(a)), ["k"]) for a, b in zip(first, steps, strict=True)]
-            return [v if v.isidentifier() or v.isdigit() else f"({v})" for v in variables], 1
-        if n:
-            self.printer.line(f"for i0 in range({n - 1}):")
-            self.printer.line(f"    for i1 in range(i0 + 1, {n}):")
-            return variables, 2
-        name = self._table_names.get(loop.id)
-        if name is None:
-            name = self._table_names[loop.id] = f"TABLE_{len(self.tables)}"
-            self.tables.append(f"{name} = np.array({loop.rows.tolist()}, dtype=np.int64)")
-        self.printer.line(f"for k in range({len(loop)}):")
-        for column, variable in enumerate(variables):
-            self.printer.line(f"    {variable} = {name}[k, {column}]")
-        return variables, 1
-
-    def _scatter(self, scatter: Scatter) -> None:
-        variables, depth = self._loop(scatter.loop)
-        outer, self.printer.indent = self.printer.indent, self.printer.indent + "    " * depth
-        for node in scatter.body:
-            self._let(node, variables)
-        for entry, unique in zip(scatter.entries, scatter.unique, strict=True):
-            self._add(entry, unique, variables)
-        self.printer.indent = outer
-
-    def _add(self, entry: LoopTerm, unique: bool, variables: list[str]) -> None:
-        place = _affine(entry.index, variables)
-        node = entry.node
-        if unique:
-            self.printer.line(f"out[{place}] = {self.printer.text(node)}")
-        elif node.op == "neg" and self.printer.waiting(node):
-            text = self.printer.text(node).removeprefix("-")
-            self.printer.line(f"out[{place}] = out[{place}] - {text}")
+    def _loop(self, loop: Loop, body: Sequence[Node], target: Scatter | Node) -> None:
+        """Print a loop that adds to the outputs of a scatter, or to a declared sum."""
+        nested = nest(loop)
+        if nested is not None:
+            self._nested(nested, body, target)
+            return
+        pieces = ranges(loop)
+        if pieces is None:
+            name, text = f"TABLE_{len(self.tables)}", f"np.array({loop.rows.tolist()}, dtype=np.int64)"
+            name, _ = self.tables.setdefault(loop.id, (name, text))
+            self._simple(Table(name, len(loop), loop.width), body, target)
         else:
-            self.printer.line(f"out[{place}] = out[{place}] + {self.printer.text(node, 2)}")
+            for piece in pieces:
+                self._simple(piece, body, target)
 
-    def _reduce(self, statement: Reduce) -> None:
-        printer = self.printer
-        # By way of an output not yet in use, so that the sum starts as a lane where outputs are lanes.
-        spare = self.plan.spare[statement.node.id]
-        printer.line(f"out[{spare}] = -0.0")
-        printer.assign(statement.node, f"out[{spare}]")
-        total = printer.names[statement.node.id]
-        variables, depth = self._loop(statement.loop)
-        outer, printer.indent = printer.indent, printer.indent + "    " * depth
-        for node in statement.body:
-            self._let(node, variables)
-        printer.line(f"{total} = {total} + {printer.text(statement.node.args[0], 2)}")
-        printer.indent = outer
+    def _simple(self, header: Range | Table, body: Sequence[Node], target: Scatter | Node) -> None:
+        printer, outside = self.printer, self.printer.indent
+        carried: dict[int, int] = {}
+        if isinstance(header, Range) and isinstance(target, Scatter) and header.n > 1:
+            carried = _carried(header, target)
+            for i in carried:
+                printer.line(f"a{i} = out[{header.along(target.entries[i].index).offset}]")
+        opening = header.opening()
+        for line in opening:
+            printer.line(line)
+        printer.indent = outside + "    " * bool(opening)
+        for node in body:
+            self._let(node, header)
+        if isinstance(target, Node):
+            self._add_to_sum(target)
+        else:
+            later = {second: first for first, second in carried.items()}
+            # What uses a carried value comes before what renews it.
+            for i in sorted(range(len(target.entries)), key=lambda i: i not in carried):
+                entry = target.entries[i]
+                place = f"out[{header.index(entry.index)}]"
+                if i in carried:
+                    self._add(place, f"a{i}", entry)
+                elif i in later:
+                    self._add(f"a{later[i]}", place, entry)
+                elif target.unique[i]:
+                    printer.line(f"{place} = {printer.text(entry.node)}")
+                else:
+                    self._add(place, place, entry)
+        printer.indent = outside
+        if isinstance(header, Range) and isinstance(target, Scatter):
+            for first, second in carried.items():
+                along = header.along(target.entries[second].index)
+                last = along.offset + along.coefficients[0] * (header.n - 1)
+                printer.line(f"out[{last}] = a{first}")
+
+    def _nested(self, header: Nest, body: Sequence[Node], target: Scatter | Node) -> None:
+        """Print two nested loops; what depends on i alone stays out of the inner one, sums too."""
+        printer, outside = self.printer, self.printer.indent
+        outer = _outer(body)
+        held = _held(target) if isinstance(target, Scatter) else []
+        printer.line(f"for i in {header.outer}:")
+        printer.indent = outside + "    "
+        for node in body:
+            if node.id in outer:
+                self._let(node, header)
+                if printer.waiting(node):  # for the inner loop
+                    printer.assign(node, printer.text(node))
+        entries = target.entries if isinstance(target, Scatter) else ()
+        for i in held:
+            printer.line(f"a{i} = out[{header.index(entries[i].index)}]")
+        printer.line(f"for j in {header.inner}:")
+        printer.indent = outside + "        "
+        for node in body:
+            if node.id not in outer:
+                self._let(node, header)
+        if isinstance(target, Node):
+            self._add_to_sum(target)
+        else:
+            for i, entry in enumerate(entries):
+                place = f"out[{header.index(entry.index)}]"
+                if i in held:
+                    self._add(f"a{i}", f"a{i}", entry)
+                elif target.unique[i]:
+                    printer.line(f"{place} = {printer.text(entry.node)}")
+                else:
+                    self._add(place, place, entry)
+        printer.indent = outside + "    "
+        for i in held:
+            printer.line(f"out[{header.index(entries[i].index)}] = a{i}")
+        printer.indent = outside
+
+    def _add_to_sum(self, node: Node) -> None:
+        total = self.printer.names[node.id]
+        self.printer.line(f"{total} = {total} + {self.printer.text(node.args[0], 2)}")
+
+    def _add(self, to: str, before: str, entry: LoopTerm) -> None:
+        node = entry.node
+        if node.op == "neg" and self.printer.waiting(node):
+            self.printer.line(f"{to} = {before} - {self.printer.text(node).removeprefix('-')}")
+        else:
+            self.printer.line(f"{to} = {before} + {self.printer.text(node, 2)}")
 
 
-def _affine(affine: Affine, variables: list[str]) -> str:
-    parts = []
-    for coefficient, variable in zip(affine.coefficients, variables, strict=True):
-        if coefficient:
-            parts.append(variable if coefficient == 1 else f"{coefficient}*{variable}")
-    if affine.offset or not parts:
-        parts.append(str(affine.offset))
-    return " + ".join(parts).replace("+ -", "- ")
+def _outer(body: Sequence[Node]) -> set[int]:
+    """Return the nodes that depend on the first of two loop integers alone."""
+    outer: set[int] = set()
+    inside = {node.id for node in body}
+    for node in body:
+        if node.op in ("symbol", "index"):
+            affine: Affine = node.data[1] if node.op == "symbol" else node.data
+            alone = affine.coefficients[1] == 0
+        else:
+            alone = all(arg.id in outer for arg in node.args if arg.id in inside)
+        if alone:
+            outer.add(node.id)
+    return outer
 
 
-def _progression(loop: Loop) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the first row and the constant step between rows, ``None`` if there is none."""
-    first = loop.rows[0]
-    steps = np.diff(loop.rows, axis=0)
-    if len(steps) == 0:
-        return first, np.zeros_like(first)
-    return first, steps[0] if (steps == steps[0]).all() else None
+def _held(scatter: Scatter) -> list[int]:
+    """Return the entries whose output is the same throughout the inner loop and touched by no other."""
+    places = [entry.index.values(scatter.loop) for entry in scatter.entries]
+    return [
+        i
+        for i, entry in enumerate(scatter.entries)
+        if entry.index.coefficients[1] == 0
+        and not any((places[i] == other).any() for j, other in enumerate(places) if j != i)
+    ]
 
 
-def _all_pairs(loop: Loop) -> int:
-    """Return n if the rows are all pairs (i, j), i < j < n, in order; else 0."""
-    if loop.width != 2:
-        return 0
-    n = int(loop.rows[-1, 1]) + 1
-    if len(loop) != n * (n - 1) // 2:
-        return 0
-    i, j = np.triu_indices(n, 1)
-    return n if np.array_equal(loop.rows[:, 0], i) and np.array_equal(loop.rows[:, 1], j) else 0
+def _carried(header: Range, scatter: Scatter) -> dict[int, int]:
+    """Return pairs of entries of which the second adds to the output that the first adds to next.
+
+    In a chain of neighbours the output of k + 1 is then kept in a variable from
+    one term to the next, instead of going through memory.
+    """
+    along = [header.along(entry.index) for entry in scatter.entries]
+    k = np.arange(header.n)
+    places = [a.offset + a.coefficients[0] * k for a in along]
+    pairs: dict[int, int] = {}
+    for first, a in enumerate(along):
+        for second, b in enumerate(along):
+            step = a.coefficients[0]
+            if step == 0 or b.coefficients[0] != step or b.offset != a.offset + step:
+                continue
+            mine = np.union1d(places[first], places[second])
+            others = [p for i, p in enumerate(places) if i not in (first, second)]
+            if not any(np.isin(mine, other).any() for other in others):
+                pairs[first] = second
+    return pairs
 
 
-def _ranges(places: list[int]) -> list[tuple[int, int]]:
+def _runs(places: list[int]) -> list[tuple[int, int]]:
     """Return runs of consecutive places as half-open ranges."""
     runs: list[tuple[int, int]] = []
     for place in places:
@@ -165,28 +234,7 @@ def _ranges(places: list[int]) -> list[tuple[int, int]]:
 
 def numba_text(plan: Plan, name: str) -> str:
     """Return ``def name(t, y, par, out)`` on scalars, preceded by its index tables if it has any."""
-    writer = _NumbaWriter(plan)
+    writer = _Writer(plan)
     writer.write()
-    head = "".join(table + "\n" for table in writer.tables)
+    head = "".join(f"{table} = {text}\n" for table, text in writer.tables.values())
     return head + f"def {name}(t, y, par, out):\n" + "\n".join(writer.printer.lines) + "\n"
-
-
-def heyoka_text(plan: Plan, name: str) -> str:
-    """Return ``def name(t, y, par, hy)``, which returns the list of expressions; no loops."""
-    functions = {f: f"hy.{f}" for f in _MATH} | {
-        "abs": "(hy.relu({0}) + hy.relu(-({0})))",
-        "sign": "(hy.relup({0}) - hy.relup(-({0})))",
-    }
-    printer = Printer(plan.uses, functions)
-    printer.line(f"out = [None]*{plan.n_out}")
-    for statement in plan.first:
-        match statement:
-            case Let(node) if node.op == "symbol":
-                space, place = node.data
-                printer.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
-            case Let(node):
-                printer.let(node)
-            case Store(place, node):
-                printer.line(f"out[{place}] = {printer.text(node)}")
-    printer.line("return out")
-    return f"def {name}(t, y, par, hy):\n" + "\n".join(printer.lines) + "\n"
