@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from integrators.hbvm import HBVM, HBVMProgram
-from integrators.protocol import MethodBase
+from integrators.hbvm import HBVM
+from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -74,6 +74,6 @@ class Gauss(MethodBase):
         """Accept every system of ordinary differential equations."""
         return None
 
-    def compile(self, system: System) -> HBVMProgram:
+    def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does."""
         return self.as_hbvm().compile(system)

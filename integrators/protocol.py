@@ -215,7 +215,7 @@ class MethodBase:
         return f"{type(self).__name__}({inside})"
 
 
-def check_times(times: Array, t: float) -> Array:
+def check_times(times: ArrayLike, t: float) -> Array:
     """Return ``times`` as a float64 array, or raise for times no stepper can serve.
 
     Parameters

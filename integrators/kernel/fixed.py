@@ -38,8 +38,7 @@ MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding 
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 
 
-@intrinsic
-def _call(typingctx: Any, field: Any, t: Any, y: Any, par: Any, out: Any) -> Any:
+def _typed_call(typingctx: Any, field: Any, t: Any, y: Any, par: Any, out: Any) -> Any:
     """Call the C function at address ``field`` on the data of three contiguous arrays."""
     signature = types.void(types.int64, types.float64, y, par, out)
 
@@ -56,6 +55,9 @@ def _call(typingctx: Any, field: Any, t: Any, y: Any, par: Any, out: Any) -> Any
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+_call: Any = intrinsic(_typed_call)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -334,12 +336,12 @@ def compile_field(system: System) -> tuple[int, bool]:
     function = emit.numba(system, "field")
     number = types.CPointer(types.float64)
 
-    @cfunc(types.void(types.float64, number, number, number))
     def field(t: Any, y: Any, par: Any, out: Any) -> None:
         function(t, y, par, out)
 
-    _fields[key] = field
-    return field.address, not function.stats.cache_misses
+    # Kept for as long as the process lives: it owns the code.
+    _fields[key] = cfunc(types.void(types.float64, number, number, number))(field)
+    return _fields[key].address, not function.stats.cache_misses
 
 
 def compile_kernel() -> bool:

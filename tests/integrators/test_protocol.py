@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import integrators
 from integrators import HBVM, Gauss, registry, testing
-from integrators.hbvm import plan
+from integrators.grid import plan
 from integrators.protocol import Status, check_state, check_times
 from problems import Hamiltonian, Problem
 from problems.errors import InputError, UnknownNameError
@@ -94,6 +94,16 @@ def test_a_state_that_is_not_finite_is_refused_before_the_first_step():
         program.start([0.0, np.nan])
     with pytest.raises(InputError, match=r"shape \(2,\), not \(3,\)"):
         program.start([0.0, 1.0, 2.0])
+    with pytest.raises(InputError, match=r"par must have shape \(0,\), not \(1,\)"):
+        program.start([0.0, 1.0], np.ones(1))
+
+
+def test_a_checkpoint_of_another_method_is_refused():
+    system = testing.pendulum().system
+    checkpoint = HBVM(k=4, s=2, h=0.1).compile(system).start([0.0, 1.0]).checkpoint()
+    other = HBVM(k=4, s=3, h=0.1).compile(system).start([0.0, 1.0])
+    with pytest.raises(InputError, match="belongs to another method or system"):
+        other.restore(checkpoint)
 
 
 def test_a_solution_knows_all_about_itself():
