@@ -21,7 +21,7 @@ def test_agrees_with_dop853(method, henon_heiles):
     theirs = solve_ivp(
         by_hand, (0.0, 50.0), henon_heiles.y0, method="DOP853", t_eval=TIMES, rtol=3e-14, atol=1e-15
     ).y.T
-    assert np.abs(ours - theirs).max() < 1e-9
+    assert np.abs(ours - theirs).max() < 2e-12  # measured 8.8e-14, DOP853's own error
 
 
 @pytest.mark.parametrize("method", [HBVM(k=16, s=10, h=0.5), Gauss(s=8, h=0.25)], ids=repr)
@@ -32,4 +32,4 @@ def test_agrees_with_heyoka(method, henon_heiles):
     taylor = hy.taylor_adaptive(equations, henon_heiles.y0.tolist(), tol=1e-18)
     theirs = taylor.propagate_grid(TIMES)[-1]
     ours = integrators.integrate(henon_heiles, method, TIMES).y
-    assert np.abs(ours - theirs).max() < 1e-11
+    assert np.abs(ours - theirs).max() < 5e-14  # measured 2.0e-15

@@ -57,11 +57,11 @@ def test_gauss_keeps_quadratic_invariants_and_hbvm_does_not(s, kepler):
     problem, times = kepler(0.4), np.arange(0.0, 60.1, 0.3)
     gauss = integrators.integrate(problem, Gauss(s=s, h=0.1), times).errors()
     hbvm = integrators.integrate(problem, HBVM(k=20, s=s, h=0.1), times).errors()
-    assert gauss["angular_momentum"].max() < 2e-14
-    assert hbvm["energy"].max() < 2e-14
+    assert gauss["angular_momentum"].max() < 5e-15  # measured 4.3e-16
+    assert hbvm["energy"].max() < 1e-14  # measured 1.6e-15
     if s < 5:  # at s = 5 both reach rounding
-        assert gauss["energy"].max() > 1e-9
-        assert hbvm["angular_momentum"].max() > 1e-9
+        assert gauss["energy"].max() > 1e-9  # measured 1.5e-2, 9.4e-6, 2.0e-8
+        assert hbvm["angular_momentum"].max() > 1e-9  # measured 3.6e-3, 3.0e-6, 2.2e-9
 
 
 def test_energy_that_is_not_polynomial_is_conserved_in_practice_once_k_is_large():
@@ -75,7 +75,8 @@ def test_energy_that_is_not_polynomial_is_conserved_in_practice_once_k_is_large(
         for k in (2, 3, 4, 6, 8, 12, 16)
     ]
     assert all(after < before / 5 for before, after in itertools.pairwise(errors[:5]))
-    assert max(errors[5:]) < 1e-14
+    # Measured 3.0e-3, 2.7e-5, 2.3e-7, 5.6e-12, then 1.8e-15, 2.4e-15, 2.5e-15.
+    assert max(errors[4:]) < 1e-14
 
 
 def test_side_samples_have_the_energy_of_own_steps_and_the_polynomial_has_not(henon_heiles):
@@ -83,8 +84,8 @@ def test_side_samples_have_the_energy_of_own_steps_and_the_polynomial_has_not(he
     between = np.arange(0.5, 50.0, 1.0)
     side = integrators.integrate(henon_heiles, method, between, "side").errors()["energy"]
     dense = integrators.integrate(henon_heiles, method, between, "dense").errors()["energy"]
-    assert side.max() < 5e-15
-    assert dense.max() > 1e-6
+    assert side.max() < 5e-15  # measured 2.8e-16
+    assert dense.max() > 1e-6  # measured 6.7e-5
 
 
 def test_energy_stays_at_round_off_over_a_hundred_thousand_steps(henon_heiles):

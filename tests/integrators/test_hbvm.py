@@ -34,12 +34,14 @@ def test_the_step_satisfies_the_extended_collocation_conditions(henon_heiles):
     path = integrators.integrate(henon_heiles, HBVM(k=k, s=s, h=h), times, "dense").y
     fit = [np.polynomial.Polynomial.fit(times / h, component, s, domain=[0, 1]) for component in path.T]
     assert (
-        max(np.abs(f(times / h) - component).max() for f, component in zip(fit, path.T, strict=True)) < 1e-14
+        max(np.abs(f(times / h) - component).max() for f, component in zip(fit, path.T, strict=True)) < 5e-15
     )
     field = field_of(henon_heiles, np.stack([f(fine) for f in fit]))
     gamma = (legendre(fine, s).T * weights) @ field.T
     slope = np.stack([f.deriv()(c) for f in fit], axis=-1) / h
-    assert np.abs(slope - legendre(c, s) @ gamma).max() < 1e-12  # measured 4e-14
+    assert np.abs(slope - legendre(c, s) @ gamma).max() < 2e-13  # measured 7.2e-15
+    # Collocation itself, sigma'(c_i) = f(sigma(c_i)), is what k > s gives up: measured 3.0e-5.
+    assert np.abs(slope - field_of(henon_heiles, np.stack([f(c) for f in fit])).T).max() > 1e-6
 
 
 def field_of(problem, y):
@@ -58,7 +60,7 @@ def test_integrating_back_returns_to_the_start(method, henon_heiles):
     assert back.status is Status.FINISHED
     assert stepper.t == pytest.approx(0.0, abs=1e-12)
     assert np.abs(forth - henon_heiles.y0).max() > 0.1
-    assert np.abs(back.y[-1] - henon_heiles.y0).max() < 2e-13  # measured 1.4e-14
+    assert np.abs(back.y[-1] - henon_heiles.y0).max() < 5e-15  # measured 4.4e-16
 
 
 def test_integration_backwards_is_integration_of_the_reversed_problem(henon_heiles):
@@ -128,7 +130,7 @@ def test_time_is_counted_not_summed():
     stepper = start(problem, HBVM(k=2, s=1, h=0.1))
     end = stepper.advance([1000.0])
     assert stepper.t == 10000 * 0.1
-    # The increments of y are rounded, its sum is not (compensated): measured 2e-16 relative.
+    # The increments of y are rounded, its sum is not (compensated): measured 2.2e-16.
     assert abs(end.y[0, 0] / 500_000 - 1) < 2e-15
 
 
@@ -141,7 +143,7 @@ def test_time_dependent_fields_see_the_stage_times():
     found = integrators.integrate(problem, HBVM(k=10, s=8, h=0.5), times).y[:, 0]
     # y = cos t + (2/3) sin t - (1/3) sin 2t
     exact = np.cos(times) + 2 / 3 * np.sin(times) - np.sin(2 * times) / 3
-    assert np.abs(found - exact).max() < 1e-13
+    assert np.abs(found - exact).max() < 1e-14  # measured 6.7e-16
 
 
 def test_parameters_are_run_time_values():
@@ -151,8 +153,8 @@ def test_parameters_are_run_time_values():
     program = Gauss(s=6, h=0.1).compile(Hamiltonian(H, dof=1, parameters={"w": 1.0}, name="spring"))
     slow = program.start([1.0, 0.0]).advance([3.0]).y[0, 0]
     fast = program.start([1.0, 0.0], np.array([4.0])).advance([3.0]).y[0, 0]
-    assert abs(slow - np.cos(3.0)) < 1e-14
-    assert abs(fast - np.cos(6.0)) < 1e-13
+    assert abs(slow - np.cos(3.0)) < 5e-15  # measured 1.1e-16
+    assert abs(fast - np.cos(6.0)) < 5e-15  # measured 2.2e-16
 
 
 def test_a_step_that_the_iteration_cannot_solve_ends_the_run_and_keeps_what_was_done(kepler):
@@ -184,7 +186,7 @@ def test_a_solution_that_ceases_to_exist_is_not_jumped_over():
     assert solution.status.failed
     assert 0.8 < solution.t_stop <= 1.0
     error = np.abs(solution.y[:, 0] - 1 / (1 - solution.t))[solution.t < 0.9]
-    assert error.max() < 1e-5
+    assert error.max() < 1e-9  # measured 4.4e-11
 
 
 def test_a_bad_extrapolation_does_not_lose_the_step():
@@ -195,9 +197,10 @@ def test_a_bad_extrapolation_does_not_lose_the_step():
         return kinetic - 2 * m.cos(q[0]) - m.cos(q[1])
 
     problem = Problem(Hamiltonian(H, dof=2, name="double_pendulum"), q0=[1.5, 1.0], p0=[0.0, 0.0], t_end=40.0)
-    solution = integrators.integrate(problem, HBVM(k=16, s=16, h=0.4), np.arange(0.0, 40.1, 0.4))
+    solution = integrators.integrate(problem, HBVM(k=16, s=16, h=0.6), np.arange(0.0, 40.1, 0.6))
     assert solution.status is Status.FINISHED, solution.reason
-    assert solution.errors()["energy"].max() < 1e-8
+    assert solution.stats.extra["restarts"] > 0  # measured 1
+    assert solution.errors()["energy"].max() < 1e-11  # measured 1.7e-13
 
 
 @pytest.mark.parametrize("tiny", [1e-5, 1e-150])
@@ -210,7 +213,7 @@ def test_tiny_components_are_resolved_relative_to_themselves(tiny):
         Hamiltonian(H, dof=2, name="light_and_heavy"), q0=[0.5, tiny], p0=[0.0, 0.0], t_end=10.0
     )
     y = integrators.integrate(problem, HBVM(k=12, s=10, h=0.5), [10.0]).y[0]
-    assert abs(y[1] / tiny - np.cos(10.0)) < 1e-14
+    assert abs(y[1] / tiny - np.cos(10.0)) < 5e-15  # measured 1.1e-16
 
 
 def test_components_that_rest_in_balance_do_not_stop_the_iteration():
@@ -224,14 +227,15 @@ def test_components_that_rest_in_balance_do_not_stop_the_iteration():
     )
     solution = integrators.integrate(problem, HBVM(k=8, s=4, h=0.5), [200.0])
     assert solution.status is Status.FINISHED, solution.reason
-    assert solution.stats.iterations < 15 * solution.stats.steps
+    assert solution.stats.iterations < 15 * solution.stats.steps  # measured 9.5
 
 
 def test_many_stages_and_coefficients_work(henon_heiles):
     reference = integrators.integrate(henon_heiles, Gauss(s=10, h=0.2), [20.0]).y
+    # Measured 1.6e-15, and 6.2e-5 for s = 1.
     for k, s, h in [(64, 32, 2.5), (64, 1, 0.01), (33, 17, 1.0), (40, 40, 2.5)]:
         found = integrators.integrate(henon_heiles, HBVM(k=k, s=s, h=h), [20.0]).y
-        assert np.abs(found - reference).max() < (1e-4 if s == 1 else 2e-12)
+        assert np.abs(found - reference).max() < (3e-4 if s == 1 else 5e-14)
 
 
 def test_the_second_program_of_a_system_costs_no_compilation(henon_heiles):

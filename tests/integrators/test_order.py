@@ -37,14 +37,14 @@ PAIRS = [(2, 1), (6, 1), (3, 2), (18, 2), (4, 3), (9, 3), (6, 4), (16, 4), (8, 5
 @pytest.mark.parametrize(("k", "s"), PAIRS)
 def test_hbvm_has_order_2s(k, s, kepler, kepler_exact):
     order = measured_order(lambda h: HBVM(k=k, s=s, h=h), kepler(E), kepler_exact(E, SPAN))
-    assert abs(order - 2 * s) < 0.3
+    assert abs(order - 2 * s) < 0.3  # measured 0.0003 (s <= 3), 0.02 (4), 0.13 (5)
     assert HBVM(k=k, s=s, h=0.1).order == 2 * s
 
 
 @pytest.mark.parametrize("s", [1, 2, 3, 4, 5])
 def test_gauss_has_order_2s(s, kepler, kepler_exact):
     order = measured_order(lambda h: Gauss(s=s, h=h), kepler(E), kepler_exact(E, SPAN))
-    assert abs(order - 2 * s) < 0.3
+    assert abs(order - 2 * s) < 0.3  # measured 0.003 (s <= 3), 0.03 (4), 0.17 (5)
     assert Gauss(s=s, h=0.1).order == 2 * s
 
 
@@ -65,4 +65,4 @@ def test_states_between_steps_have_order_2s_but_the_polynomial_only_s_plus_one(
         points.append((np.log(h), np.log(error)))
     assert len(points) >= 3
     h, error = np.array(points[-6:]).T
-    assert abs(np.polyfit(h, error, 1)[0] - expected) < 0.3
+    assert abs(np.polyfit(h, error, 1)[0] - expected) < 0.1  # measured 6.008, 6.008, 4.009

@@ -40,7 +40,7 @@ def test_hbvm_18_2_keeps_the_energy_and_the_planetoid_but_neither_angular_moment
     solution = run(sitnikov, HBVM(k=18, s=2, h=0.5))
     errors = solution.errors()
     assert np.abs(solution.y[:, 8]).max() < 2  # measured 1.692
-    assert errors["energy"].max() <= 1e-13  # measured 1.6e-14
+    assert errors["energy"].max() <= 1e-13  # measured 1.9e-14 to 4.0e-14
     assert errors["angular_momentum"].max() == pytest.approx(3.4e-3, rel=0.02)  # measured 3.388e-3
     assert abs(solution.y[-1, 8] - Z_END) == pytest.approx(1.8, abs=0.1)  # measured 1.784
     assert solution.guards()["off_axis"].max() == 0.0
@@ -51,8 +51,8 @@ def test_hbvm_16_8_is_exact_on_the_axis_and_to_nine_digits_along_it(sitnikov):
     errors = solution.errors()
     assert solution.guards()["off_axis"].max() == 0.0
     assert abs(solution.y[-1, 8] - Z_END) <= 1e-8  # measured 5.7e-10
-    assert errors["energy"].max() <= 5e-14  # measured 6.7e-15
-    assert errors["angular_momentum"].max() <= 1e-14  # measured 1.0e-15
+    assert errors["energy"].max() <= 5e-14  # measured 0.7e-14 to 1.7e-14
+    assert errors["angular_momentum"].max() <= 1e-14  # measured 1.0e-15 to 2.9e-15
 
 
 def test_states_between_steps_stay_on_the_axis(sitnikov):
