@@ -1,6 +1,7 @@
 """heyoka's adaptive Taylor integrator."""
 
 import copy
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +24,8 @@ COLD = "HBVM_BENCH_COLD_COMPILE"
 
 WORTHWHILE = 16
 """Fewest steps for which the compiled loop is called; shorter ways are taken step by step."""
+
+TINY = float(np.finfo(np.float64).tiny)
 
 CITATION = """\
 @article{BiscaniIzzo2021,
@@ -160,20 +163,12 @@ class TaylorStepper(PeerStepper):
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
-        states = np.full((grid.size, self._y.size), np.nan)
-        made = 0
-        while made < grid.size and not self._status.failed:
-            if how == "land":
-                made += self._land(float(grid[made]), states[made])
-                continue
-            # The samples that the library's last step has passed.
-            passed = int(np.searchsorted(sign * grid, sign * self._ta.time, side="right"))
-            for i in range(made, passed):
-                states[i] = self._ta.update_d_output(float(grid[i]))
-            made = max(made, passed)
-            if made < grid.size:
-                made += self._bulk(grid[made:], states[made:])
-        return grid[:made], states[:made]
+        states = np.empty((grid.size, self._y.size))
+        for i, t in enumerate(grid.tolist()):
+            if not (self._land(t) if how == "land" else self._pass(t, sign)):
+                return grid[:i], states[:i]
+            states[i] = self._ta.state if self._ta.time == t else self._ta.update_d_output(t)
+        return grid, states
 
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
@@ -208,60 +203,53 @@ class TaylorStepper(PeerStepper):
         self._broken(t)
         return None
 
-    def _land(self, t: float, out: Array) -> int:
-        """Go to ``t`` by a shortened last step; return 1, or note the failure and return 0."""
+    def _land(self, t: float) -> bool:
+        """Go to ``t`` by a shortened last step; return whether that succeeded."""
         watch = Crawl(self._ta.time, t)
-        while not self._status.failed:
+        while True:
             before = self._ta.time
             outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS)
             self._stats.steps += steps
             if outcome == self._outcome.time_limit:
-                out[:] = self._ta.state
-                return 1
+                return True
             if outcome == self._outcome.err_nf_state:
                 self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
             elif stalled := watch.sees(self._ta.time, steps):
                 self._fail(Status.STALLED, self._ta.time, stalled)
-        return 0
+            if self._status.failed:
+                return False
 
-    def _bulk(self, grid: Array, out: Array) -> int:
-        """Take own steps towards ``grid[-1]``, not to it, and fill in the samples passed; return how many.
+    def _pass(self, t: float, sign: float) -> bool:
+        """Take own steps until one passes ``t``; return whether that succeeded.
 
-        heyoka's loops shorten their last step to end at a given time, which would
-        make the steps depend on the samples. So its loop is given a number of steps
-        that falls short of the time; near the end it is one step at a time.
+        heyoka's compiled loop shortens its last step to end at the time it is given,
+        which would make the steps depend on the samples. So it is given a number of
+        steps that falls short of the time; the rest is one step at a time.
+        (`propagate_grid` will not do: it forgets the low part of heyoka's clock.)
         """
-        end = float(grid[-1])
-        watch = Crawl(self._ta.time, end)
-        longest = self._step()
-        if longest is None:
-            return 0
-        done = 0
-        while not self._status.failed:
-            here = self._ta.time
-            passed = int(np.searchsorted(self._sign * grid, self._sign * here, side="right"))
-            for i in range(done, passed):
-                out[i] = self._ta.update_d_output(float(grid[i]))
-            done = max(done, passed)
-            count = int(min(0.5 * abs(end - here) / max(longest, 1e-300), CRAWL_STEPS))
-            if self._sign * (end - here) <= 0.0 or count < WORTHWHILE:
-                break
-            state, clock = self._ta.state.copy(), self._ta.dtime
-            outcome, _, longest, steps, *_, rows = self._ta.propagate_grid(
-                np.concatenate([[here], grid[done:]]), max_steps=count
-            )
-            if outcome != self._outcome.step_limit:
-                # It got to the end, or broke: go back and come nearer by fewer steps.
-                self._ta.state[:] = state
-                self._ta.dtime = clock
-                longest = 2.0 * abs(end - here) / count
-                continue
-            self._stats.steps += steps
-            out[done : done + len(rows) - 1] = rows[1:]
-            done += len(rows) - 1
-            if stalled := watch.sees(self._ta.time, steps):
-                self._fail(Status.STALLED, self._ta.time, stalled)
-        return done
+        ta, watch, longest = self._ta, Crawl(self._ta.time, t), math.inf
+        while sign * (ta.time - t) < 0.0:
+            here = ta.time
+            count = int(min(0.5 * abs(t - here) / max(longest, TINY), CRAWL_STEPS))
+            if count < WORTHWHILE:
+                length = self._step()
+                if length is None:
+                    return False
+                longest, steps = length, 1
+            else:
+                state, clock = ta.state.copy(), ta.dtime
+                outcome, _, longest, steps, *_ = ta.propagate_until(t, max_steps=count)
+                if outcome != self._outcome.step_limit:
+                    # It came to t after all, or broke: go back and come nearer by fewer steps.
+                    ta.state[:] = state
+                    ta.dtime = clock
+                    longest = 2.0 * abs(t - here) / count
+                    continue
+                self._stats.steps += steps
+            if stalled := watch.sees(ta.time, steps):
+                self._fail(Status.STALLED, ta.time, stalled)
+                return False
+        return True
 
     def _broken(self, t: float) -> None:
         self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")

@@ -184,22 +184,30 @@ def particle_size() -> int:
 
 def attach(simulation: Any, block: Block, *, heartbeat: Any = None, force: Any = None) -> None:
     """Put compiled callbacks into a simulation's function pointers; the caller keeps all of them alive."""
-    kind = dict(type(simulation)._fields_)["_heartbeat"]
     simulation.extras = block.values.ctypes.data
-    simulation._heartbeat = kind(heartbeat.address) if heartbeat is not None else kind()
-    simulation._additional_forces = kind(force.address) if force is not None else kind()
+    simulation._heartbeat = _function(simulation, 0 if heartbeat is None else heartbeat.address)
+    simulation._additional_forces = _function(simulation, 0 if force is None else force.address)
 
 
 @contextmanager
 def detached(simulation: Any) -> Iterator[None]:
     """Take a simulation's callbacks away for a while: with them REBOUND warns when it copies."""
-    held = simulation._heartbeat, simulation._additional_forces
-    kind = dict(type(simulation)._fields_)["_heartbeat"]
-    simulation._heartbeat = simulation._additional_forces = kind()
+    # What ctypes returns for a field is a view of it, so the addresses are what to keep.
+    names = "_heartbeat", "_additional_forces"
+    held = [ctypes.cast(getattr(simulation, name), ctypes.c_void_p).value for name in names]
+    for name in names:
+        setattr(simulation, name, _function(simulation, 0))
     try:
         yield
     finally:
-        simulation._heartbeat, simulation._additional_forces = held
+        for name, address in zip(names, held, strict=True):
+            setattr(simulation, name, _function(simulation, address or 0))
+
+
+def _function(simulation: Any, address: int) -> Any:
+    """Return the C function at an address, as REBOUND's function pointers want it; 0 is none."""
+    kind = dict(type(simulation)._fields_)["_heartbeat"]
+    return kind(address) if address else kind()
 
 
 def particles(simulation: Any) -> NDArray[np.float64]:

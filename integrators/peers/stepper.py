@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.hbvm import plan
+from integrators.grid import plan
 from integrators.protocol import Array, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 from problems.problem import System

@@ -1,0 +1,322 @@
+"""Calls of `diffrax.diffeqsolve`, compiled once for any times, steps, tolerances and parameters.
+
+Imported only once diffrax is known to be installed.
+
+diffrax is always given time that goes forward, tau = sign t, so that a solver's own
+state can be handed from one call to the next. The times of a fixed step are those of
+integer multiples (`Multiples`), and an adaptive solve that was shortened to end at a
+sample goes on with the step it would have taken (`Resuming`); both are step size
+controllers as diffrax invites its users to write.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from time import perf_counter
+from typing import Any, cast
+
+import diffrax as dx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from problems import emit
+from problems.errors import InputError
+from problems.problem import System
+
+OK, LIMIT, DT_MIN, OTHER = range(4)
+"""How a solve ended: at its end, after the number of steps it was given, or why not."""
+
+ULPS = 4.0
+"""An adaptive step of fewer ulp of the time than these has underflowed."""
+
+
+class Multiples(dx.AbstractStepSizeController):
+    """Steps from ``base + n h`` to ``base + (n + 1) h``, the products formed anew from the integer n."""
+
+    base: Any
+    h: Any
+    n: Any
+
+    def wrap(self, direction: Any) -> "Multiples":
+        """Leave it as it is: time goes forward."""
+        return self
+
+    def init(
+        self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, args: Any, func: Any, error_order: Any
+    ) -> tuple[Any, Any]:
+        """Return the end of the first step, and its number."""
+        return self.base + (self.n + 1) * self.h, self.n + 1
+
+    def adapt_step_size(
+        self,
+        t0: Any,
+        t1: Any,
+        y0: Any,
+        y1_candidate: Any,
+        args: Any,
+        y_error: Any,
+        error_order: Any,
+        controller_state: Any,
+    ) -> tuple[Any, Any, Any, Any, Any, Any]:
+        """Keep the step; return the next."""
+        n = controller_state + 1
+        return True, t1, self.base + n * self.h, False, n, dx.RESULTS.successful
+
+
+class Resuming(dx.AbstractAdaptiveStepSizeController):
+    """A controller that remembers the step it wanted, ends after ``limit`` steps, and sees underflow.
+
+    Its state: the inner controller's state, the next step's length, steps accepted.
+    """
+
+    inner: Any
+    limit: Any
+
+    @property
+    def rtol(self) -> Any:
+        """The inner controller's relative tolerance."""
+        return self.inner.rtol
+
+    @property
+    def atol(self) -> Any:
+        """The inner controller's absolute tolerance."""
+        return self.inner.atol
+
+    @property
+    def norm(self) -> Any:
+        """The inner controller's norm."""
+        return self.inner.norm
+
+    def wrap(self, direction: Any) -> "Resuming":
+        """Leave it as it is: time goes forward."""
+        return self
+
+    def init(
+        self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, args: Any, func: Any, error_order: Any
+    ) -> tuple[Any, Any]:
+        """Return the end of the first step, and the state."""
+        end, inner = self.inner.init(terms, t0, t1, y0, dt0, args, func, error_order)
+        return end, (inner, end - t0, jnp.asarray(0))
+
+    def adapt_step_size(
+        self,
+        t0: Any,
+        t1: Any,
+        y0: Any,
+        y1_candidate: Any,
+        args: Any,
+        y_error: Any,
+        error_order: Any,
+        controller_state: Any,
+    ) -> tuple[Any, Any, Any, Any, Any, Any]:
+        """Ask the inner controller; note the length of the next step."""
+        inner, wanted, accepted = controller_state
+        keep, next_t0, next_t1, jump, inner, result = self.inner.adapt_step_size(
+            t0, t1, y0, y1_candidate, args, y_error, error_order, inner
+        )
+        dt = next_t1 - next_t0
+        # diffeqsolve shortened this step to its end; it was as good as the one wanted.
+        dt = jnp.where(keep & (t1 - t0 < wanted), jnp.maximum(dt, wanted), dt)
+        accepted = accepted + jnp.where(keep, 1, 0)
+        underflow = dt <= ULPS * jnp.finfo(dt.dtype).eps * jnp.abs(next_t0)
+        result = dx.RESULTS.where(underflow, dx.RESULTS.dt_min_reached, result)
+        # A result of "event occurred" ends the solve without being a failure.
+        ended = (accepted >= self.limit) & (result == dx.RESULTS.successful)
+        result = dx.RESULTS.where(ended, dx.RESULTS.event_occurred, result)
+        return keep, next_t0, next_t0 + dt, jump, (inner, dt, accepted), result
+
+
+@dataclass
+class Compiled:
+    """A function compiled ahead of time, and the seconds that took."""
+
+    call: Callable[..., Any]
+    seconds: float
+
+
+@dataclass
+class Solve:
+    """What is compiled for one field and one solver.
+
+    Attributes
+    ----------
+    begin : Compiled
+        Fixed: ``(tau, y, par) -> solver state``. Adaptive: ``(tau, y, par, rtol,
+        atol) -> (solver state, controller state, first step)``.
+    run : Compiled
+        Fixed: ``(base, h, n0, n1, y, state, par) -> (y, state)``. Adaptive: ``(tau,
+        end, dt, y, state, controller state, limit, par, rtol, atol) -> (y, tau, state,
+        controller state, dt, accepted, rejected, code)``.
+    """
+
+    begin: Compiled
+    run: Compiled
+    seconds: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.seconds = self.begin.seconds + self.run.seconds
+
+
+def cpu() -> Any:
+    """Return JAX's CPU.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If JAX has been told to leave the CPU alone.
+    """
+    try:
+        return jax.devices("cpu")[0]
+    except RuntimeError as error:
+        raise InputError(
+            f"JAX offers no CPU ({error}); add cpu to JAX_PLATFORMS, since these methods run there."
+        ) from error
+
+
+def _compile(function: Callable[..., Any], *arguments: Any) -> Compiled:
+    started = perf_counter()
+    with jax.default_device(cpu()):
+        call = jax.jit(function).lower(*arguments).compile()
+    return Compiled(call, perf_counter() - started)
+
+
+def _apart(f: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the vector field ``f`` behind a condition that always holds.
+
+    XLA would otherwise put the sums of a Runge-Kutta stage into the expression of
+    each of the field's components, to be calculated again in each: 18 microseconds
+    for a step of Dopri8 on three bodies, and 11 with the condition.
+    """
+
+    def field(tau: Any, y: Any, par: Any) -> Any:
+        finite = jnp.isfinite(y[0])
+        return jax.lax.cond(finite, lambda y: f(tau, y, par), lambda y: jnp.full_like(y, jnp.nan), y)
+
+    return field
+
+
+def terms(system: System, sign: int, solver: str) -> Any:
+    """Return a system as diffrax's terms in tau = sign t, for `SemiImplicitEuler` q' from p and p' from q."""
+    if solver == "SemiImplicitEuler":
+        scale, force = emit.jax(system, "velocity_scale"), emit.jax(system, "force")
+        return (
+            dx.ODETerm(lambda tau, p, par: sign * (scale(sign * tau, p, par) * p)),
+            dx.ODETerm(lambda tau, q, par: sign * force(sign * tau, q, par)),
+        )
+    f = emit.jax(system, "field")
+    if solver == "Dopri8":
+        f = _apart(f)
+    return dx.ODETerm(lambda tau, y, par: sign * f(sign * tau, y, par))
+
+
+_made: dict[tuple[Any, ...], Solve] = {}
+
+
+def made(system: System, solver: str, sign: int, adaptive: bool) -> tuple[Solve, bool]:
+    """Return the compiled solve for a system, and whether this process had it already."""
+    split = solver == "SemiImplicitEuler"
+    whats = ("velocity_scale", "force") if split else ("field",)
+    emitted = tuple(emit.source(system, what, "jax").sha256 for what in whats)
+    key = (emitted, system.dim, system.n_par, solver, sign, adaptive)
+    if known := _made.get(key):
+        return known, True
+    make = _adaptive if adaptive else _fixed
+    _made[key] = make(terms(system, sign, solver), getattr(dx, solver)(), system.dim, system.n_par, split)
+    return _made[key], False
+
+
+def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
+    def parts(y: Any) -> Any:
+        return (y[: dim // 2], y[dim // 2 :]) if split else y
+
+    def whole(y: Any) -> Any:
+        return jnp.concatenate(y) if split else y
+
+    def begin(tau: Any, y: Any, par: Any) -> Any:
+        return solver.init(terms, tau, tau, parts(y), par)
+
+    def run(base: Any, h: Any, n0: Any, n1: Any, y: Any, state: Any, par: Any) -> Any:
+        solution = dx.diffeqsolve(
+            terms,
+            solver,
+            base + n0 * h,
+            base + n1 * h,
+            h,
+            parts(y),
+            args=par,
+            saveat=dx.SaveAt(t1=True, solver_state=True),
+            stepsize_controller=Multiples(base, h, n0),
+            adjoint=dx.ForwardMode(),
+            max_steps=None,
+            throw=False,
+            solver_state=state,
+        )
+        return whole(jax.tree.map(lambda x: x[-1], solution.ys)), solution.solver_state
+
+    tau, y, par, n = np.float64(0.0), np.zeros(dim), np.zeros(n_par), np.int64(0)
+    first = _compile(begin, tau, y, par)
+    return Solve(first, _compile(run, tau, np.float64(1.0), n, n, y, first.call(tau, y, par), par))
+
+
+def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
+    def controller(limit: Any, rtol: Any, atol: Any) -> Any:
+        return Resuming(dx.PIDController(rtol=rtol, atol=atol), limit)
+
+    def begin(tau: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
+        control = controller(1, rtol, atol)
+        order = solver.error_order(terms)
+        end, state = control.init(terms, tau, tau + 1.0, y, None, par, solver.func, order)
+        return solver.init(terms, tau, end, y, par), jax.tree.map(jnp.asarray, state), end - tau
+
+    def run(
+        tau: Any, end: Any, dt: Any, y: Any, state: Any, control: Any, limit: Any, par: Any, rtol: Any, atol: Any
+    ) -> Any:
+        inner, _, _ = control
+        solution = dx.diffeqsolve(
+            terms,
+            solver,
+            tau,
+            end,
+            dt,
+            y,
+            args=par,
+            saveat=dx.SaveAt(t1=True, solver_state=True, controller_state=True),
+            stepsize_controller=controller(limit, rtol, atol),
+            adjoint=dx.ForwardMode(),
+            max_steps=None,
+            throw=False,
+            solver_state=state,
+            controller_state=(inner, dt, jnp.asarray(0)),
+        )
+        after = cast(Any, solution.controller_state)
+        code = jnp.asarray(OTHER)
+        for result, value in (
+            (dx.RESULTS.successful, OK),
+            (dx.RESULTS.event_occurred, LIMIT),
+            (dx.RESULTS.dt_min_reached, DT_MIN),
+        ):
+            code = jnp.where(solution.result == result, value, code)
+        return (
+            solution.ys[-1],  # pyright: ignore[reportOptionalSubscript, reportIndexIssue]
+            solution.ts[-1],  # pyright: ignore[reportOptionalSubscript]
+            solution.solver_state,
+            after,
+            after[1],
+            solution.stats["num_accepted_steps"],
+            solution.stats["num_rejected_steps"],
+            code,
+        )
+
+    one, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
+    first = _compile(begin, one, y, par, one, one)
+    state, control, dt = first.call(one, y, par, one, one)
+    return Solve(first, _compile(run, one, one, dt, y, state, control, np.int64(1), par, one, one))
+
+
+@cache
+def contracts() -> bool:
+    """Return whether XLA fuses multiplications and additions here, which breaks exact symmetries."""
+    x = np.float64(1.0 + 2.0**-30)
+    fused = _compile(lambda a, b: a * a - b, x, x).call(x, np.float64(x * x))
+    return float(fused) != 0.0
