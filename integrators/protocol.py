@@ -132,6 +132,9 @@ class Stepper(Protocol):
     def advance(self, times: Array, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]`` and return the states at ``times``.
 
+        The stepper then stands at ``times[-1]`` or, where states between steps are
+        made beside the steps, at the last step before it.
+
         Parameters
         ----------
         times : ndarray, shape (n,)

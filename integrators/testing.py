@@ -58,7 +58,9 @@ def describes_itself(method: MethodBase, problem: Problem) -> str | None:
     _require(
         bool(cls.library) and bool(cls.citation.strip()), f"{cls.__name__} names its library and citation"
     )
-    _require(bool((cls.__doc__ or "").strip()), f"{cls.__name__} has a docstring")
+    # A dataclass without a docstring gets its signature as one.
+    doc = cls.__doc__ or ""
+    _require(bool(doc) and not doc.startswith(f"{cls.__name__}("), f"{cls.__name__} has a docstring")
     order = method.order
     _require(
         order is None or (isinstance(order, int) and order >= 1), f"order is None or positive, not {order!r}"
@@ -79,7 +81,7 @@ def is_a_value(method: MethodBase, problem: Problem) -> str | None:
     twin = type(method)(**options)
     _require(twin == method and hash(twin) == hash(method), f"{method!r} equals what its text makes")
     _require(pickle.loads(pickle.dumps(method)) == method, f"{method!r} survives pickling")
-    if registry.get(name) is not type(method) if name in registry.names() else True:
+    if name not in registry.names() or registry.get(name) is not type(method):
         return f"{name} is not registered under its own name"
     _require(registry.create(name, **options) == method, f"the registry makes {method!r} from its text")
     return None
