@@ -58,9 +58,9 @@ def describes_itself(method: MethodBase, problem: Problem) -> str | None:
     _require(
         bool(cls.library) and bool(cls.citation.strip()), f"{cls.__name__} names its library and citation"
     )
-    # A dataclass without a docstring gets its signature as one.
+    # A dataclass without a docstring gets its signature as one: Name(*, option: type).
     doc = cls.__doc__ or ""
-    _require(bool(doc) and not doc.startswith(f"{cls.__name__}("), f"{cls.__name__} has a docstring")
+    _require(bool(doc) and not doc.startswith(f"{cls.__name__}(*"), f"{cls.__name__} has a docstring")
     order = method.order
     _require(
         order is None or (isinstance(order, int) and order >= 1), f"order is None or positive, not {order!r}"
