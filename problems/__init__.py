@@ -2,6 +2,7 @@
 
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.hamiltonian import Bodies, Hamiltonian, System, VectorField
+from problems.poisson import Poisson
 from problems.problem import Problem
 from problems.registry import load, names
 
@@ -10,6 +11,7 @@ __all__ = [
     "Hamiltonian",
     "InputError",
     "MissingLibraryError",
+    "Poisson",
     "Problem",
     "System",
     "UnknownNameError",

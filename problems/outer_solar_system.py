@@ -8,9 +8,8 @@ masses in solar masses, heliocentric. The Sun's mass contains the inner planets.
 
 from fractions import Fraction
 
-from problems import given, gravity
+from problems.planets import planetary
 from problems.problem import Problem
-from problems.registry import changed
 
 G_PER_DAY = "2.95912208286e-4"  # au^3/(solar mass day^2)
 NAMES = ("Sun", "Jupiter", "Saturn", "Uranus", "Neptune", "Pluto")
@@ -38,7 +37,6 @@ VELOCITIES = (
     ("0.00288930", "0.00114527", "0.00039677"),
     ("0.00276725", "-0.00170702", "-0.00136504"),
 )
-DAYS = {"day": Fraction(1), "year": Fraction("365.25")}
 
 
 def outer_solar_system(
@@ -73,42 +71,19 @@ def outer_solar_system(
     problems.errors.InputError
         For an unknown unit or frame, or a span that is not finite.
     """
-    given.choice("outer_solar_system", "unit", unit, tuple(DAYS))
-    given.choice("outer_solar_system", "frame", frame, ("barycentric", "heliocentric"))
-    if t_end is not None:
-        given.finite("outer_solar_system", t_end=t_end)
-    days = DAYS[unit]
-    masses = [Fraction(text) for text in MASSES]
-    q = [[Fraction(text) for text in row] for row in POSITIONS]
-    v = [[Fraction(text) * days for text in row] for row in VELOCITIES]
-    if frame == "barycentric":
-        q, v = _centred(masses, q), _centred(masses, v)
-    system = gravity.hamiltonian(
-        [float(mass) for mass in masses],
-        name="outer_solar_system",
-        G=float(Fraction(G_PER_DAY) * days * days),
-        linear_momentum=frame == "heliocentric",
-    )
-    return Problem(
-        system,
-        q0=[float(x) for row in q for x in row],
-        p0=[float(mass * x) for mass, row in zip(masses, v, strict=True) for x in row],
-        t_end=float(Fraction(438300) / days) if t_end is None else t_end,
-        name="outer_solar_system",
+    return planetary(
+        outer_solar_system,
+        unit=unit,
+        frame=frame,
+        t_end=t_end,
+        gravity_per_day=Fraction(G_PER_DAY),
+        masses=[Fraction(text) for text in MASSES],
+        positions=[[Fraction(text) for text in row] for row in POSITIONS],
+        velocities=[[Fraction(text) for text in row] for row in VELOCITIES],
         title="the outer Solar System",
-        arguments={"unit": unit, "frame": frame} | changed(outer_solar_system, t_end=t_end),
         references=(
             "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
             "Springer 2006, section I.2.4, table 2.2",
         ),
         notes="A dominant mass and weak perturbations; the inner planets are in the Sun's mass.",
     )
-
-
-def _centred(masses: list[Fraction], rows: list[list[Fraction]]) -> list[list[Fraction]]:
-    total = sum(masses)
-    centre = [
-        sum((mass * row[c] for mass, row in zip(masses, rows, strict=True)), Fraction(0)) / total
-        for c in range(3)
-    ]
-    return [[x - c for x, c in zip(row, centre, strict=True)] for row in rows]
