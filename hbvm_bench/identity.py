@@ -20,7 +20,7 @@ import msgspec
 import integrators.registry
 import problems
 from hbvm_bench.campaign import Case
-from hbvm_bench.spec import parse_spec
+from hbvm_bench.spec import Spec, parse_spec
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem
@@ -73,7 +73,9 @@ def resolve(case: Case) -> Resolved:
     problem = make_problem(case.problem)
     method = make_method(case.method)
     case.grid.times(problem)
-    canonical = msgspec.structs.replace(case, problem=repr(problem), method=repr(method))
+    # not repr(method), which is a third party's own
+    text = str(Spec(parse_spec(case.method).name, method.options()))
+    canonical = msgspec.structs.replace(case, problem=repr(problem), method=text)
     key = case_key(canonical, problem, method)
     text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return Resolved(canonical, problem, method, hashlib.sha256(text.encode()).hexdigest(), key)

@@ -24,8 +24,8 @@ class Metric:
     ----------
     key : str
         The name on the command line and in JSON.
-    label, unit : str
-        For column heads and axes.
+    label, short, unit : str
+        For sentences and axes, for column heads.
     better : {"lower", None}
         Which way is better; ``None`` where neither is.
     scale : {"log", "linear"}
@@ -46,6 +46,7 @@ class Metric:
 
     key: str
     label: str
+    short: str
     unit: str
     better: Literal["lower"] | None
     scale: Literal["log", "linear"]
@@ -196,6 +197,7 @@ _TABLE = [
     Metric(
         key="energy_max",
         label="energy error",
+        short="energy",
         unit="relative",
         better="lower",
         scale="log",
@@ -205,6 +207,7 @@ _TABLE = [
     Metric(
         key="energy_end",
         label="energy error at the end",
+        short="energy, end",
         unit="relative",
         better="lower",
         scale="log",
@@ -214,6 +217,7 @@ _TABLE = [
     Metric(
         key="angular_momentum_max",
         label="angular momentum error",
+        short="ang. mom.",
         unit="relative",
         better="lower",
         scale="log",
@@ -223,6 +227,7 @@ _TABLE = [
     Metric(
         key="guard_max",
         label="off-axis distance",
+        short="off axis",
         unit="length",
         better="lower",
         scale="log",
@@ -233,6 +238,7 @@ _TABLE = [
     Metric(
         key="position_end",
         label="position error at the end",
+        short="position",
         unit="length",
         better="lower",
         scale="log",
@@ -243,6 +249,7 @@ _TABLE = [
     Metric(
         key="position_max",
         label="position error",
+        short="position, max",
         unit="length",
         better="lower",
         scale="log",
@@ -253,6 +260,7 @@ _TABLE = [
     Metric(
         key="z_end",
         label="z at the end",
+        short="z(end)",
         unit="length",
         better=None,
         scale="linear",
@@ -264,6 +272,7 @@ _TABLE = [
     Metric(
         key="z_error",
         label="error of z at the end",
+        short="z error",
         unit="length",
         better="lower",
         scale="log",
@@ -275,6 +284,7 @@ _TABLE = [
     Metric(
         key="distance_max",
         label="largest distance",
+        short="distance",
         unit="length",
         better=None,
         scale="log",
@@ -284,6 +294,7 @@ _TABLE = [
     Metric(
         key="steps",
         label="steps",
+        short="steps",
         unit="",
         better=None,
         scale="log",
@@ -293,6 +304,7 @@ _TABLE = [
     Metric(
         key="evaluations",
         label="evaluations",
+        short="evals",
         unit="",
         better="lower",
         scale="log",
@@ -303,6 +315,7 @@ _TABLE = [
     Metric(
         key="warm_seconds",
         label="time",
+        short="time",
         unit="s",
         better="lower",
         scale="log",
@@ -313,6 +326,7 @@ _TABLE = [
     Metric(
         key="compile_seconds",
         label="compile time",
+        short="compile",
         unit="s",
         better="lower",
         scale="log",

@@ -129,7 +129,7 @@ def format_value(metric: Metric, value: Value) -> Cell:
     elif metric.key in ("steps", "evaluations"):
         text = f"{int(number):,}".replace(",", "\u202f")
     elif metric.scale == "linear":
-        text = f"{number:.7f}" if 1e-4 < abs(number) < 1e5 else f"{number:.3g}"
+        text = f"{number:.6f}" if 1e-3 < abs(number) < 10 else f"{number:.4g}"
     else:
         text = "0" if number == 0 else f"{number:.1e}"
     return Cell(text, value.void, value.why, math.inf if value.void else number)
@@ -159,10 +159,10 @@ def _remark(record: Record) -> str:
     if result.outcome != "ok" or result.status != "finished":
         head = status_of(record)
         parts.append(f"{head}: {result.reason}" if result.reason else head)
-    else:
-        guard = result.metrics.get("guard_max")
-        if guard is not None and guard.value:
-            parts.append(f"{guard.value:.1e} away from the symmetry that should be exact")
+    elif result.violation:
+        parts.append(result.violation)
+    elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
+        parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
     if record.case.note:
         parts.append(record.case.note)
     return "; ".join(part.rstrip(". ") for part in parts)

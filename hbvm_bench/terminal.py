@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group, RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -91,32 +91,39 @@ class Live:
 
 def results(
     records: Sequence[Record], keys: Sequence[str] | None = None, sort: str | None = None
-) -> list[Table]:
-    """Return one table per problem."""
+) -> list[RenderableType]:
+    """Return, for each problem, its table and the remarks on its rows."""
     problems = list(dict.fromkeys(record.case.problem for record in records))
     return [
-        _table(problem, [r for r in records if r.case.problem == problem], keys, sort) for problem in problems
+        _results(problem, [r for r in records if r.case.problem == problem], keys, sort)
+        for problem in problems
     ]
 
 
-def _table(problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None) -> Table:
+def _results(
+    problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None
+) -> RenderableType:
     shown = columns(records, keys)
+    numbers = {record.id: number for number, record in enumerate(records, 1)}
     made = Table(title=Text(problem), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    made.add_column("method", no_wrap=True)
+    made.add_column("#", justify="right")
+    made.add_column("method", overflow="fold")
     for metric in shown:
-        made.add_column(metric.label, justify="right")
-    made.add_column("remark", overflow="fold", ratio=1, min_width=24)
+        made.add_column(metric.short, justify="right", no_wrap=True)
+    remarks = Table.grid(padding=(0, 2))
     group = ""
     for row in rows(records, sort):
         if row.group != group:
             if group:
                 made.add_section()
             group = row.group
-            made.add_row(Text(GROUPS[group], style="bold italic"))
-        made.add_row(
-            _method(row), *(_cell(row, metric.key) for metric in shown), Text(row.remark, style="dim")
-        )
-    return made
+            made.add_row("", Text(GROUPS[group], style="bold italic"))
+        number = str(numbers[row.record.id])
+        made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
+        if row.remark:
+            remarks.add_row(Text(number, justify="right"), Text(f"{row.record.case.method}: {row.remark}."))
+    brackets = Text("In brackets: void, for the row is another trajectory or only a part of it.", style="dim")
+    return Group(made, brackets, remarks, "")
 
 
 def _method(row: Row) -> Text:

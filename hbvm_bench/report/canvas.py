@@ -4,6 +4,7 @@ import io
 import math
 import re
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import matplotlib as mpl
@@ -76,6 +77,11 @@ class Picture:
     png: bytes
 
 
+def drawing() -> AbstractContextManager[None]:
+    """Return the context in which figures are made, so that they all look alike."""
+    return mpl.rc_context(SETTINGS)
+
+
 def picture(figure: Figure, key: str, title: str, caption: str, summary: str) -> Picture:
     """Render a figure; the same figure gives the same bytes."""
     svg, png = io.StringIO(), io.BytesIO()
@@ -119,10 +125,12 @@ def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
 
 def new(width: float, height: float) -> Figure:
     """Return an empty figure of ``width`` × ``height`` inches."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return Figure(figsize=(width, height))
 
 
-def log_axis(axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None) -> None:
+def log_axis(
+    axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
+) -> None:
     """Make an axis logarithmic from 10^low to 10^high with its labels written as powers.
 
     Parameters
@@ -156,4 +164,3 @@ def power_label(value: float) -> str:
     """Write a power of ten: ``10⁻¹⁵``."""
     exponent = round(math.log10(value))
     return "1" if exponent == 0 else "10" if exponent == 1 else "10" + str(exponent).translate(_SUPERSCRIPT)
-

@@ -1,8 +1,11 @@
 """Everything a report says, gathered once and printed twice: as markdown and as a page."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hbvm_bench import reference as references
 from hbvm_bench.identity import make_problem
@@ -10,12 +13,14 @@ from hbvm_bench.metrics import METRICS, Metric
 from hbvm_bench.records import Record
 from hbvm_bench.reference import Reference
 from hbvm_bench.report import figures, views, words
-from hbvm_bench.report.canvas import Picture
+from hbvm_bench.report.canvas import Picture, drawing
 from hbvm_bench.report.figures import Drawn, OverTime
 from hbvm_bench.report.style import Look, looks
-from hbvm_bench.store import Index, Store
+from hbvm_bench.store import Store
 from hbvm_bench.table import GROUPS, Row, columns, rows
 from problems.problem import Problem
+
+Array = NDArray[np.float64]
 
 # Machine code of the libraries: what the times were made with.
 BUILT = {
@@ -117,7 +122,8 @@ def gather(store: Store) -> Content:
     texts = list(dict.fromkeys(record.case.problem for record in records))
     planned = len(index.ids) // max(1, len(index.campaign.problems))
     sections = [
-        _section(text, [r for r in records if r.case.problem == text], store, look, planned) for text in texts
+        _section(text, [r for r in records if r.case.problem == text], store, look, planned, number)
+        for number, text in enumerate(texts, 1)
     ]
     return Content(
         title=index.campaign.title or index.campaign.name,
@@ -136,16 +142,13 @@ def gather(store: Store) -> Content:
     )
 
 
-def not_run(index: Index) -> str:
-    """Return what a report without a single case says."""
-    return f"none of the {len(index.ids)} cases of this run has finished; run: {index.command}."
-
-
-def _section(text: str, records: list[Record], store: Store, look: dict[str, Look], planned: int) -> Section:
+def _section(
+    text: str, records: list[Record], store: Store, look: dict[str, Look], planned: int, number: int
+) -> Section:
     problem = make_problem(text)
     known = references.find(problem)
     cases = [Drawn(record, look[record.id], store.series(record.id)) for record in records]
-    drawn = [case for case in cases if case.series.get("t", ()) is not () and len(case.series["t"]) > 0]
+    drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
     return Section(
         problem=problem,
@@ -158,18 +161,22 @@ def _section(text: str, records: list[Record], store: Store, look: dict[str, Loo
             if any(row.group == key for row in table)
         ],
         missing=planned - len(records),
-        pictures=_pictures(problem, drawn, known),
+        pictures=_pictures(problem, drawn, known, number),
         reference=known,
         truth=_truth(problem, known),
     )
 
 
-def _pictures(problem: Problem, cases: Sequence[Drawn], known: Reference | None) -> list[Picture]:
-    made = [figures.work_precision(cases)]
-    made += [figures.over_time(cases, what) for what in OVER_TIME]
-    made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
-    made.append(views.step_sizes(cases))
-    return [picture for picture in made if picture is not None]
+def _pictures(
+    problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int
+) -> list[Picture]:
+    with drawing():
+        made = [figures.work_precision(cases)]
+        made += [figures.over_time(cases, what) for what in OVER_TIME]
+        made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
+        made.append(views.step_sizes(cases))
+    suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
+    return [replace(picture, key=picture.key + suffix) for picture in made if picture is not None]
 
 
 OVER_TIME = (
@@ -205,7 +212,7 @@ OVER_TIME = (
     OverTime(
         key="symmetry",
         title="Off-axis distance over time",
-        caption="What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0 throughout; "
+        caption="What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
         "what is smaller than the lowest power is drawn just above it.",
         label="distance from the axis",
         get=lambda series: _guard(series),
@@ -225,11 +232,11 @@ OVER_TIME = (
 )
 
 
-def _pair(series: dict, t: str, values: str):  # noqa: ANN202
+def _pair(series: dict[str, Array], t: str, values: str) -> tuple[Array, Array] | None:
     return (series[t], series[values]) if values in series and series[t].size else None
 
 
-def _guard(series: dict):
+def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
     names = [name for name in series if name.startswith("guard.")]
     return (series["t"], series[names[0]]) if names else None
 
@@ -238,7 +245,9 @@ def _truth(problem: Problem, known: Reference | None) -> list[tuple[str, str]]:
     if known is None:
         return []
     values = [("position at the end", "stored reference, 128-bit arithmetic")]
-    values += [(key, value) for key, value in known.provenance.items() if key in ("method", "heyoka", "check")]
+    values += [
+        (key, value) for key, value in known.provenance.items() if key in ("method", "heyoka", "check")
+    ]
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
         values.insert(0, (f"z at t = {problem.t_end:g}", f"{known.high[-1, views.PLANETOID_Z]:.15g}"))
     return values

@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.style import INK, Look, options, panels
+from hbvm_bench.report.style import INK, MUTED, Look, options, panels
 from hbvm_bench.table import group_of
 
 Array = NDArray[np.float64]
 
 BINS = 240  # an error series is drawn as its largest value in each of so many bins
 COLUMNS = 3
+# Inches: the panels of all figures over time have one size and stand under each other.
+WIDTH, LEFT, RIGHT, GAP = 10.4, 0.72, 0.12, 0.28
+TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
 
 
 @dataclass(frozen=True)
@@ -70,27 +73,51 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
     shown = [case for case in cases if what.get(case.series) is not None]
     if not shown:
         return None
-    by_id = {case.record.id: case for case in shown}
-    groups = panels([case.record for case in shown])
-    figure, grid = panel_grid(len(groups))
-    for axes, (name, members) in zip(grid, groups, strict=False):
-        axes.set_title(name, color=INK)
-        _error_axis(axes, what)
-        for record in members:
-            _draw_error(axes, by_id[record.id], what)
-        panel_legend(axes, [by_id[record.id] for record in members], markers=not what.joined)
-    label_outer(grid, len(groups), "time", what.label)
+    figure, grid = family_panels(shown, what.label)
+    for axes, members in grid:
+        log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
+        axes.grid(visible=False, axis="x")
+        for case in members:
+            _draw_error(axes, case, what)
+        panel_legend(axes, members, markers=not what.joined)
     return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what))
 
 
-def panel_grid(count: int, *, height: float = 2.75, columns: int = COLUMNS) -> tuple[Figure, list[Axes]]:
-    """Return a figure with at least ``count`` panels in rows; the surplus is blank."""
-    rows = -(-count // columns)
-    figure = new(10.4, height * rows)
-    grid = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
-    for axes in grid[count:]:
-        axes.set_axis_off()
-    return figure, grid
+def family_panels(
+    cases: Sequence[Drawn], label: str, *, height: float = 1.75
+) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
+    """Return a figure with a panel per family, all of one size, with room for a legend under each.
+
+    Parameters
+    ----------
+    cases : sequence of Drawn
+        Divided as `style.panels` does.
+    label : str
+        Of the vertical axes.
+    height : float
+        Of a panel, in inches.
+    """
+    by_id = {case.record.id: case for case in cases}
+    groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
+    rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
+    heights = [TOP + height + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
+    figure = new(WIDTH, sum(heights))
+    panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
+    made: list[tuple[Axes, list[Drawn]]] = []
+    ceiling = sum(heights)
+    for row, used in zip(rows, heights, strict=True):
+        for column, (name, members) in enumerate(row):
+            x, y = LEFT + column * (panel + GAP), ceiling - TOP - height
+            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, height / sum(heights)))
+            axes.set_title(name, color=INK)
+            axes.text(1.0, -0.2, "time", transform=axes.transAxes, ha="right", fontsize=8, color=MUTED)
+            if column == 0:
+                axes.set_ylabel(label)
+            else:
+                axes.tick_params(labelleft=False)
+            made.append((axes, members))
+        ceiling -= used
+    return figure, made
 
 
 def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -> None:
@@ -107,15 +134,7 @@ def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -
         )
         for case in cases
     ]
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.02, -0.16), ncols=1, borderaxespad=0.0)
-
-
-def label_outer(grid: Sequence[Axes], count: int, x: str, y: str, columns: int = COLUMNS) -> None:
-    """Label the axes at the left edge and under every column's last panel."""
-    for index, axes in enumerate(grid[:count]):
-        if index % columns == 0:
-            axes.set_ylabel(y)
-        axes.set_xlabel(x, labelpad=1, fontsize=8, loc="right")
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.03, -0.23), borderaxespad=0.0)
 
 
 def work_precision(cases: Sequence[Drawn]) -> Picture | None:
@@ -128,8 +147,9 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     ]
     if len(shown) < 2:
         return None
-    figure = new(10.4, 4.7)
-    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.62])
+    figure = new(WIDTH, 4.7)
+    figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
+    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
     times = [_number(case.record, "warm_seconds") for case in shown]
     for axes, key in ((left, keys[0]), (right, keys[1])):
         values = [_number(case.record, key) for case in shown]
@@ -150,7 +170,9 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
         for c in sorted(shown, key=lambda case: case.look.number)
     ]
-    side.legend(handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1)
+    side.legend(
+        handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1
+    )
     best = min(shown, key=lambda case: _number(case.record, "position_end"))
     left_out = len(cases) - len(shown)
     return picture(
@@ -187,6 +209,8 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
         return
     if what.joined:
         t, values = envelope(t, values)
+    elif not what.zero:  # the start is right by definition
+        t, values = t[values > 0], values[values > 0]
     bottom = 10.0**what.low
     clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
     drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
@@ -197,11 +221,6 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
         line.set_linewidth(0.7)
         line.set_marker(case.look.marker)
         line.set_markersize(2.6)
-
-
-def _error_axis(axes: Axes, what: OverTime) -> None:
-    log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
-    axes.grid(visible=False, axis="x")
 
 
 def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
@@ -246,4 +265,3 @@ def _number(record: Record, key: str) -> float:
     value = record.result.metrics[key].value
     assert value is not None
     return value
-

@@ -30,7 +30,14 @@ FAMILIES = {
 }
 OTHERS = (("#a8324a", "#ff8a9e"), ("#3d6b1f", "#a5d677"), ("#7a4a1e", "#e0a46a"))
 
-DASHES: tuple[tuple[float, ...], ...] = ((), (6, 2), (2, 1.6), (8, 2, 2, 2), (5, 1.5, 1.5, 1.5, 1.5, 1.5), (12, 3))
+DASHES: tuple[tuple[float, ...], ...] = (
+    (),
+    (6, 2),
+    (2, 1.6),
+    (8, 2, 2, 2),
+    (5, 1.5, 1.5, 1.5, 1.5, 1.5),
+    (12, 3),
+)
 MARKERS = dict(zip(FAMILIES, "oDs^vPX<>phH", strict=True))
 
 # Neutral colours of the figures; each is unique so that it can be themed in the page.

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from hbvm_bench.reference import Reference
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.figures import Drawn, label_outer, panel_grid, panel_legend
-from hbvm_bench.report.style import INK, MUTED, TRUTH, options, panels
+from hbvm_bench.report.figures import Drawn, family_panels, panel_legend
+from hbvm_bench.report.style import INK, MUTED, TRUTH, options
 from hbvm_bench.table import status_of
 from problems.problem import Problem
 
@@ -28,13 +28,9 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
     shown = [case for case in cases if case.series["t"].size and case.series["t"][-1] > start]
     if not shown:
         return None
-    by_id = {case.record.id: case for case in shown}
-    groups = panels([case.record for case in shown])
-    figure, grid = panel_grid(len(groups), height=2.6)
-    for axes, (name, members) in zip(grid, groups, strict=False):
-        axes.set_title(name, color=INK)
-        for record in members:
-            case = by_id[record.id]
+    figure, grid = family_panels(shown, "z of the planetoid")
+    for axes, members in grid:
+        for case in members:
             t, z = case.series["t"], case.series["y"][:, PLANETOID_Z]
             kept = (t >= start) & (np.abs(z) <= REACH)
             (line,) = axes.plot(t[kept], z[kept], color=case.look.light)
@@ -42,20 +38,11 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
                 line.set_dashes(case.look.dash)
         if reference is not None:
             late = reference.t >= start
-            axes.plot(
-                reference.t[late],
-                reference.high[late, PLANETOID_Z],
-                "o",
-                mfc="none",
-                color=INK,
-                markersize=5,
-                clip_on=False,
-                zorder=5,
-            )
+            truth = reference.high[late, PLANETOID_Z]
+            axes.plot(reference.t[late], truth, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
         axes.set_xlim(start, problem.t_end)
         axes.set_ylim(-REACH, REACH)
-        panel_legend(axes, [by_id[record.id] for record in members])
-    label_outer(grid, len(groups), "time", "z of the planetoid")
+        panel_legend(axes, members)
     ends = "; ".join(
         f"{case.record.case.method}: {case.series['y'][-1, PLANETOID_Z]:.4g}"
         for case in shown
@@ -65,8 +52,8 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
         figure,
         "axis-motion",
         f"The planetoid on the axis, the last {LAST:.0f} time units",
-        "Rings: the stored 128-bit reference. A line that is not in the picture has left it: that planetoid is "
-        "far away. A curve that misses the rings conserves, at best, the energy of another motion.",
+        "Rings: the stored 128-bit reference. A line that is missing has left the picture: its planetoid "
+        "is far away. A curve that misses the rings conserves, at best, the energy of another motion.",
         f"z at t = {problem.t_end:g}. {ends}.",
     )
 
@@ -79,8 +66,9 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         return None
     columns = 7
     rows = -(-len(shown) // columns)
-    figure = new(10.4, 1.72 * rows)
-    grid = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    figure = new(10.4, 1.78 * rows)
+    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / (1.78 * rows), bottom=0.2 / (1.78 * rows))
+    grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.32}).ravel().tolist()
     for axes in grid[len(shown) :]:
         axes.set_axis_off()
     for axes, case in zip(grid, shown, strict=False):
@@ -90,12 +78,15 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         for body in (0, 1):
             _path(axes, problem, case, first, body, color=TRUTH, linewidth=2.6)
             _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
-        axes.set_xlim(-6, 6)
-        axes.set_ylim(-6, 6)
+        axes.set_xlim(-3.4, 3.4)
+        axes.set_ylim(-3.4, 3.4)
         axes.set_aspect("equal")
-        axes.set_xticks([-5, 0, 5], labels=[])
-        axes.set_yticks([-5, 0, 5], labels=[])
-        axes.set_title(f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK)
+        axes.set_xticks([-2.5, 0, 2.5], labels=[])
+        axes.set_yticks([-2.5, 0, 2.5], labels=[])
+        axes.tick_params(length=0)
+        axes.set_title(
+            f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK
+        )
         words = options(case.record)
         axes.set_xlabel(words if len(words) < 31 else words[:29] + "…", fontsize=5.5, color=MUTED, labelpad=1)
     return picture(
@@ -103,9 +94,9 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         "primaries",
         "The paths of the primaries in their plane",
         "Grey: the first revolution, which is the right one for all times: the true orbits keep their place. "
-        "Colour: the last three revolutions that the run reached. Grid lines at −5, 0 and 5.",
-        "An orbit that has turned against the grey one is the sham rotation of a method that keeps the energy "
-        "but neither the angular momentum nor the apsidal direction at this step.",
+        "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
+        "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
+        "for the direction of the apsides, whatever its energy says.",
     )
 
 
@@ -119,6 +110,7 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     if not shown:
         return None
     figure = new(10.4, 3.2)
+    figure.subplots_adjust(left=0.07, right=0.98, top=0.97, bottom=0.15)
     left, right = figure.subplots(1, 2)
     low = 0
     for case in shown:
@@ -146,7 +138,7 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
         figure,
         "step-sizes",
         "Step sizes of what stalled",
-        "The run was ended by a watchdog that saw the time stand still while steps were taken, not by a time limit.",
+        "The run was ended by a watchdog that saw the time stand still, not by a time limit.",
         "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
     )
 
@@ -155,7 +147,14 @@ VIEWS: dict[str, tuple[View, ...]] = {"sitnikov": (axis_motion, primaries)}
 
 
 def _path(
-    axes: Axes, problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int, *, color: str, linewidth: float
+    axes: Axes,
+    problem: Problem,
+    case: Drawn,
+    chosen: NDArray[np.bool_],
+    body: int,
+    *,
+    color: str,
+    linewidth: float,
 ) -> None:
     # cubic Hermite pieces: the samples know their velocities, straight lines would cut the pericentres
     t, y = case.series["t"][chosen], case.series["y"][chosen]

@@ -11,35 +11,57 @@ from hbvm_bench.table import group_of, seconds, status_of
 RIGHT_POSITION = 1e-8
 RIGHT_ENERGY = 1e-13
 
-RULES = (
-    "Every integrator starts from the same doubles and receives the same vector field, written down once as a "
-    "Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.",
-    "The settings were declared in the campaign file before the run. How many each method has, and whether they are its defaults, its authors' advice or a use outside its domain, "
-    "is in the table below.",
-    "Energy is never ranked without position: the table is sorted by the position error at the end, and the picture "
-    "of energy against time stands beside that of position against time.",
-    "Where the problem's symmetry is lost by more than "
-    f"{GUARD_TOLERANCE:g} of the size of the trajectory, the run follows another trajectory: its position error and "
-    "its time are void, are printed in brackets, and take part in no ranking. Where it is lost by less, the row says so.",
-    "Invariants are evaluated in double-double arithmetic from the double states, on one grid of times common to all; "
-    "each method reaches the grid in the way that costs its quality nothing, and no state is interpolated by us.",
-    "Times are those of whole integrations without output, compiled before, with one thread on one core, in a pass "
-    "of their own with no other case running: every round visits every case once in a fresh process, so that a machine "
-    "that changes its speed touches all alike. A sample lasts at least 20 ms. The table gives the median and the "
-    "quartiles; all samples are in the store. Compilation is stated apart.",
-    "heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels come, built "
-    "for any x86-64 processor. SciPy's solvers are Python and call a vector field compiled by numba.",
-    "A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; "
-    "the numbers of the part that it did run are void.",
-)
+RULES_TEXT = f"""
+Every integrator starts from the same doubles and receives the same vector field, written down
+once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
 
-WEAKNESSES = (
-    "HBVM(k, s) with k > s is not symplectic: it keeps the energy, not the phase-space volume. Gauss (k = s) is "
-    "symplectic and does not keep the energy.",
-    "Both are implicit: every step solves a nonlinear system, so they need many evaluations of the vector field.",
-    "HBVM does not keep the angular momentum, only as far as its order does.",
-    "Conserving the energy is not accuracy: it says nothing about where on the energy surface the state is.",
-)
+The settings were declared in the campaign file before the run. How many each method has, and
+whether they are its defaults, its authors' advice, those of a publication or a use outside its
+domain, is in the table below.
+
+Energy is never ranked without position: the table is sorted by the position error at the end, and
+the picture of energy against time stands beside that of position against time.
+
+Where the problem's symmetry is lost by more than {GUARD_TOLERANCE:g} of the size of the trajectory,
+the run follows another trajectory: its position error and its time are void, are printed in
+brackets, and take part in no ranking. Where it is lost by less, the row says so.
+
+Invariants are evaluated in double-double arithmetic from the double states, on one grid of times
+common to all. Each method reaches the grid in the way that costs its quality nothing: by its own
+steps, by a partial step aside, by its own step's polynomial at full order, or by landing on it.
+
+Times are those of whole integrations without output, compiled before, with one thread on one core,
+in a pass of their own with no other case running: every round visits every case once in a fresh
+process, so that a machine that changes its speed touches all alike. A sample lasts at least 20 ms.
+The table gives the median and the quartiles; all samples are in the store. Compilation is stated
+apart.
+
+heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels
+come, built for any processor of the kind. SciPy's solvers are Python and call a vector field
+compiled by numba.
+
+A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; the
+numbers of the part that it did run are void.
+"""
+WEAKNESSES_TEXT = """
+HBVM(k, s) with k > s is not symplectic: it keeps the energy, not the volume in phase space.
+Gauss (k = s) is symplectic and does not keep the energy.
+
+Both are implicit: every step solves a nonlinear system, so they need many evaluations of the vector
+field.
+
+HBVM keeps the angular momentum only as far as its order does.
+
+Conserving the energy is not accuracy: it does not say where on the energy surface the state is.
+"""
+
+
+def _paragraphs(text: str) -> tuple[str, ...]:
+    return tuple(" ".join(paragraph.split()) for paragraph in text.strip().split("\n\n"))
+
+
+RULES = _paragraphs(RULES_TEXT)
+WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
 
 
 def summary(records: Sequence[Record]) -> list[str]:
@@ -77,7 +99,10 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
         position, energy = _value(record, "position_end"), _value(record, "energy_max")
         if position is None or energy is None or position < 1e-2:
             continue
-        parts = [f"here {record.case.method} has the energy right to {energy:.1e} and a body {position:.2g} off at the end"]
+        parts = [
+            f"here {record.case.method} has the energy right to {energy:.1e} "
+            f"and a body {position:.2g} off at the end"
+        ]
         z, angular = _value(record, "z_error"), _value(record, "angular_momentum_max")
         if z is not None:
             parts.append(f"z wrong by {z:.2g}")

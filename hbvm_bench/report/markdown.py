@@ -1,0 +1,44 @@
+"""The report as markdown, for a code forge."""
+
+import re
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from hbvm_bench.report.content import Content, Section
+from hbvm_bench.table import Row
+
+
+def markdown(content: Content) -> str:
+    """Return the report as markdown with relative links to its figures."""
+    environment = Environment(
+        loader=PackageLoader("hbvm_bench.report", "templates"),
+        autoescape=False,  # markdown has its own escapes, see `plain`
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"plain": plain, "code": code}
+    environment.globals |= {"row_cells": row_cells}
+    text = environment.get_template("report.md.j2").render(c=content)
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def plain(text: object) -> str:
+    """Make any text harmless inside a line or a table cell of markdown."""
+    one_line = " ".join(str(text).split())
+    return re.sub(r"([\\`*_{}\[\]<>#|~$])", r"\\\1", one_line)
+
+
+def code(text: object) -> str:
+    """Return text as inline code that can stand in a table cell."""
+    one_line = " ".join(str(text).split()).replace("|", "\\|")
+    fence = "`" * (max((len(run) for run in re.findall("`+", one_line)), default=0) + 1)
+    pad = " " if "`" in one_line else ""
+    return f"{fence}{pad}{one_line}{pad}{fence}"
+
+
+def row_cells(section: Section, row: Row) -> list[str]:
+    """Return the cells of a row, void ones in brackets."""
+    cells = [row.cells.get(metric.key) for metric in section.columns]
+    return ["–" if cell is None else f"({cell.text})" if cell.void else cell.text for cell in cells]

@@ -1,0 +1,47 @@
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+import integrators.registry
+
+HERE = Path(__file__).parent
+TOYS = (
+    "Steady",
+    "Straying",
+    "Stalling",
+    "Endless",
+    "Crashing",
+    "Raising",
+    "Exiting",
+    "Hungry",
+    "Garbage",
+    "Refusing",
+    "Missing",
+)
+SHORT = "sitnikov(t_end=1.0)"
+
+
+@pytest.fixture(scope="session")
+def toy_path(tmp_path_factory):
+    """Return folders that, on the path, are an installed distribution of toy methods."""
+    folder = tmp_path_factory.mktemp("site")
+    info = folder / "toys-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: toys\nVersion: 1.0\n")
+    lines = [f"{name} = toy_methods:{name}" for name in TOYS]
+    (info / "entry_points.txt").write_text("\n".join(["[hbvm_bench.integrators]", *lines]) + "\n")
+    return [str(folder), str(HERE)]
+
+
+@pytest.fixture
+def toys(toy_path, monkeypatch):
+    """Install the toy methods in this process and in its children."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(toy_path))
+    for folder in toy_path:
+        monkeypatch.syspath_prepend(folder)
+    integrators.registry._entries.cache_clear()
+    yield
+    integrators.registry._entries.cache_clear()
+    sys.modules.pop("toy_methods", None)

@@ -1,0 +1,179 @@
+"""Methods that misbehave in every way a third party's may; registered for these tests only."""
+
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from integrators.protocol import MethodBase, Samples, Stats, Status
+from problems.errors import MissingLibraryError
+
+
+class ToyStepper:
+    def __init__(self, method, y0, t0):
+        self.method, self.y, self.t = method, np.array(y0), t0
+        self.status, self.reason, self.stats = Status.RUNNING, "", Stats(steps=1, evaluations=2)
+
+    def step(self):
+        return self.status
+
+    def advance(self, times, *, sample=None):
+        times = np.asarray(times, dtype=float)
+        self.t = float(times[-1])
+        return self.method.samples(times, np.tile(self.y, (times.size, 1)))
+
+    def checkpoint(self):
+        return self.t
+
+    def restore(self, checkpoint):
+        self.t = checkpoint
+
+
+@dataclass
+class ToyProgram:
+    method: "ToyBase"
+    compile_seconds: float = 0.25
+    from_cache: bool | None = False
+
+    def start(self, y0, par=None, t0=0.0):
+        return ToyStepper(self.method, y0, t0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToyBase(MethodBase):
+    library = "toys"
+    citation = "@misc{toy, title = {A toy}}"
+    family = "toy"
+
+    @property
+    def order(self):
+        return 1
+
+    def accepts(self, problem):
+        return None
+
+    def compile(self, system):
+        return ToyProgram(self)
+
+    def samples(self, times, states):
+        return Samples(times, states, Status.FINISHED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Steady(ToyBase):
+    """Stays where it is."""
+
+    h: float = 0.1
+    wait: float = 0.0
+
+    def samples(self, times, states):
+        time.sleep(self.wait)
+        return super().samples(times, states)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Straying(ToyBase):
+    """Leaves the axis."""
+
+    def samples(self, times, states):
+        states[1:, 6] = 1e-3
+        return super().samples(times, states)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stalling(ToyBase):
+    """Stalls in the middle."""
+
+    def samples(self, times, states):
+        half = times.size // 2
+        return Samples(times[:half], states[:half], Status.STALLED, "it crawled.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Endless(ToyBase):
+    """Never returns."""
+
+    def samples(self, times, states):
+        while True:
+            time.sleep(0.1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crashing(ToyBase):
+    """Dies of a signal."""
+
+    number: int = int(signal.SIGSEGV)
+
+    def samples(self, times, states):
+        os.kill(os.getpid(), self.number)
+        time.sleep(5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Raising(ToyBase):
+    """Raises what no method should."""
+
+    def samples(self, times, states):
+        raise RuntimeError("something <b>broke</b>")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exiting(ToyBase):
+    """Leaves without a word."""
+
+    code: int = 0
+
+    def samples(self, times, states):
+        os._exit(self.code)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hungry(ToyBase):
+    """Eats memory."""
+
+    def samples(self, times, states):
+        eaten = []
+        while True:
+            eaten.append(np.ones(4_000_000))
+            time.sleep(0.01)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Garbage(ToyBase):
+    """Breaks the protocol, or writes nonsense."""
+
+    what: str = "shape"
+
+    def samples(self, times, states):
+        match self.what:
+            case "shape":
+                return Samples(times, states[:, :3], Status.FINISHED)
+            case "times":
+                return Samples(times + 1, states, Status.FINISHED)
+            case "few":
+                return Samples(times[:2], states[:2], Status.FINISHED)
+            case "nan":
+                states[-1] = np.nan
+            case "noise":
+                sys.stdout.buffer.write(os.urandom(1 << 20))
+                sys.stdout.flush()
+        return super().samples(times, states)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refusing(ToyBase):
+    """Accepts nothing."""
+
+    def accepts(self, problem):
+        return "it accepts nothing."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Missing(ToyBase):
+    """Needs a library that is not there."""
+
+    def compile(self, system):
+        raise MissingLibraryError("this needs the library nowhere; install it with: pip install nowhere.")
