@@ -6,6 +6,7 @@ from fractions import Fraction
 from problems.tracing import Graph, Node, is_power_of_two
 
 ONE = Fraction(1)
+_SMALL = 2**20  # 2/3 is written 2*x/3; a quotient of long decimals is rounded once instead
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class Adjoint:
         size = abs(self.factor)
         num, den = self.num, self.den
         up, down = float(size), 1.0
-        if Fraction(up) != size and max(size.numerator, size.denominator) < 2**53:
+        if Fraction(up) != size and max(size.numerator, size.denominator) < _SMALL:
             up, down = float(size.numerator), float(size.denominator)
         value = graph.const(up) if num is None else graph.mul(graph.const(up), num)
         if down != 1.0:

@@ -29,7 +29,7 @@ _BLOCK = 2_000_000
 
 
 def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]:
-    """Evaluate a function without loops among its outputs, in double-double.
+    """Evaluate a function in double-double.
 
     Parameters
     ----------
@@ -48,7 +48,8 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
         One array of shape (n,) per output.
     """
     roots = [term.node for terms in function.outputs for term in terms]
-    largest = max((len(node.data) for node in reachable(roots) if node.op == "sum"), default=1)
+    lengths = [len(node.data) for node in reachable(roots) if node.op == "sum"]
+    largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
     columns = max(1, _BLOCK // largest)
     n = y.shape[1]
     times = np.broadcast_to(np.asarray(t, dtype=np.float64), (n,))
@@ -70,19 +71,37 @@ class _Interpreter:
 
     def outputs(self, function: Function) -> list[DD]:
         roots = [term.node for terms in function.outputs for term in terms]
+        roots += [entry.node for _, entries in function.loops for entry in entries]
         # Overflow and 0/0 at a state that is not finite give nan there, which is the answer.
         with np.errstate(all="ignore"):
             for node in reachable(roots):
                 if node.loop is None:
                     self.known[node.id] = self._value(node, self.known)
-            return [self._total([self.known[term.node.id] for term in terms]) for terms in function.outputs]
+            summands: list[list[DD]] = [[] for _ in function.outputs]
+            for loop, entries in function.loops:
+                body = self._inside([entry.node for entry in entries], loop)
+                for entry in entries:
+                    terms = body[entry.node.id] if entry.node.loop is loop else self.known[entry.node.id]
+                    rows = self._rows(terms, len(loop))
+                    for row, place in enumerate(entry.index.values(loop)):
+                        summands[place].append(rows[row])
+            for terms, parts in zip(function.outputs, summands, strict=True):
+                parts.extend(self.known[term.node.id] for term in terms)
+            return [self._total(parts) for parts in summands]
 
-    def _total(self, values: list[DD]) -> DD:
-        total = values[0]
-        for value in values[1:]:
-            total = total + value
-        shape = (self.n,)
-        return DD(np.broadcast_to(total.hi, shape), np.broadcast_to(total.lo, shape))
+    def _total(self, parts: list[DD]) -> DD:
+        total = sum(parts, start=DD(0.0))
+        return DD(np.broadcast_to(total.hi, (self.n,)), np.broadcast_to(total.lo, (self.n,)))
+
+    def _rows(self, terms: DD, n: int) -> DD:
+        return DD(np.broadcast_to(terms.hi, (n, self.n)), np.broadcast_to(terms.lo, (n, self.n)))
+
+    def _inside(self, roots: list[Node], loop: Loop) -> dict[int, DD]:
+        body: dict[int, DD] = {}
+        for node in reachable(roots):
+            if node.loop is loop:
+                body[node.id] = self._value(node, body)
+        return body
 
     def _value(self, node: Node, known: dict[int, DD]) -> DD:
         if node.op == "const":
@@ -113,14 +132,9 @@ class _Interpreter:
                 return dd.FUNCTIONS[node.op](args[0])
 
     def _sum(self, node: Node, loop: Loop) -> DD:
-        body: dict[int, DD] = {}
-        for inner in reachable([node.args[0]]):
-            if inner.loop is loop:
-                body[inner.id] = self._value(inner, body)
-        terms = body[node.args[0].id]
-        shape = (len(loop), self.n)
-        hi, lo = np.broadcast_to(terms.hi, shape), np.broadcast_to(terms.lo, shape)
+        terms = self._rows(self._inside([node.args[0]], loop)[node.args[0].id], len(loop))
         # In halves: with 32 digits the order does not matter, and this is fast.
+        hi, lo = terms.hi, terms.lo
         while len(hi) > 1:
             half = len(hi) // 2
             paired = DD(hi[:half], lo[:half]) + DD(hi[half : 2 * half], lo[half : 2 * half])
@@ -186,17 +200,7 @@ def guards(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, A
 
 
 def _scale(system: System, par: Array) -> list[DD]:
-    from problems import emit
-
-    function = system.function("velocity_scale")
-    if function.loops:
-        return [DD(c) for c in emit.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)]
-    state = np.zeros((system.dim, 1))
-    zero = DD(np.zeros(1))
-    interpreter = _Interpreter(np.zeros(1), state, par)
-    filled = Function(function.graph, tuple(terms for terms in function.outputs if terms))
-    values = iter(interpreter.outputs(filled))
-    return [next(values) if terms else zero for terms in function.outputs]
+    return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, 1)), par)
 
 
 def velocity(problem: "Problem", y: ArrayLike) -> Array | None:

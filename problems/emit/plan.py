@@ -153,7 +153,7 @@ def _chains(
     finals: list[tuple[int, Node]] = []
     partial: list[tuple[int, Node]] = []
     for place, chain in enumerate(chains):
-        total = graph.symbol("out", place, flags=0) if place in covered else None
+        total = graph.symbol("out", place, flags=0) if chain and place in covered else None
         for term in chain:
             total = term.node if total is None else total + term.node
             partial.append((term.key, total))

@@ -71,4 +71,4 @@ class Printer:
             return "-" + self.text(node.args[0], _LEAF), _SUM
         name = self._functions[node.op]
         text = self.text(node.args[0])
-        return (name.format(text) if "{}" in name else f"{name}({text})"), _LEAF
+        return (name.format(text) if "{" in name else f"{name}({text})"), _LEAF
