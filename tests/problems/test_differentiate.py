@@ -122,8 +122,8 @@ def test_gradients_of_generated_expressions(tree: Any, x: float, y: float):
     state = np.array([[x], [y], [0.0], [0.0]])
     values = evaluate(system.function("field"), 0.0, state, system.pack())
     with mpmath.workdps(60):
+        leaf = {"a": mpmath.mpf(0.7), "b": mpmath.mpf(2)}
         for place, at in ((2, (1, 0)), (3, (0, 1))):
-            leaf = {"a": mpmath.mpf(0.7), "b": mpmath.mpf(2)}
             expected = -mpmath.diff(
                 lambda u, v: mpmath.mpf(1) * build(tree, mpmath, leaf | {"x": u, "y": v}),
                 (mpmath.mpf(x), mpmath.mpf(y)),

@@ -30,7 +30,7 @@ def blocks(system: Any, values: np.ndarray) -> np.ndarray:
 
 
 def largest_terms(system: Any, states: np.ndarray, par: np.ndarray) -> np.ndarray:
-    """Return the size of the largest summand of each component: where terms cancel, ulps are counted of these."""
+    """Return the largest summand of each component: where summands cancel, ulps are counted of these."""
     function = system.function("field")
     values = [np.zeros((len(states),)) for _ in function.outputs]
     for place, terms in enumerate(function.outputs):
@@ -70,7 +70,7 @@ def test_fields_of_all_engines_agree_within_8_ulp_of_the_largest_term(case, stat
     scale = np.maximum(blocks(system, exact), largest_terms(system, states, par))
     for engine, found in values.items():
         gap = np.abs(found - exact[: len(found)]) / (EPS * scale[: len(found)])
-        # Measured: at most 3.5, but zoo 7.7 and, with its 14th powers of rounded distances, lennard_jones 16.5.
+        # Measured: at most 3.5; zoo 7.7; lennard_jones, with 14th powers of rounded distances, 16.5.
         assert gap.max() <= case.ulps, engine
 
 
@@ -95,7 +95,7 @@ def compiled(made: emit.Source, backend: str) -> Any:
     namespace: dict[str, Any] = {"np": np} | {
         name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "fabs", "copysign")
     }
-    exec(made.text, namespace)
+    exec(made.text, namespace)  # noqa: S102 -- the text under test
     return namespace[made.name]
 
 
@@ -171,7 +171,7 @@ def test_sitnikovs_force_has_one_root_one_division_and_few_operations_per_pair()
     count = operations(text)
     assert count["sqrt"] == 3
     assert count["div"] == 3
-    # per pair: 3 differences, 5 for r2, r2*sqrt(r2), the product of the masses, 3 for the force, 6 to add it up
+    # per pair: 3 differences, 5 for r2, r2*sqrt(r2), the masses' product, 3 for the force, 6 to add it up
     assert count["rest"] <= 3 * 19
 
 
