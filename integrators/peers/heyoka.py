@@ -22,7 +22,7 @@ EPS = float(np.finfo(np.float64).eps)
 COLD = "HBVM_BENCH_COLD_COMPILE"
 """Environment variable: set to 1, heyoka compiles anew, using neither of its caches."""
 
-WORTHWHILE = 16
+WORTHWHILE = 64
 """Fewest steps for which the compiled loop is called; shorter ways are taken step by step."""
 
 TINY = float(np.finfo(np.float64).tiny)

@@ -25,11 +25,12 @@ def load(library: str, *modules: str) -> ModuleType:
         If one of them is not installed.
     """
     try:
-        return [import_module(name) for name in modules or (library,)][0]
+        found = [import_module(name) for name in modules or (library,)]
     except ImportError as error:
         raise MissingLibraryError(
             f'{library} is not installed ({error}); install the peers with pip install "hbvm-bench[peers]".'
         ) from error
+    return found[0]
 
 
 def number(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from integrators.peers.options import choice, flag, number, whole_choice
-from integrators.peers.rebound_program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls
+from integrators.peers.rebound_program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.peers.stepper import FixedStepper
 from integrators.protocol import Array
 from problems.errors import InputError
@@ -31,8 +31,8 @@ RADIAL = 1e-6
 WHFAST = """\
 @article{ReinTamayo2015,
   author = {Rein, Hanno and Tamayo, Daniel},
-  title = {{WHFAST}: a fast and unbiased implementation of a symplectic {Wisdom-Holman} integrator for long-term
-           gravitational simulations},
+  title = {{WHFAST}: a fast and unbiased implementation of a symplectic {Wisdom-Holman} integrator for
+           long-term gravitational simulations},
   journal = {Monthly Notices of the Royal Astronomical Society},
   volume = {452},
   number = {1},
@@ -170,15 +170,14 @@ class WHFast(ReboundMethod):
         radial = _radial(layout, problem.y0) if self.coordinates == "jacobi" else []
         if radial:
             said.append(
-                f"the Jacobi orbit of body {radial[0]} is radial: it goes through the barycentre of those before it, "
-                "where the Kepler orbit is singular"
+                f"the Jacobi orbit of body {radial[0]} is radial: it goes through the barycentre of those "
+                "before it, where the Kepler orbit is singular"
             )
         return "; ".join(said) + "." if said else None
 
     def set_up(self, simulation: Any) -> None:
         """Choose WHFast and its options."""
-        simulation.integrator = "whfast"
-        chosen = simulation.integrator
+        chosen = choose(simulation, "whfast")
         chosen.coordinates, chosen.kernel = self.coordinates, self.kernel
         chosen.corrector, chosen.corrector2 = self.corrector, int(self.corrector2)
         chosen.safe_mode, chosen.keep_unsynchronized = 0, 1
@@ -216,8 +215,7 @@ class Leapfrog(ReboundMethod):
 
     def set_up(self, simulation: Any) -> None:
         """Choose the leapfrog and its order."""
-        simulation.integrator = "leapfrog"
-        simulation.integrator.order = self.order
+        choose(simulation, "leapfrog").order = self.order
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
         """Return a trajectory."""

@@ -1,4 +1,4 @@
-"""Compiled callbacks that REBOUND calls from its own loop: the watchdog, the count of force evaluations, forces.
+"""Compiled callbacks that REBOUND calls from its own loop: the watchdog, a counter, forces.
 
 They are C functions made by numba. They are put into the simulation's function
 pointers directly: by REBOUND's Python setters each call would pass through a Python
@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba import carray, types
+from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -65,14 +65,16 @@ class Block:
         return ring[np.arange(first, steps + 1) % RING].copy()
 
 
-@intrinsic
-def _pointer(typingctx: Any, address: Any) -> Any:
+def _pointer_of(typingctx: Any, address: Any) -> Any:
     """Turn an address (int64) into a pointer."""
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
 
     return types.voidptr(types.int64), codegen
+
+
+_pointer: Any = intrinsic(_pointer_of)
 
 
 def _offset(field: str, size: int) -> int:
@@ -91,7 +93,7 @@ def watchdog() -> Any:
     patience, share = CRAWL_STEPS, CRAWL_SHARE
 
     @numba.cfunc(types.void(types.voidptr), cache=True)
-    def watch(simulation):  # pyright: ignore[reportMissingParameterType]
+    def watch(simulation: Any) -> None:
         real = carray(simulation, (128,), np.float64)
         whole = carray(simulation, (128,), np.int64)
         block = carray(_pointer(whole[EXTRAS]), (BLOCK,), np.float64)
@@ -131,13 +133,14 @@ def counter() -> Any:
     EXTRAS = _offset("extras", 8)
 
     @numba.cfunc(types.void(types.voidptr), cache=True)
-    def count(simulation):  # pyright: ignore[reportMissingParameterType]
+    def count(simulation: Any) -> None:
         block = carray(_pointer(carray(simulation, (128,), np.int64)[EXTRAS]), (BLOCK,), np.float64)
         block[EVALUATIONS] += 1.0
 
     return count
 
 
+@cache
 def forces(kernel: Any, dof: int, n_par: int) -> Any:
     """Return additional forces q'' = c force(t, q), coordinates in threes to a particle, counting calls.
 
@@ -150,8 +153,9 @@ def forces(kernel: Any, dof: int, n_par: int) -> Any:
 
     Returns
     -------
-    numba C function, to be kept alive while a simulation uses it; its `Block` holds
-    as numbers: parameters (n_par), c (dof), room for q (dof) and for the force (dof).
+    numba C function
+        Its `Block` holds as numbers: parameters (n_par), c (dof), room for q (dof) and
+        for the force (dof).
     """
     T, EXTRAS, PARTICLES = _offset("t", 8), _offset("extras", 8), _offset("_particles", 8)
     stride = particle_size()
@@ -159,7 +163,7 @@ def forces(kernel: Any, dof: int, n_par: int) -> Any:
     particles = -(-dof // 3)
 
     @numba.cfunc(types.void(types.voidptr))
-    def force(simulation):  # pyright: ignore[reportMissingParameterType]
+    def force(simulation: Any) -> None:
         whole = carray(simulation, (128,), np.int64)
         block = carray(_pointer(whole[EXTRAS]), (BLOCK,), np.float64)
         block[EVALUATIONS] += 1.0
@@ -213,5 +217,5 @@ def _function(simulation: Any, address: int) -> Any:
 def particles(simulation: Any) -> NDArray[np.float64]:
     """Return a view (N, size) of a simulation's particles; valid until particles are added."""
     n, size = int(simulation.N), particle_size()
-    address = ctypes.cast(simulation._particles, ctypes.c_void_p).value
-    return np.frombuffer((ctypes.c_double * (n * size)).from_address(address or 0)).reshape(n, size)
+    first = ctypes.cast(simulation._particles, ctypes.POINTER(ctypes.c_double))
+    return np.ctypeslib.as_array(first, (n, size))

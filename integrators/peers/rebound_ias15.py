@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from integrators.peers.options import choice, number
-from integrators.peers.rebound_program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls
+from integrators.peers.rebound_program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.peers.stepper import CRAWL_STEPS, PeerStepper
 from integrators.protocol import Array, Status
 from problems.errors import InputError
@@ -105,16 +105,14 @@ class IAS15(ReboundMethod):
 
     def set_up(self, simulation: Any) -> None:
         """Choose IAS15 and its options."""
-        simulation.integrator = "ias15"
-        simulation.integrator.epsilon = self.epsilon
-        simulation.integrator.min_dt = self.min_dt
-        simulation.integrator.adaptive_mode = self.mode
+        chosen = choose(simulation, "ias15")
+        chosen.epsilon, chosen.min_dt, chosen.adaptive_mode = self.epsilon, self.min_dt, self.mode
         if self.h is not None:
             simulation.dt = self.h
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "IAS15Stepper":
         """Return a trajectory."""
-        return IAS15Stepper(program, layout, y, t)
+        return IAS15Stepper(program, layout, self, y, t)
 
 
 class IAS15Stepper(PeerStepper):
@@ -122,9 +120,9 @@ class IAS15Stepper(PeerStepper):
 
     samplings = ("land", "steps")
 
-    def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float):
+    def __init__(self, program: ReboundProgram, layout: Layout, method: IAS15, y: Array, t: float):
         super().__init__(y, t)
-        self._program, self._layout = program, layout
+        self._program, self._layout, self._method = program, layout, method
         self._block = program.hooks.Block(layout.numbers)
         self._use(program.simulation(layout, t, y))
 
@@ -152,27 +150,19 @@ class IAS15Stepper(PeerStepper):
         hooks, values = self._program.hooks, self._block.values
         history = self._block.history(int(self._simulation.steps_done))
         self._stats.extra["dt_history"] = history
-        last = float(history[-1, 1])
+        fell = f"IAS15's step fell to {float(history[-1, 1]):.1e} and"
+        stopped = "stopped by the watchdog"
+        if self._method.mode != "global":
+            stopped += '; try mode="global", or a min_dt'
         if values[hooks.REASON] == hooks.NAN:
-            self._fail(
-                Status.NOT_FINITE,
-                t if math.isfinite(t) else self._t,
-                f"IAS15's time or step was no longer finite after t = {self._t!r}.",
-            )
+            t = t if math.isfinite(t) else self._t
+            self._fail(Status.NOT_FINITE, t, f"IAS15's time or step was no longer finite after t = {t!r}.")
         elif values[hooks.REASON] == hooks.STANDS:
-            self._fail(
-                Status.STALLED,
-                t,
-                f"IAS15's step fell to {last:.1e} and time stood still at t = {t!r} for {hooks.FROZEN} steps; "
-                f'stopped by the watchdog (try mode="global" or a min_dt).',
-            )
+            still = f"time stood still at t = {t!r} for {hooks.FROZEN} steps"
+            self._fail(Status.STALLED, t, f"{fell} {still}; {stopped}.")
         else:
-            self._fail(
-                Status.STALLED,
-                t,
-                f"IAS15's step fell to {last:.1e} and {CRAWL_STEPS} steps got nowhere near t = {end!r}; stopped by "
-                f'the watchdog at t = {t!r} (try mode="global" or a min_dt).',
-            )
+            still = f"{CRAWL_STEPS} steps came no nearer to t = {end!r} than t = {t!r}"
+            self._fail(Status.STALLED, t, f"{fell} {still}; {stopped}.")
 
     def _towards(self, end: float) -> float:
         simulation = self._simulation
@@ -204,7 +194,7 @@ class IAS15Stepper(PeerStepper):
 
     def _one(self) -> tuple[float, Array] | None:
         simulation = self._simulation
-        self._block.aim(float(simulation.t), math.copysign(math.inf, simulation.dt), int(simulation.steps_done))
+        self._towards(math.copysign(math.inf, simulation.dt))
         with calls(self._stats):
             if not self._run(simulation.steps, 1, math.inf):
                 return None
@@ -215,4 +205,3 @@ class IAS15Stepper(PeerStepper):
 
     def _load(self, inner: bytes) -> None:
         self._use(self._program.rebound.Simulation(inner))
-

@@ -52,7 +52,8 @@ class ReboundMethod(MethodBase):
                 return "it needs positive masses, since the momentum of a massless body is 0."
         elif not system.separable:
             return (
-                "REBOUND integrates bodies with positions and velocities; it needs H = sum of c p^2/2 + V(q, t)."
+                "REBOUND moves bodies with positions and velocities, so it needs a separable Hamiltonian: "
+                "sum of c p^2/2 + V(q, t)."
             )
         return None
 
@@ -92,8 +93,9 @@ class ReboundProgram(PeerProgram):
         self.method, self.hooks = method, rebound_hooks
         self.watch, self.force = rebound_hooks.watchdog(), rebound_hooks.counter()
         if system.bodies is None:
+            known = rebound_hooks.forces.cache_info().hits
             self.force = rebound_hooks.forces(emit.numba(system, "force"), system.dim // 2, system.n_par)
-            self.from_cache = False
+            self.from_cache = rebound_hooks.forces.cache_info().hits > known
         self.compile_seconds = perf_counter() - started
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
@@ -139,7 +141,7 @@ class ReboundProgram(PeerProgram):
         from problems import emit
 
         simulation = self.simulation(layout, t, y)
-        simulation.integrator = "leapfrog"
+        choose(simulation, "leapfrog")
         simulation.dt = 0.0
         simulation.steps(1)
         dof = self.system.dim // 2
@@ -209,6 +211,12 @@ class Layout:
         return 3 * self.place[i // self.width] + i % self.width
 
 
+def choose(simulation: Any, integrator: str) -> Any:
+    """Choose REBOUND's integrator and return its options, which are REBOUND's defaults then."""
+    simulation.integrator = integrator
+    return simulation.integrator
+
+
 @contextmanager
 def calls(stats: Stats) -> Iterator[None]:
     """Call REBOUND: keep its warnings with the statistics, and give Python its Ctrl-C back.
@@ -239,4 +247,3 @@ def _parameter(system: System, par: Array, name: str) -> Array:
             return par[offset : offset + size]
         offset += size
     raise InputError(f"{system.name} has no parameter {name!r}, which its bodies refer to.")
-

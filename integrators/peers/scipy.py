@@ -241,12 +241,12 @@ class SciPyStepper(PeerStepper):
     def _step(self, watch: "Crawl") -> bool:
         """Take one own step; return whether it succeeded."""
         solver, stats = self._solver, self._stats
-        before, jacobians, factorizations = float(solver.t), solver.njev, solver.nlu
+        before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
         with np.errstate(all="ignore"):
             message = solver.step()
-        for name, count in (("jacobians", solver.njev - jacobians), ("factorizations", solver.nlu - factorizations)):
-            if count:
-                stats.extra[name] = stats.extra.get(name, 0) + count
+        for name, made in (("jacobians", solver.njev - jacobians), ("factorizations", solver.nlu - factored)):
+            if made:
+                stats.extra[name] = stats.extra.get(name, 0) + made
         if solver.status == "failed":
             self._fail(Status.STEP_UNDERFLOW, before, f"SciPy gave up at t = {before!r}: {message}")
             return False

@@ -50,9 +50,7 @@ class PeerProgram:
     def __init__(self, system: System):
         self.system = system
 
-    def arguments(
-        self, y0: ArrayLike, par: ArrayLike | None, t0: float
-    ) -> tuple[Array, Array, float]:
+    def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
         """Return copies of a start's arguments, checked.
 
         Raises
@@ -223,7 +221,7 @@ class FixedStepper(PeerStepper):
         return self._t0 + self._n * self._h
 
     def _towards(self, end: float) -> None:
-        """Turn round where ``end`` lies on the other side of the present: steps are counted from here then."""
+        """Turn round where ``end`` lies on the other side of the present: steps count from here then."""
         if (end - self._t) * self._h < 0.0:
             self._t0, self._n, self._h = self._t, 0, -self._h
             self._restart(self._t, self._y, self._h)
@@ -249,7 +247,7 @@ class FixedStepper(PeerStepper):
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         self._towards(end)
         last = int(plan(np.array([end]), np.array([self._t0]), self._h)[0][0])
-        times = self._t0 + np.arange(self._n + 1, last + 1) * self._h
+        times: Array = self._t0 + self._h * np.arange(self._n + 1, last + 1, dtype=np.float64)
         states = np.empty((times.size, self._y.size))
         for i in range(times.size):
             self._go(self._n + 1)
