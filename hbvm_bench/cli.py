@@ -14,6 +14,7 @@ from hbvm_bench import listing, runner, supervise, terminal
 from hbvm_bench.campaign import Campaign, Grid, MethodEntry, load
 from hbvm_bench.identity import Resolved, make_method, make_problem
 from hbvm_bench.metrics import find
+from hbvm_bench.race.command import race
 from hbvm_bench.records import Record
 from hbvm_bench.store import Index, Store, ensure_writable
 from problems.errors import InputError
@@ -273,6 +274,8 @@ def _write_report(store: Store, directory: Path) -> None:
     for path in write_report(store, directory):
         print(path)
 
+
+app.command()(race)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -15,6 +15,10 @@ from problems.errors import InputError
 
 SCHEMA = 1
 
+# The accuracy at which times are compared first.
+ENERGY = 1e-13
+POSITION = 1e-10
+
 
 class Goal(msgspec.Struct, frozen=True, kw_only=True):
     """A ratio that the project set itself, declared before it was measured.
@@ -32,8 +36,8 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True):
 
     family: str
     ratio: float
-    energy: float
-    position: float | None
+    energy: float = ENERGY
+    position: float | None = POSITION
 
 
 class Contest(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,11 +49,8 @@ class Contest(msgspec.Struct, frozen=True, kw_only=True):
         A file name; a line for readers.
     problem : str
         As `hbvm_bench.spec` reads it; its ``t_end`` is the span.
-    short : float
-        The span of ``--quick``.
-    energy, position : float or None
-        The errors at which times are compared first; ``None`` where the problem is
-        run without a target.
+    energy, position : float
+        The errors at which times are compared first.
     goals : tuple of Goal
         What the project set itself.
     note : str
@@ -59,9 +60,8 @@ class Contest(msgspec.Struct, frozen=True, kw_only=True):
     key: str
     title: str
     problem: str
-    short: float
-    energy: float | None = None
-    position: float | None = None
+    energy: float = ENERGY
+    position: float = POSITION
     goals: tuple[Goal, ...] = ()
     note: str = ""
 
@@ -296,5 +296,7 @@ def load(directory: Path, order: list[str]) -> list[Race]:
             raise InputError(f"{str(path)!r} was written by another version; run the race again.")
         found.append(race)
     if not found:
-        raise InputError(f"there is no result of a race in {str(directory)!r}; run: hbvm-bench race --out DIR.")
+        raise InputError(
+            f"there is no result of a race in {str(directory)!r}; run: hbvm-bench race --out DIR."
+        )
     return found

@@ -42,7 +42,7 @@ class Verdict:
 
 
 def best(race: Race, family: str, energy: float, position: float) -> Outcome | None:
-    """Return the fastest setting of a family with errors at most these, by its median; ``None`` if none is."""
+    """Return the fastest setting of a family with errors at most these; ``None`` if there is none."""
     able = [
         o
         for o in race.outcomes
@@ -58,7 +58,9 @@ def best(race: Race, family: str, energy: float, position: float) -> Outcome | N
 
 def default(race: Race, family: str) -> Outcome | None:
     """Return the outcome of a family's own defaults, where they may be compared."""
-    return next((o for o in race.outcomes if o.setting.family == family and o.setting.default and o.counts), None)
+    return next(
+        (o for o in race.outcomes if o.setting.family == family and o.setting.default and o.counts), None
+    )
 
 
 def ratio(ours: Outcome | None, theirs: Outcome | None) -> Ratio:

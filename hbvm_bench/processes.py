@@ -1,0 +1,38 @@
+"""A child process that measures: told by Ctrl-C through its parent, and never left behind."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from hbvm_bench import machine
+from hbvm_bench.worker import ENVIRONMENT
+
+
+def wait(command: Sequence[str]) -> int:
+    """Run a command with one thread for every library, and return its exit code.
+
+    What it prints goes where ours goes. On Ctrl-C, or whatever else ends the waiting, it
+    is killed first.
+    """
+    child = subprocess.Popen(
+        list(command), stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env={**os.environ, **ENVIRONMENT}
+    )
+    try:
+        return child.wait()
+    finally:
+        child.kill()
+        child.wait()
+
+
+def settle() -> None:
+    """Make this process a child that measures: deaf to Ctrl-C, gone with its parent, on one core."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+    cores = machine.cores()
+    if len(cores) > 1:
+        os.sched_setaffinity(0, {cores[-1]})
