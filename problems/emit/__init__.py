@@ -11,10 +11,10 @@ import numpy as np
 
 from problems.emit import cache
 from problems.emit.array import jax_text, numpy_text
-from problems.emit.plan import SMALL, Plan, make_plan
+from problems.emit.plan import SMALL, make_plan
 from problems.emit.scalar import numba_text
 from problems.emit.symbolic import heyoka_text
-from problems.errors import InputError, MissingLibraryError, unknown
+from problems.errors import MissingLibraryError, unknown
 from problems.hamiltonian import System
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
@@ -53,7 +53,8 @@ _compiled: dict[tuple[str, str], Any] = {}
 
 def function_name(system: System, what: str) -> str:
     """Return the name of an emitted function."""
-    return re.sub(r"\W+", "_", f"{system.name}_{what}")
+    name = re.sub(r"\W+", "_", f"{system.name}_{what}")
+    return name if name.isidentifier() else f"_{name}"
 
 
 def source(system: System, what: str, backend: str, *, limit: int | None = SMALL) -> Source:
@@ -67,7 +68,7 @@ def source(system: System, what: str, backend: str, *, limit: int | None = SMALL
         ``"field"`` (dim outputs: q' then p'), ``"force"`` (dof outputs -dH/dq from
         positions alone; separable systems), ``"velocity_scale"`` (dof outputs c
         with q'_i = c_i p_i; separable systems), ``"hamiltonian"``,
-        ``"invariant:<name>"``, ``"guard:<name>"``.
+        ``"invariant:<name>"``, ``"guard:<name>"``, ``"domain"``.
     backend : {"numpy", "numba", "jax", "heyoka"}
         numba: ``def name(t, y, par, out)`` on scalars, with the functions of
         `math` as globals; works unchanged on lanes. numpy: the same signature
@@ -101,13 +102,13 @@ def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
     return namespace[made.name]
 
 
-def numpy(system: System, what: str) -> Callable[..., np.ndarray]:
+def numpy(system: System, what: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
 
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
-    the like give inf and nan, in silence, as in compiled code.
+    the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
-    made = source(system, what, "numpy")
+    made = source(system, what, "numpy", limit=limit)
     key = ("numpy", made.sha256)
     if key not in _compiled:
         inner = _executed(made, {"np": np})
@@ -128,12 +129,13 @@ def numpy(system: System, what: str) -> Callable[..., np.ndarray]:
     return _compiled[key]
 
 
-def numba(system: System, what: str) -> Any:
+def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
-    No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not overlap.
+    No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
+    overlap. ``limit`` as in `source`.
     """
-    made = source(system, what, "numba")
+    made = source(system, what, "numba", limit=limit)
     key = ("numba", made.sha256)
     if key not in _compiled:
         cut = made.text.index(f"def {made.name}(")
@@ -143,8 +145,10 @@ def numba(system: System, what: str) -> Any:
     return _compiled[key]
 
 
-def jax(system: System, what: str) -> Callable[..., Any]:
+def jax(system: System, what: str, *, limit: int | None = SMALL) -> Callable[..., Any]:
     """Return ``f(t, y, par)`` on JAX arrays; y is (dim,); switches JAX to double precision.
+
+    ``limit`` as in `source`.
 
     Raises
     ------
@@ -157,7 +161,7 @@ def jax(system: System, what: str) -> Callable[..., Any]:
     except ImportError as error:
         raise _missing("jax") from error
     library.config.update("jax_enable_x64", True)
-    made = source(system, what, "jax")
+    made = source(system, what, "jax", limit=limit)
     key = ("jax", made.sha256)
     if key not in _compiled:
         _compiled[key] = _executed(made, {"np": np, "jnp": jnp})
@@ -200,8 +204,7 @@ def _missing(library: str) -> MissingLibraryError:
 
 __all__ = [
     "BACKENDS",
-    "InputError",
-    "Plan",
+    "SMALL",
     "Source",
     "function_name",
     "heyoka",
