@@ -30,6 +30,14 @@ ULPS = 4.0
 """An adaptive step of fewer ulp of the time than these has underflowed."""
 
 
+FIRST_STEP = 0.01
+"""The first step that `diffeqsolve` takes where it is left to choose: in diffrax 0.7 always this,
+because the choice by the field asks for an `ODETerm` and is given a wrapped one."""
+
+SHORTENED = 1e-6
+"""A step shorter than wanted by this part was shortened, and not only rounded."""
+
+
 class Multiples(dx.AbstractStepSizeController):
     """Steps from ``base + n h`` to ``base + (n + 1) h``, the products formed anew from the integer n."""
 
@@ -99,16 +107,17 @@ class Resuming(dx.AbstractStepSizeController):
         keep, next_t0, next_t1, jump, inner, result = self.inner.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, inner
         )
-        dt = next_t1 - next_t0
         # diffeqsolve shortened this step to its end; it was as good as the one wanted.
-        dt = jnp.where(keep & (t1 - t0 < wanted), jnp.maximum(dt, wanted), dt)
+        shortened = keep & (t1 - t0 < (1.0 - SHORTENED) * wanted)
+        next_t1 = jnp.where(shortened, jnp.maximum(next_t1, next_t0 + wanted), next_t1)
+        dt = next_t1 - next_t0
         accepted = accepted + jnp.where(keep, 1, 0)
         underflow = dt <= ULPS * jnp.finfo(dt.dtype).eps * jnp.abs(next_t0)
         result = dx.RESULTS.where(underflow, dx.RESULTS.dt_min_reached, result)
         # A result of "event occurred" ends the solve without being a failure.
         ended = (accepted >= self.limit) & (result == dx.RESULTS.successful)
         result = dx.RESULTS.where(ended, dx.RESULTS.event_occurred, result)
-        return keep, next_t0, next_t0 + dt, jump, (inner, dt, accepted), result
+        return keep, next_t0, next_t1, jump, (inner, dt, accepted), result
 
 
 @dataclass
@@ -250,8 +259,8 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
     def begin(tau: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
         control = controller(1, rtol, atol)
         order = solver.error_order(terms)
-        end, state = control.init(terms, tau, tau + 1.0, y, None, par, solver.func, order)
-        return solver.init(terms, tau, end, y, par), jax.tree.map(jnp.asarray, state), end - tau
+        end, state = control.init(terms, tau, tau + 1.0, y, FIRST_STEP, par, solver.func, order)
+        return solver.init(terms, tau, end, y, par), jax.tree.map(jnp.asarray, state), jnp.asarray(FIRST_STEP)
 
     def run(tau: Any, end: Any, dt: Any, y: Any, state: Any, control: Any, limit: Any, *rest: Any) -> Any:
         par, rtol, atol = rest

@@ -96,7 +96,14 @@ class IAS15(ReboundMethod):
     def caveat(self, problem: Problem) -> str | None:
         """Say where the step criterion goes by particles that the problem does not have."""
         dof = problem.system.dim // 2
-        if problem.system.bodies is None and dof > 3 and self.mode != "global":
+        if problem.system.bodies is not None or self.mode == "global":
+            return None
+        if self.mode == "prs23" and dof % 3 == 1:
+            return (
+                "the last coordinate is a particle on a straight line, and the step criterion 'prs23' "
+                "collapses where its acceleration passes through zero."
+            )
+        if dof > 3:
             return (
                 f"the {dof} coordinates are grouped by three into particles, and the step criterion "
                 f"{self.mode!r} depends on that grouping."

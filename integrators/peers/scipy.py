@@ -179,7 +179,7 @@ class SciPyStepper(PeerStepper):
         self._program, self._par = program, par
         self._stats.evaluations = 0
         self._stats.extra["side_evaluations"] = 0
-        self._solver = self._make(self._evaluate, t, y, math.inf)
+        self._solver = self._begin(t, y, 1.0)
 
     def _evaluate(self, t: float, y: Array) -> Array:
         # SciPy's own count, nfev, leaves out the evaluations of its finite differences.
@@ -201,6 +201,15 @@ class SciPyStepper(PeerStepper):
         method = self._program.method
         with np.errstate(all="ignore"):
             return self._program.solver(fun, t, y, end, rtol=method.rtol, atol=method.atol, first_step=first)
+
+    def _begin(self, t: float, y: Array, sign: float) -> Any:
+        solver = self._make(self._evaluate, t, y, sign * math.inf)
+        self._note("jacobians", solver.njev)
+        return solver
+
+    def _note(self, name: str, count: int) -> None:
+        if count:
+            self._stats.extra[name] = self._stats.extra.get(name, 0) + count
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
@@ -235,7 +244,7 @@ class SciPyStepper(PeerStepper):
         """Return the sign of the direction to ``end``, with a solver that goes that way."""
         sign = 1.0 if end > self._t else -1.0
         if self._solver.direction != sign:
-            self._solver = self._make(self._evaluate, self._t, self._y, sign * math.inf)
+            self._solver = self._begin(self._t, self._y, sign)
         return sign
 
     def _step(self, watch: "Crawl") -> bool:
@@ -244,9 +253,8 @@ class SciPyStepper(PeerStepper):
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
         with np.errstate(all="ignore"):
             message = solver.step()
-        for name, made in (("jacobians", solver.njev - jacobians), ("factorizations", solver.nlu - factored)):
-            if made:
-                stats.extra[name] = stats.extra.get(name, 0) + made
+        self._note("jacobians", solver.njev - jacobians)
+        self._note("factorizations", solver.nlu - factored)
         if solver.status == "failed":
             self._fail(Status.STEP_UNDERFLOW, before, f"SciPy gave up at t = {before!r}: {message}")
             return False

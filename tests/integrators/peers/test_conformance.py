@@ -1,0 +1,32 @@
+import pytest
+
+import integrators.testing as testing
+from integrators.peers.diffrax import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.heyoka import Taylor
+from integrators.peers.rebound import IAS15, Leapfrog, WHFast
+from integrators.peers.scipy import DOP853, Radau
+
+CASES = [
+    (Taylor(), testing.two_bodies),
+    (Taylor(tol=1e-12, high_accuracy=True, compact_mode=True), testing.pendulum),
+    (IAS15(), testing.two_bodies),
+    (IAS15(mode="global", h=0.01), testing.pendulum),
+    (WHFast(h=0.05), testing.two_bodies),
+    (WHFast(h=0.05, corrector=17, kernel="lazy"), testing.two_bodies),
+    (WHFast(h=0.05, coordinates="whds", body_order=(1, 0)), testing.two_bodies),
+    (Leapfrog(h=0.02, order=8), testing.two_bodies),
+    (Leapfrog(h=0.02, order=4), testing.pendulum),
+    (SemiImplicitEuler(h=0.001), testing.two_bodies),
+    (LeapfrogMidpoint(h=0.01), testing.pendulum),
+    (ReversibleHeun(h=0.01), testing.pendulum),
+    (Dopri8(h=0.05), testing.pendulum),
+    (Dopri8(rtol=1e-9, atol=1e-11), testing.pendulum),
+    (DOP853(rtol=1e-9, atol=1e-12), testing.two_bodies),
+    (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),
+]
+
+
+@pytest.mark.parametrize("check", testing.CHECKS, ids=testing.name_of)
+@pytest.mark.parametrize(("method", "problem"), CASES, ids=[repr(method) for method, _ in CASES])
+def test_conforms(method, problem, check):
+    check(method, problem())

@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+
+import integrators.testing as testing
+from integrators import Status, integrate
+from integrators.peers.heyoka import COLD, EPS, Taylor
+from problems import Problem, VectorField
+
+
+def test_the_default_tolerance_is_the_library_s_own_and_is_not_printed():
+    import heyoka
+
+    x, v = heyoka.make_vars("x", "v")
+    assert heyoka.taylor_adaptive([(x, v), (v, -x)], [1.0, 0.0]).tol == EPS == Taylor().tol
+    assert repr(Taylor()) == "Taylor()"
+
+
+def test_the_options_reach_the_library():
+    program = Taylor(tol=1e-9, high_accuracy=True, compact_mode=True, fast_math=True).compile(
+        testing.pendulum().system
+    )
+    ta = program.template
+    assert (ta.tol, ta.high_accuracy, ta.compact_mode) == (1e-9, True, True)
+    assert all(state.fast_math for state in np.atleast_1d(ta.llvm_state))
+    plain = Taylor().compile(testing.pendulum().system).template
+    assert (plain.high_accuracy, plain.compact_mode) == (False, False)
+    assert not any(state.fast_math for state in np.atleast_1d(plain.llvm_state))
+
+
+def test_samples_leave_the_steps_alone_bit_for_bit():
+    problem = testing.two_bodies()
+    program = Taylor().compile(problem.system)
+    alone, sampled = (program.start(problem.y0, problem.par) for _ in range(2))
+    few = alone.advance([300.0])
+    many = sampled.advance(np.sort(np.append(np.linspace(0.01, 299.0, 700), 300.0)))
+    assert np.array_equal(few.y[-1], many.y[-1])
+    assert alone.stats.steps == sampled.stats.steps > 500
+    steps = program.start(problem.y0, problem.par).advance([300.0], sample="steps")
+    assert alone.stats.steps - 1 <= steps.t.size <= alone.stats.steps
+
+
+def test_a_sample_is_what_a_partial_step_gives():
+    problem = testing.pendulum()
+    stepper = Taylor().compile(problem.system).start(problem.y0, problem.par)
+    ta = stepper.checkpoint().inner[0]
+    sample = stepper.advance([0.05]).y[0]
+    ta.step(max_delta_t=0.05)
+    assert ta.time == 0.05
+    assert np.max(np.abs(sample - ta.state)) <= 2.3e-16  # 0
+
+
+def test_landing_and_side_agree_and_landing_takes_more_steps():
+    problem = testing.two_bodies()
+    grid = np.linspace(0.0, 15.0, 301)
+    side, land = (integrate(problem, Taylor(), grid, sample=how) for how in ("side", "land"))
+    assert np.max(np.abs(side.y - land.y)) < 1e-12  # 4e-14
+    assert land.stats.steps > side.stats.steps
+
+
+def test_time_runs_backwards_from_ahead_of_the_last_sample():
+    problem = testing.two_bodies()
+    stepper = Taylor().compile(problem.system).start(problem.y0, problem.par)
+    stepper.advance([7.3])
+    back = stepper.advance([5.0, 0.0])
+    assert back.status is Status.FINISHED
+    assert np.max(np.abs(back.y[-1] - problem.y0)) < 1e-12  # 2e-14
+
+
+def test_time_dependent_fields_start_at_their_time():
+    problem = Problem(VectorField(lambda t, y, m: [m.cos(t)], dim=1), y0=[np.sin(2.0)], t0=2.0, t_end=9.0)
+    solution = integrate(problem, Taylor(), [3.0, 9.0])
+    assert np.max(np.abs(solution.y[:, 0] - np.sin([3.0, 9.0]))) < 1e-14  # 4e-16
+
+
+def test_a_pole_is_reported_where_it_is():
+    solution = integrate(testing.blow_up(), Taylor(), np.linspace(0.0, 2.0, 41))
+    assert solution.status is Status.NOT_FINITE
+    assert solution.t_stop == pytest.approx(1.0, abs=1e-10)
+    assert solution.t.size == 20
+
+
+def test_a_cold_compilation_uses_no_cache(monkeypatch):
+    system = testing.pendulum().system
+    Taylor().compile(system)
+    assert Taylor().compile(system).from_cache is True
+    monkeypatch.setenv(COLD, "1")
+    cold = Taylor().compile(system)
+    assert cold.from_cache is False
+    assert cold.compile_seconds > 0.005  # 0.06; from memory 0.003
+    monkeypatch.setenv(COLD, "0")
+    assert Taylor().compile(system).from_cache is True
