@@ -48,7 +48,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             return np.asarray(problem.times, dtype=np.float64)
         if self.step is None:
             count = self.count or 1000
-            return problem.t0 + span * (np.arange(count + 1) / count)
+            return problem.t0 + span * np.arange(count + 1) / count
         whole = round(abs(span) / self.step)
         if whole > 10_000_000:
             raise InputError(f"a grid step of {self.step!r} gives {whole} samples; make it larger.")

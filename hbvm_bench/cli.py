@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +15,6 @@ from hbvm_bench import listing, runner, supervise, terminal
 from hbvm_bench.campaign import Campaign, Grid, MethodEntry, load
 from hbvm_bench.identity import Resolved, make_method, make_problem
 from hbvm_bench.metrics import find
-from hbvm_bench.race.command import race
 from hbvm_bench.records import Record
 from hbvm_bench.store import Index, Store, ensure_writable
 from problems.errors import InputError
@@ -38,8 +38,16 @@ MethodOption = Annotated[
 ]
 
 
+# Commands with an implementation of their own; each is imported only when it is asked for.
+SEPARATE = {
+    "race": "hbvm_bench.race.command",
+    "endure": "hbvm_bench.endure.command",
+}
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 2 for input errors, 130 for Ctrl-C."""
+    _attach(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(arguments, prog_name="hbvm-bench", standalone_mode=False)
     except InputError as error:
@@ -48,10 +56,21 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error.format_message())
     except typer.Abort:
         return 130
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader has gone, as in `hbvm-bench list | head`
+    except SystemExit:  # typer's answer to a reader that has gone, as in `hbvm-bench list | head`
         return 0
     return code if isinstance(code, int) else 0
+
+
+def _attach(arguments: list[str]) -> None:
+    present = {
+        command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands
+    }
+    asked = next((word for word in arguments if not word.startswith("-")), None)
+    if asked in present:
+        return
+    # all of them for --help, and for the suggestions where there is no such command
+    for name in [asked] if asked in SEPARATE else sorted(SEPARATE.keys() - present):
+        app.command(name)(getattr(import_module(SEPARATE[name]), name))
 
 
 def _fail(sentence: str) -> int:
@@ -269,13 +288,11 @@ def _print_results(records: list[Record], keys: list[str] | None, sort: str | No
 
 
 def _write_report(store: Store, directory: Path) -> None:
-    from hbvm_bench.report import write_report
+    from hbvm_bench.report.write import write_report
 
     for path in write_report(store, directory):
         print(path)
 
-
-app.command()(race)
 
 if __name__ == "__main__":
     sys.exit(main())

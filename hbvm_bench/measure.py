@@ -169,7 +169,7 @@ def largest_distance(problem: Problem, q: Array) -> Array:
     bodies = getattr(problem.system, "bodies", None)
     width = q.shape[1] if bodies is None else bodies.dimension
     # scaled by hand: squares of 1e200 overflow, and such positions do occur
-    groups = np.abs(q.reshape(len(q), -1, width))
+    groups = np.abs(q.reshape(len(q), q.shape[1] // width, width))
     scale = groups.max(axis=2, initial=0.0)
     safe = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
     return (safe * np.sqrt(((groups / safe[:, :, None]) ** 2).sum(axis=2))).max(axis=1)

@@ -1,13 +1,14 @@
 """The one table of metrics: the command line, the reports and the documents read only this."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hbvm_bench import quantities
 from hbvm_bench.measure import Measured
+from hbvm_bench.quantities import Quantity
 from hbvm_bench.records import Value
 from problems.errors import unknown
 
@@ -50,7 +51,7 @@ class Metric:
     unit: str
     better: Literal["lower"] | None
     scale: Literal["log", "linear"]
-    function: Callable[[Measured], float | str]
+    function: Quantity
     description: str
     same_trajectory: bool = False
     whole_span: bool = True
@@ -102,97 +103,6 @@ def _value(metric: Metric, measured: Measured) -> Value:
     return Value(value=float(number))
 
 
-def _largest(values: NDArray[np.float64], t: NDArray[np.float64]) -> float | str:
-    if values.size == 0:
-        return "no samples"
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        return f"not finite from t = {t[bad[0]]:.4g}"
-    return float(np.max(np.abs(values)))
-
-
-def _error_max(name: str) -> Callable[[Measured], float | str]:
-    def largest(m: Measured) -> float | str:
-        if name not in m.errors:
-            return f"the problem declares no {name.replace('_', ' ')}"
-        return _largest(m.errors[name], m.t)
-
-    return largest
-
-
-def _energy_end(m: Measured) -> float | str:
-    if "energy" not in m.errors:
-        return "the problem declares no energy"
-    return float(m.errors["energy"][-1]) if m.t.size else "no samples"
-
-
-def _guard_max(m: Measured) -> float | str:
-    if not m.guards:
-        return "the problem declares no symmetry guard"
-    if not m.t.size:
-        return "no samples"
-    return max(float(np.max(np.abs(values))) for values in m.guards.values())
-
-
-def _distance_max(m: Measured) -> float | str:
-    return _largest(m.distance, m.t)
-
-
-def _no_reference(m: Measured) -> str:
-    return "" if m.reference is not None else "no stored reference for this problem"
-
-
-def _position_end(m: Measured) -> float | str:
-    if why := _no_reference(m):
-        return why
-    if not m.complete:
-        return f"ended at t = {m.t_stop:.4g}"
-    if m.position_t.size == 0 or m.position_t[-1] != m.t[-1]:
-        return "the reference does not reach the end time"
-    return float(m.position[-1])
-
-
-def _position_max(m: Measured) -> float | str:
-    return _no_reference(m) or _largest(m.position, m.position_t)
-
-
-def _axis_end(m: Measured) -> float | str:
-    if not m.complete:
-        return f"ended at t = {m.t_stop:.4g}"
-    return float(m.y[-1, 8])
-
-
-def _axis_error(m: Measured) -> float | str:
-    if why := _no_reference(m):
-        return why
-    if not m.complete or m.reference is None:
-        return f"ended at t = {m.t_stop:.4g}"
-    if m.reference.t[-1] != m.t[-1]:
-        return "the reference does not reach the end time"
-    return abs(float((m.y[-1, 8] - m.reference.high[-1, 8]) - m.reference.low[-1, 8]))
-
-
-def _counter(name: str, words: str) -> Callable[[Measured], float | str]:
-    def count(m: Measured) -> float | str:
-        number = getattr(m.counters, name)
-        return f"not applicable: the library counts no {words}" if number is None else float(number)
-
-    return count
-
-
-def _warm_seconds(m: Measured) -> float | str:
-    if m.timing is None:
-        return "not timed"
-    return m.timing.summary.get("median", m.timing.why or "not timed")
-
-
-def _compile_seconds(m: Measured) -> float | str:
-    compile_ = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
-    if compile_ is None or compile_.cached is None:
-        return "nothing is compiled at run time"
-    return compile_.seconds
-
-
 _TABLE = [
     Metric(
         key="energy_max",
@@ -201,7 +111,7 @@ _TABLE = [
         unit="relative",
         better="lower",
         scale="log",
-        function=_error_max("energy"),
+        function=quantities.error_max("energy"),
         description="Largest relative error of the energy over all samples, evaluated in double-double.",
     ),
     Metric(
@@ -211,7 +121,7 @@ _TABLE = [
         unit="relative",
         better="lower",
         scale="log",
-        function=_energy_end,
+        function=quantities.energy_end,
         description="Relative error of the energy at the last sample.",
     ),
     Metric(
@@ -221,7 +131,7 @@ _TABLE = [
         unit="relative",
         better="lower",
         scale="log",
-        function=_error_max("angular_momentum"),
+        function=quantities.error_max("angular_momentum"),
         description="Largest 2-norm of the error of the angular momentum vector, relative to its length.",
     ),
     Metric(
@@ -231,7 +141,7 @@ _TABLE = [
         unit="length",
         better="lower",
         scale="log",
-        function=_guard_max,
+        function=quantities.guard_max,
         description="Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the "
         "planetoid's distance from the axis). Where it is not 0 the run follows another trajectory.",
     ),
@@ -242,7 +152,7 @@ _TABLE = [
         unit="length",
         better="lower",
         scale="log",
-        function=_position_end,
+        function=quantities.position_end,
         description="Largest distance of a body from where the 128-bit reference has it at the end time.",
         same_trajectory=True,
     ),
@@ -253,7 +163,7 @@ _TABLE = [
         unit="length",
         better="lower",
         scale="log",
-        function=_position_max,
+        function=quantities.position_max,
         description="The same, the largest over the times of the stored reference.",
         same_trajectory=True,
     ),
@@ -264,7 +174,7 @@ _TABLE = [
         unit="length",
         better=None,
         scale="linear",
-        function=_axis_end,
+        function=quantities.axis_end,
         description="Where the planetoid is on the axis at the end time.",
         same_trajectory=True,
         problem="sitnikov",
@@ -276,7 +186,7 @@ _TABLE = [
         unit="length",
         better="lower",
         scale="log",
-        function=_axis_error,
+        function=quantities.axis_error,
         description="Distance of z at the end time from the stored 128-bit reference.",
         same_trajectory=True,
         problem="sitnikov",
@@ -288,7 +198,7 @@ _TABLE = [
         unit="length",
         better=None,
         scale="log",
-        function=_distance_max,
+        function=quantities.distance_max,
         description="Largest distance of a body from the origin: shows what escaped.",
     ),
     Metric(
@@ -298,8 +208,9 @@ _TABLE = [
         unit="",
         better=None,
         scale="log",
-        function=_counter("steps", "steps"),
+        function=quantities.counter("steps", "steps"),
         description="Accepted steps.",
+        same_trajectory=True,
     ),
     Metric(
         key="evaluations",
@@ -308,7 +219,7 @@ _TABLE = [
         unit="",
         better="lower",
         scale="log",
-        function=_counter("evaluations", "right-hand-side evaluations"),
+        function=quantities.counter("evaluations", "right-hand-side evaluations"),
         description="Evaluations of the vector field at one state; Taylor methods and maps have none.",
         same_trajectory=True,
     ),
@@ -319,7 +230,7 @@ _TABLE = [
         unit="s",
         better="lower",
         scale="log",
-        function=_warm_seconds,
+        function=quantities.warm_seconds,
         description="Median wall seconds of a whole integration without output, compiled before, alone.",
         same_trajectory=True,
     ),
@@ -330,7 +241,7 @@ _TABLE = [
         unit="s",
         better="lower",
         scale="log",
-        function=_compile_seconds,
+        function=quantities.compile_seconds,
         description="Seconds of compilation before the first step, from a cache where the library keeps one.",
         whole_span=False,
     ),

@@ -18,7 +18,7 @@ from hbvm_bench.metrics import TIMING_KEYS, evaluate
 from hbvm_bench.records import Outcome, Record, Result, Timing
 from hbvm_bench.store import Store
 from hbvm_bench.supervise import Ended
-from hbvm_bench.worker import ENVIRONMENT, Request, TimingReply
+from hbvm_bench.worker import ENVIRONMENT, STALE, Request, TimingReply
 from problems.errors import InputError
 
 T = TypeVar("T")
@@ -78,6 +78,8 @@ def run_case(case: Case, directory: str, limits: Limits) -> Record:
     ------
     InterruptedRunError
         If the run was stopped meanwhile; nothing is stored then.
+    problems.errors.InputError
+        If the sources changed meanwhile; nothing is stored then either.
     """
     resolved = resolve(case)
     store = Store(Path(directory))
@@ -85,6 +87,8 @@ def run_case(case: Case, directory: str, limits: Limits) -> Record:
         request = Request(case=resolved.case, id=resolved.id)
         ended = _start(Path(scratch), request, limits)
         result = _result(Path(scratch), ended, limits)
+        if result.reason == STALE:
+            raise InputError(STALE)
         series = _series(Path(scratch)) if result.outcome in ("ok", "stalled") else None
     record = Record(
         id=resolved.id,

@@ -90,7 +90,10 @@ class Store:
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
         """Return the series of a case by name; empty where it has none."""
         try:
-            with self._series_path(case_id).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            with (
+                self._series_path(case_id).open("rb") as stream,
+                np.load(stream, allow_pickle=False) as stored,
+            ):
                 return {name: stored[name] for name in stored.files}
         except (FileNotFoundError, ValueError, EOFError, zipfile.BadZipFile):
             return {}

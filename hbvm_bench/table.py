@@ -99,6 +99,12 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
 
 
+def numbers(records: Sequence[Record]) -> dict[str, int]:
+    """Return the number of every case by its id: that of its method, from 1 in the campaign's order."""
+    methods: dict[str, int] = {}
+    return {record.id: methods.setdefault(record.case.method, len(methods) + 1) for record in records}
+
+
 def group_of(record: Record) -> str:
     """Return the key in `GROUPS` of a case."""
     result = record.result

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hbvm_bench.records import Record
-from hbvm_bench.table import GROUPS, Row, columns, rows, seconds, status_of
+from hbvm_bench.table import GROUPS, Row, columns, numbers, rows, seconds, status_of
 
 PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded at 80
 
@@ -104,7 +104,7 @@ def _results(
     problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None
 ) -> RenderableType:
     shown = columns(records, keys)
-    numbers = {record.id: number for number, record in enumerate(records, 1)}
+    number_of = numbers(records)
     made = Table(title=Text(problem), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("#", justify="right")
     made.add_column("method", overflow="fold")
@@ -118,7 +118,7 @@ def _results(
                 made.add_section()
             group = row.group
             made.add_row("", Text(GROUPS[group], style="bold italic"))
-        number = str(numbers[row.record.id])
+        number = str(number_of[row.record.id])
         made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
         if row.remark:
             remarks.add_row(Text(number, justify="right"), Text(f"{row.record.case.method}: {row.remark}."))

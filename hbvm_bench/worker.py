@@ -30,6 +30,7 @@ from integrators.protocol import Status
 from problems.errors import InputError
 
 LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
+STALE = "the sources or versions changed while the run was under way; start it again."
 ENVIRONMENT = {
     # one thread each, whatever does the linear algebra
     "OMP_NUM_THREADS": "1",
@@ -132,9 +133,7 @@ def _time(request: Request, directory: Path) -> TimingReply:
 def _resolved(request: Request) -> Resolved:
     resolved = resolve(request.case)
     if resolved.id != request.id:
-        raise InputError(
-            "this process does not see the versions and sources that the runner saw; start the run again."
-        )
+        raise InputError(STALE)
     return resolved
 
 

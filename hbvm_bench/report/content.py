@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hbvm_bench import reference as references
 from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import METRICS, Metric
+from hbvm_bench.quantities import PLANETOID_Z
 from hbvm_bench.records import Record
 from hbvm_bench.reference import Reference
 from hbvm_bench.report import figures, views, words
@@ -244,12 +245,22 @@ def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
 def _truth(problem: Problem, known: Reference | None) -> list[tuple[str, str]]:
     if known is None:
         return []
-    values = [("position at the end", "stored reference, 128-bit arithmetic")]
-    values += [
-        (key, value) for key, value in known.provenance.items() if key in ("method", "heyoka", "check")
-    ]
+    made = known.provenance
+    text = f"{made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"
+    floor = problem.errors(known.high, known.t)
+    least = ", ".join(
+        f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}"
+        for name in ("energy", "angular_momentum")
+        if name in floor
+    )
+    values = [("Reference", text)]
+    if least:
+        values.append(
+            ("Errors of the reference itself once rounded to doubles, the least a run can show", least)
+        )
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
-        values.insert(0, (f"z at t = {problem.t_end:g}", f"{known.high[-1, views.PLANETOID_Z]:.15g}"))
+        z = known.high[-1, PLANETOID_Z]
+        values.insert(0, (f"Reference value of z at t = {problem.t_end:g}", f"{z:.15g}"))
     return values
 
 

@@ -8,20 +8,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.style import INK, MUTED, Look, options, panels
+from hbvm_bench.report.style import INK, MUTED, Look, method_name, options, panels
 from hbvm_bench.table import group_of
 
 Array = NDArray[np.float64]
 
-BINS = 240  # an error series is drawn as its largest value in each of so many bins
-COLUMNS = 3
+BINS = 60  # an error series is drawn as its largest value in each of so many spans
+COLUMNS = 4
 # Inches: the panels of all figures over time have one size and stand under each other.
-WIDTH, LEFT, RIGHT, GAP = 10.4, 0.72, 0.12, 0.28
+WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
 TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
 
 
@@ -33,10 +34,11 @@ class Drawn:
     look: Look
     series: dict[str, Array]
 
-    @property
-    def legend(self) -> str:
+    def legend(self, *, named: bool) -> str:
+        """Return its number, its name if ``named``, its options, and a mark where it failed."""
         mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
-        return f"{self.look.number}  {options(self.record)}{mark}"
+        name = f"{method_name(self.record)}  " if named else ""
+        return f"{self.look.number}  {name}{options(self.record)}{mark}"
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
     for axes, members in grid:
         log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
         axes.grid(visible=False, axis="x")
+        ends = [case.series["t"][[0, -1]] for case in shown]
+        axes.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
         for case in members:
             _draw_error(axes, case, what)
         panel_legend(axes, members, markers=not what.joined)
@@ -111,8 +115,10 @@ def family_panels(
             axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, height / sum(heights)))
             axes.set_title(name, color=INK)
             axes.text(1.0, -0.2, "time", transform=axes.transAxes, ha="right", fontsize=8, color=MUTED)
+            axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
             if column == 0:
                 axes.set_ylabel(label)
+                axes.yaxis.set_label_coords(-0.72 / panel, 0.5)
             else:
                 axes.tick_params(labelleft=False)
             made.append((axes, members))
@@ -122,6 +128,7 @@ def family_panels(
 
 def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -> None:
     """Put the legend under its panel, where it covers no data."""
+    named = len({method_name(case.record) for case in cases}) > 1
     handles = [
         Line2D(
             [],
@@ -130,7 +137,7 @@ def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -
             dashes=case.look.dash or (None, None),
             marker=case.look.marker if markers else "",
             markersize=4,
-            label=case.legend,
+            label=case.legend(named=named),
         )
         for case in cases
     ]
@@ -210,7 +217,8 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
     if what.joined:
         t, values = envelope(t, values)
     elif not what.zero:  # the start is right by definition
-        t, values = t[values > 0], values[values > 0]
+        seen = values >= 10.0**what.low
+        t, values = t[seen], values[seen]
     bottom = 10.0**what.low
     clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
     drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped

@@ -1,14 +1,17 @@
 """The report as markdown, for a code forge."""
 
 import re
+from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hbvm_bench.report.content import Content, Section
 from hbvm_bench.table import Row
 
+if TYPE_CHECKING:  # so that the escapes below cost no plotting library
+    from hbvm_bench.report.content import Content, Section
 
-def markdown(content: Content) -> str:
+
+def markdown(content: "Content") -> str:
     """Return the report as markdown with relative links to its figures."""
     environment = Environment(
         loader=PackageLoader("hbvm_bench.report", "templates"),
@@ -38,7 +41,7 @@ def code(text: object) -> str:
     return f"{fence}{pad}{one_line}{pad}{fence}"
 
 
-def row_cells(section: Section, row: Row) -> list[str]:
+def row_cells(section: "Section", row: Row) -> list[str]:
     """Return the cells of a row, void ones in brackets."""
     cells = [row.cells.get(metric.key) for metric in section.columns]
     return ["–" if cell is None else f"({cell.text})" if cell.void else cell.text for cell in cells]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from hbvm_bench.records import Record
 from hbvm_bench.spec import parse_spec
+from hbvm_bench.table import numbers
 
 # Base colour of each method: light theme, dark theme.
 FAMILIES = {
@@ -83,7 +84,7 @@ def looks(records: Sequence[Record]) -> dict[str, Look]:
     """Return the look of every case by its id."""
     seen: dict[tuple[str, str], int] = {}
     taken: set[str] = set()
-    numbers: dict[str, int] = {}
+    number = numbers(records)
     made: dict[str, Look] = {}
     for record in records:
         name = method_name(record)
@@ -91,10 +92,9 @@ def looks(records: Sequence[Record]) -> dict[str, Look]:
         # settings of one colour are told apart by shade and dash, whatever their method's name
         index = seen.get((record.case.problem, light), 0)
         seen[record.case.problem, light] = index + 1
-        number = numbers.setdefault(record.case.method, len(numbers) + 1)
         shade = _unique(_shade(light, index, towards=0.0), taken)
         made[record.id] = Look(
-            number=number,
+            number=number[record.id],
             light=shade,
             dark=_shade(dark, index, towards=1.0),
             dash=DASHES[index % len(DASHES)],
@@ -116,9 +116,14 @@ def method_name(record: Record) -> str:
 
 
 def options(record: Record) -> str:
-    """Return the options of a case's method, as a legend needs them."""
-    text = record.case.method
-    return text[text.index("(") + 1 : -1] or "default"
+    """Return the options of a case's method as short as a legend needs them."""
+    words = []
+    for name, value in parse_spec(record.case.method).arguments.items():
+        if isinstance(value, bool):
+            words.append(name if value else f"no {name}")
+        else:
+            words.append(value if isinstance(value, str) else f"{name}={value}")
+    return ", ".join(words) or "default"
 
 
 def panels(records: Sequence[Record], most: int = 6) -> list[tuple[str, list[Record]]]:
@@ -144,9 +149,10 @@ def _shade(colour: str, index: int, *, towards: float) -> str:
         return colour
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
-    step = 0.13 * ((index + 1) // 2)
+    step = 0.11 * ((index + 1) // 2)
     lightness += step if (index % 2 == 1) == (towards == 0.0) else -step * 0.8
-    lightness = min(max(lightness, 0.16), 0.86)
+    low, high = (0.16, 0.46) if towards == 0.0 else (0.6, 0.9)  # what stands out from the paper
+    lightness = min(max(lightness, low), high)
     channels = colorsys.hls_to_rgb(hue, lightness, saturation)
     return "#" + "".join(f"{round(255 * channel):02x}" for channel in channels)
 

@@ -6,9 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from hbvm_bench.quantities import PLANETOID_Z
 from hbvm_bench.reference import Reference
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.figures import Drawn, family_panels, panel_legend
+from hbvm_bench.report.figures import WIDTH, Drawn, family_panels, panel_legend
 from hbvm_bench.report.style import INK, MUTED, TRUTH, options
 from hbvm_bench.table import status_of
 from problems.problem import Problem
@@ -18,7 +19,6 @@ View = Callable[[Problem, Sequence[Drawn], Reference | None], Picture | None]
 
 LAST = 100.0  # time units at the end that the picture of z shows
 REACH = 3.2  # of its vertical axis; the planetoid stays within 1.69
-PLANETOID_Z = 8  # component of y
 REVOLUTION = 21.46  # of the primaries
 
 
@@ -59,24 +59,25 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
 
 
 def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
-    """Draw the paths of the two primaries at the beginning and at the end, a square per case."""
+    """Draw the paths of the two primaries at the end over the true ones, a square per case."""
     del reference
     shown = [case for case in cases if case.series["t"].size > 2]
     if not shown:
         return None
-    columns = 7
+    best = min(shown, key=_position_error)
+    columns = 9
     rows = -(-len(shown) // columns)
-    figure = new(10.4, 1.78 * rows)
-    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / (1.78 * rows), bottom=0.2 / (1.78 * rows))
+    figure = new(WIDTH, 1.66 * rows)
+    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / (1.66 * rows), bottom=0.2 / (1.66 * rows))
     grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.32}).ravel().tolist()
     for axes in grid[len(shown) :]:
         axes.set_axis_off()
     for axes, case in zip(grid, shown, strict=False):
         t = case.series["t"]
-        first = t <= REVOLUTION
+        first = best.series["t"] <= REVOLUTION
         last = t >= t[-1] - 3 * REVOLUTION
         for body in (0, 1):
-            _path(axes, problem, case, first, body, color=TRUTH, linewidth=2.6)
+            _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
             _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
         axes.set_xlim(-3.4, 3.4)
         axes.set_ylim(-3.4, 3.4)
@@ -88,12 +89,12 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
             f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK
         )
         words = options(case.record)
-        axes.set_xlabel(words if len(words) < 31 else words[:29] + "…", fontsize=5.5, color=MUTED, labelpad=1)
+        axes.set_xlabel(words if len(words) < 32 else words[:30] + "…", fontsize=5.5, color=MUTED, labelpad=1)
     return picture(
         figure,
         "primaries",
         "The paths of the primaries in their plane",
-        "Grey: the first revolution, which is the right one for all times: the true orbits keep their place. "
+        f"Grey: the first revolution of case {best.look.number}; the true orbits keep their place. "
         "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
         "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
         "for the direction of the apsides, whatever its energy says.",
@@ -109,7 +110,7 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     ]
     if not shown:
         return None
-    figure = new(10.4, 3.2)
+    figure = new(WIDTH, 3.4)
     figure.subplots_adjust(left=0.07, right=0.98, top=0.97, bottom=0.15)
     left, right = figure.subplots(1, 2)
     low = 0
@@ -144,6 +145,11 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
 
 
 VIEWS: dict[str, tuple[View, ...]] = {"sitnikov": (axis_motion, primaries)}
+
+
+def _position_error(case: Drawn) -> float:
+    value = case.record.result.metrics.get("position_end")
+    return value.value if value is not None and value.counts and value.value is not None else np.inf
 
 
 def _path(

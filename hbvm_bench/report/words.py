@@ -100,7 +100,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
         if position is None or energy is None or position < 1e-2:
             continue
         parts = [
-            f"here {record.case.method} has the energy right to {energy:.1e} "
+            f"Here {record.case.method} has the energy right to {energy:.1e} "
             f"and a body {position:.2g} off at the end"
         ]
         z, angular = _value(record, "z_error"), _value(record, "angular_momentum_max")
@@ -108,9 +108,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
             parts.append(f"z wrong by {z:.2g}")
         if angular is not None:
             parts.append(f"the angular momentum off by {angular:.1e}")
-        if method_name(record) == "HBVM" and angular is not None and angular > 1e-6:
-            parts.append("which turns the orbits of the primaries in a way the true ones do not")
-        shown.append(", ".join(parts) + ".")
+        shown.append(", ".join(parts) + "; the paths below show what that does to the orbits.")
     return shown
 
 

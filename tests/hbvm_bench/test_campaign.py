@@ -123,10 +123,12 @@ def test_ours_are_ours():
 
 
 def test_a_case_that_hit_a_limit_runs_again_under_a_larger_one():
+    old = Limits(wall_seconds=10, memory_gib=1)
+    case = Case(problem="p", method="m")
+
     def record(outcome):
-        case = Case(problem="p", method="m")
-        return Record(id="0", case=case, role="peer", library="x", order=None,
-                      result=Result(outcome=outcome), limits=Limits(wall_seconds=10, memory_gib=1))  # fmt: skip
+        result = Result(outcome=outcome)
+        return Record(id="0", case=case, role="peer", library="x", order=None, result=result, limits=old)
 
     same, larger = Limits(wall_seconds=10, memory_gib=1), Limits(wall_seconds=20, memory_gib=2)
     assert not runner.is_done(None, same)
