@@ -268,13 +268,7 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, jobs: int | No
             if timing:
                 visits = runner.missing_visits(cases, store, campaign.timing)
                 live.phase("timing, one at a time", visits)
-                runner.time_cases(
-                    cases,
-                    store,
-                    campaign.timing,
-                    campaign.limits,
-                    lambda round_, case: live.now(f"round {round_ + 1}: {case.case.method}"),
-                )
+                runner.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
         except BaseException:
             supervise.stop_all()
             raise

@@ -126,9 +126,17 @@ class Store:
             raise InputError(f"{self.directory / INDEX} is not the index of a run: {error}.") from None
 
     def records(self) -> list[Record]:
-        """Return the records of the run that are there, in the order of the campaign."""
-        found = [self.load(case_id) for case_id in self.index().ids]
-        return [record for record in found if record is not None]
+        """Return the records of the run that are there, in the order of the campaign.
+
+        Labels and notes are the campaign's present ones: they are words, and no reason to run again.
+        """
+        index = self.index()
+        made: list[Record] = []
+        for case_id, case in zip(index.ids, index.campaign.cases(), strict=True):
+            if (record := self.load(case_id)) is not None:
+                words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
+                made.append(msgspec.structs.replace(record, case=words))
+        return made
 
     def _record_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.json"

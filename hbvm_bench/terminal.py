@@ -10,6 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 from rich.text import Text
 
+from hbvm_bench.identity import Resolved
 from hbvm_bench.records import Record
 from hbvm_bench.table import GROUPS, Row, columns, numbers, rows, seconds, status_of
 
@@ -41,6 +42,7 @@ class Live:
         self._task: TaskID | None = None
         self._total = total
         self._count = 0
+        self._round = -1
         self._start = time.monotonic()
 
     def __enter__(self) -> "Live":
@@ -68,11 +70,14 @@ class Live:
             + f" {escape(record.case.method)}  {mark}  [dim]{seconds(record.seconds)}[/]"
         )
 
-    def now(self, words: str) -> None:
-        """Say what is being done, and count it."""
+    def visit(self, round_: int, resolved: Resolved) -> None:
+        """Say which case is timed now, in which round from 0, and count it."""
         self._advance()
+        if round_ != self._round:
+            self._round = round_
+            self._console.print(f"  round {round_ + 1}")
         if self._task is not None:
-            self._bar.update(self._task, now=words)
+            self._bar.update(self._task, now=escape(resolved.case.method))
 
     def say(self, words: str) -> None:
         """Print a sentence."""

@@ -21,24 +21,28 @@ def markdown(content: "Content") -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"plain": plain, "code": code}
+    environment.filters |= {"plain": plain, "code": code, "one_line": one_line}
     environment.globals |= {"row_cells": row_cells}
     text = environment.get_template("report.md.j2").render(c=content)
     return re.sub(r"\n{3,}", "\n\n", text)
 
 
+def one_line(text: object) -> str:
+    """Return text without line breaks."""
+    return " ".join(str(text).split())
+
+
 def plain(text: object) -> str:
     """Make any text harmless inside a line or a table cell of markdown."""
-    one_line = " ".join(str(text).split())
-    return re.sub(r"([\\`*_{}\[\]<>#|~$])", r"\\\1", one_line)
+    return re.sub(r"([\\`*_{}\[\]<>#|~$])", r"\\\1", one_line(text))
 
 
 def code(text: object) -> str:
     """Return text as inline code that can stand in a table cell."""
-    one_line = " ".join(str(text).split()).replace("|", "\\|")
-    fence = "`" * (max((len(run) for run in re.findall("`+", one_line)), default=0) + 1)
-    pad = " " if "`" in one_line else ""
-    return f"{fence}{pad}{one_line}{pad}{fence}"
+    escaped = one_line(text).replace("|", "\\|")
+    fence = "`" * (max((len(run) for run in re.findall("`+", escaped)), default=0) + 1)
+    pad = " " if "`" in escaped else ""
+    return f"{fence}{pad}{escaped}{pad}{fence}"
 
 
 def row_cells(section: "Section", row: Row) -> list[str]:

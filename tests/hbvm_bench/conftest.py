@@ -38,7 +38,7 @@ def toy_path(tmp_path_factory):
 @pytest.fixture
 def toys(toy_path, monkeypatch):
     """Install the toy methods in this process and in its children."""
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(toy_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*toy_path, os.environ.get("PYTHONPATH", "")]))
     for folder in toy_path:
         monkeypatch.syspath_prepend(folder)
     integrators.registry._entries.cache_clear()
