@@ -99,9 +99,9 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
         B = [[0, -y3, y2], [y3, 0, -y1], [-y2, y1, 0]]
         H = sum_i y_i^2/(2 I_i) + quartic/4 sum_i y_i^4
 
-    with the moments of inertia I = (2, 1, 2/3), from (cos 1.1, 0, sin 1.1). With
-    ``quartic=0`` energy and Casimir are quadratic and every Gauss method keeps
-    both; otherwise only methods that keep the energy by design do.
+    with the moments of inertia I = (2, 1, 2/3), from (cos 1.1, 0, sin 1.1). Tests a
+    Casimir beside the energy: with ``quartic=0`` both are quadratic and every Gauss
+    method keeps them; otherwise only methods that keep the energy by design do.
 
     Parameters
     ----------

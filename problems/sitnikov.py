@@ -57,6 +57,9 @@ def sitnikov(
 ) -> Problem:
     """Return Sitnikov's problem as three bodies with G = 1.
 
+    Tests whether rounding keeps a symmetry on which everything depends, and steps
+    that must resolve the primaries' pericentres.
+
     Parameters
     ----------
     e : float
