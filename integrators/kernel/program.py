@@ -1,36 +1,73 @@
-"""HBVM(k, s) for one system and along one trajectory: `Program` and `Stepper` over the compiled steps."""
+"""HBVM(k, s) compiled for one system: a `Program` over the compiled kernel."""
 
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.grid import Counts, plan
-from integrators.kernel import fixed
-from integrators.legendre import tables
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
-from problems.errors import InputError, unknown
+from integrators.grid import Counts
+from integrators.kernel import engine, layout, tables
+from integrators.kernel import field as fields
+from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.workspace import Context, Shape
+from integrators.protocol import Array, check_state
+from problems import emit
+from problems.errors import InputError
 from problems.problem import System
 
-CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+TOLERANCE = 1e-16
 
 
 class HBVMProgram:
-    """HBVM(k, s) with step h, compiled for one system; satisfies `integrators.protocol.Program`."""
+    """HBVM(k, s) with step h, compiled for one system; satisfies `integrators.protocol.Program`.
 
-    def __init__(self, system: System, *, k: int, s: int, h: float):
+    Parameters
+    ----------
+    system : System
+        What to integrate.
+    k, s : int
+        Stages and degree, k >= s >= 1.
+    h : float
+        Length of a step, > 0.
+    form : {"first", "second"}, optional
+        Whether stages hold the whole state, or only positions (q'' = a(q), for
+        separable systems: half the unknowns, half the iterations). By default the
+        second-order form wherever the system has one.
+    """
+
+    def __init__(self, system: System, *, k: int, s: int, h: float, form: str | None = None):
         started = perf_counter()
         self.system = system
-        self.tables = tables(k, s)
         self.h = h
-        self.field, field_cached = fixed.compile_field(system)
-        kernel_cached = fixed.compile_kernel()
-        self.block, self.group = blocks(system)
-        self.from_cache = field_cached and kernel_cached
+        self.second = system.separable if form is None else form == "second"
+        if self.second and not system.separable:
+            raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
+        lanes = tables.lanes_for(k)
+        self.constants = tables.constants(k, s, self.second, lanes)
+        self.field = fields.compile_field(system, "force" if self.second else "field", lanes)
+        kernel = engine.kernel()
+        block, group = blocks(system)
+        rows = system.dim
+        if self.second:
+            assert system.dof is not None
+            rows = system.dof
+            block = block[:rows]
+            group = group[: block[-1] + 1]
+        unit = tables.unit(self.constants, self._velocity(np.full(system.n_par, np.nan)))
+        self.shape = Shape(
+            rows, self.second, unit, self.field.address, system.n_par, block, group, self.constants
+        )
+        self._fixed = tables.fixed(self.constants)
+        self._scaled: dict[float, dict[str, Array]] = {}
+        self.from_cache = self.field.from_cache and kernel.from_cache
         self.compile_seconds = perf_counter() - started
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "HBVMStepper":
+    @property
+    def lanes(self) -> bool:
+        """Whether the vector field runs on all stages at once, or on one after another."""
+        return self.field.note == fields.ON_LANES
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper:
         """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
 
         Raises
@@ -38,171 +75,49 @@ class HBVMProgram:
         problems.errors.InputError
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
+        return HBVMStepper(self, check_state(y0, self.system.dim), self.parameters(par), float(t0))
+
+    def parameters(self, par: ArrayLike | None) -> Array:
+        """Return a parameter vector as a fresh array; the system's own by default.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If it is not of the system's length.
+        """
         values = self.system.pack()
         if par is not None:
             if np.shape(par) != values.shape:
                 raise InputError(f"par must have shape {values.shape}, not {np.shape(par)}; see system.pack.")
             values[:] = par
-        return HBVMStepper(self, check_state(y0, self.system.dim), values, float(t0))
+        return values
 
+    def scaled(self, h: float) -> dict[str, Array]:
+        """Return the tables for steps of h, which may be negative."""
+        if h not in self._scaled:
+            squared = self.second and self.shape.unit
+            self._scaled[h] = tables.scaled(self.constants, h, squared=squared)
+        return self._scaled[h]
 
-@dataclass(frozen=True, eq=False)
-class Checkpoint:
-    """All that the continuation of an `HBVMStepper` depends on."""
+    def context(self, *, side: bool = False) -> Context:
+        """Return fresh memory for a trajectory, or for its partial steps."""
+        scaled = self.scaled(self.h)
+        shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
+        context = Context(self.shape, {**self._fixed, **shared})
+        context.reals[layout.TOLERANCE] = TOLERANCE
+        return context
 
-    t0: float
-    n: int
-    h: float
-    y: Array
-    e: Array
-    previous: Array
-    length: float
-    status: Status
-    reason: str
+    def load(self, context: Context, par: Array) -> None:
+        """Put parameters, and the velocities that follow from them, into a context."""
+        context["PAR"][: par.size] = par
+        if self.second:
+            context["VELOCITY"][: self.shape.rows] = self._velocity(par)
 
-
-class HBVMStepper:
-    """A trajectory of HBVM(k, s); satisfies `integrators.protocol.Stepper`.
-
-    The present time is ``t0 + n h`` with an integer n, never an accumulated sum.
-    ``advance`` offers every sampling:
-
-    ``"side"`` (default)
-        A throw-away step of the missing length from the last own step: order 2s,
-        energy as at the own steps, and the own steps are untouched.
-    ``"steps"``
-        The own steps themselves, up to the last time (and the present state, if
-        the first time is the present).
-    ``"land"``
-        The last step before each time is shortened onto it and the next begins
-        there. This changes the sequence of steps, which costs a symplectic
-        method (k = s) its long-time behaviour.
-    ``"dense"``
-        The polynomial of the step: free, but of order s + 1 only, and it does not
-        keep the energy.
-    """
-
-    def __init__(self, program: HBVMProgram, y: Array, par: Array, t0: float):
-        self._program = program
-        self._par = par
-        self._t0, self._n, self._h = t0, 0, program.h
-        self._y, self._e = y, np.zeros_like(y)
-        self._previous, self._length = np.zeros((program.tables.s, y.size)), 0.0
-        self._counters = np.zeros(5, dtype=np.int64)
-        self._status, self._reason = Status.RUNNING, ""
-
-    @property
-    def t(self) -> float:
-        """Time of the last own step."""
-        return self._t0 + self._n * self._h
-
-    @property
-    def y(self) -> Array:
-        """A copy of the state at the last own step."""
-        return self._y.copy()
-
-    @property
-    def status(self) -> Status:
-        """How the integration stands."""
-        return self._status
-
-    @property
-    def reason(self) -> str:
-        """One sentence on a failure; empty otherwise."""
-        return self._reason
-
-    @property
-    def stats(self) -> Stats:
-        """Counters of the work done; ``extra``: partial steps made, restarts from a bad extrapolation."""
-        count = self._counters.tolist()
-        return Stats(
-            steps=count[fixed.STEPS],
-            rejections=0,
-            evaluations=count[fixed.EVALUATIONS],
-            iterations=count[fixed.ITERATIONS],
-            solver="fixed point",
-            extra={"partial_steps": count[fixed.PARTIAL], "restarts": count[fixed.RESTARTS]},
-        )
-
-    def step(self) -> Status:
-        """Take one step of length h; after a failure, do nothing."""
-        if not self._status.failed:
-            self._run(fixed.SIDE, np.zeros(1), np.array([self._n + 1]), np.zeros(1))
-        return self._status
-
-    def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
-        """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
-        if sample is not None and sample not in SAMPLINGS:
-            raise unknown("sampling", str(sample), SAMPLINGS)
-        grid = check_times(times, self.t)
-        if self._status.failed:
-            return Samples(grid[:0], np.empty((0, self._y.size)), self._status, self._reason)
-        t0, n, h = self._t0, self._n, self._h
-        if (grid[-1] - self.t) * h < 0.0:  # turn round: steps are counted from here
-            t0, n, h = self.t, 0, -h
-        between = {"land": fixed.LAND, "dense": fixed.DENSE}.get(sample or "side", fixed.SIDE)
-        bases = np.full(grid.size, t0)
-        if sample == "land":
-            bases[1:] = grid[:-1]
-        targets, parts = plan(grid, bases, h)
-        if sample == "steps":
-            targets = np.arange(n + (grid[0] != self.t), targets[-1] + 1)
-            grid, parts = t0 + targets * h, np.zeros(targets.size)
-        self._t0, self._n, self._h = t0, n, h
-        return self._run(between, grid, targets, parts)
-
-    def checkpoint(self) -> Checkpoint:
-        """Return a copy of all that the continuation depends on."""
-        return Checkpoint(
-            self._t0, self._n, self._h, self._y.copy(), self._e.copy(),
-            self._previous.copy(), self._length, self._status, self._reason,
-        )  # fmt: skip
-
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; the counters keep counting.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If the checkpoint is that of another system or another s.
-        """
-        if checkpoint.previous.shape != self._previous.shape:
-            raise InputError(
-                f"this checkpoint has coefficients of shape {checkpoint.previous.shape}, not "
-                f"{self._previous.shape}: it belongs to another method or system."
-            )
-        self._t0, self._n, self._h = checkpoint.t0, checkpoint.n, checkpoint.h
-        self._y, self._e = checkpoint.y.copy(), checkpoint.e.copy()
-        self._previous, self._length = checkpoint.previous.copy(), checkpoint.length
-        self._status, self._reason = checkpoint.status, checkpoint.reason
-
-    def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
-        """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""
-        table = self._program.tables
-        out = np.empty((times.size, self._y.size))
-        code, change, made = fixed.BUDGET, 0.0, 0
-        while code == fixed.BUDGET:
-            code, change, self._t0, self._n, self._length, made = fixed.advance(
-                self._program.field, self._par,
-                table.integrals.hi, table.projection.hi, table.nodes.hi,
-                self._program.block, self._program.group,
-                self._h, self._t0, self._n, self._y, self._e, self._previous, self._length,
-                between, times, targets, parts, made, out, CHUNK, self._counters,
-            )  # fmt: skip
-        status = Status.FINISHED
-        if code != fixed.DONE:
-            status, self._reason = self._failure(code, change)
-            self._status = status
-        return Samples(times[:made], out[:made], status, self._reason)
-
-    def _failure(self, code: int, change: float) -> tuple[Status, str]:
-        if code == fixed.NOT_FINITE:
-            return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {self.t!r}."
-        return Status.NONLINEAR_DIVERGENCE, (
-            f"the fixed-point iteration did not converge in the step from t = {self.t!r}, h = {self._h!r} "
-            f"(relative change {change:.1e} after {fixed.MAX_ITERATIONS} iterations at most); "
-            "take a smaller h."
-        )
+    def _velocity(self, par: Array) -> Array:
+        """Q' = velocity * p, of unit momenta; shape (dof,)."""
+        if not self.second:
+            return np.ones(0)
+        return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
 
 
 def blocks(system: System) -> tuple[Counts, Counts]:

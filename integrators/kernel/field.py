@@ -1,0 +1,89 @@
+"""A traced vector field, compiled once behind ``void(t, stages, par, values)``.
+
+The four arguments are addresses: the times of LANES stages, the stages (rows of
+LANES doubles), the parameters, and room for the field's values, laid out like
+the stages. The user's code runs on all stages at once. Where numba cannot type
+it on lanes, it runs on one stage after another behind the same signature.
+"""
+
+from typing import Any
+
+from integrators.kernel import native, store
+from problems import emit
+from problems.system import System
+
+ON_LANES, ONE_BY_ONE = "L", "S"
+SOURCES = ("lanes", "lane_functions", "native", "field")
+
+
+def compile_field(system: System, what: str, lanes: int) -> native.Native:
+    """Compile one of a system's functions for stage memory, or load it.
+
+    Parameters
+    ----------
+    system : System
+        The traced system.
+    what : str
+        ``"field"``, or ``"force"`` for the second-order form.
+    lanes : int
+        Stages per call.
+
+    Returns
+    -------
+    Native
+        Its note is `ON_LANES` or `ONE_BY_ONE`.
+    """
+    source = emit.source(system, what, "numba")
+    name = store.key("field", source.text, str(lanes), native.sources(*SOURCES))
+    return native.obtain(name, lambda: build(emit.numba(system, what).py_func, lanes))
+
+
+def build(function: Any, lanes: int) -> tuple[str, bytes]:
+    """Compile ``function(t, y, par, out)`` on lanes if that is possible, else stage by stage.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If it can be compiled neither way.
+    """
+    from numba.core.errors import NumbaError
+
+    try:
+        return ON_LANES, build_on_lanes(function, lanes)
+    except NumbaError:
+        return ONE_BY_ONE, build_one_by_one(function, lanes)
+
+
+def build_on_lanes(function: Any, lanes: int) -> bytes:
+    """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
+    from integrators.kernel import lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
+    from integrators.kernel.lanes import Lanes, Rows, Strided
+
+    stages = Rows(lanes)
+    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (Strided(1), "ptr"), (stages, "ptr")]
+    return native.build(_jit(function), arguments)
+
+
+def build_one_by_one(function: Any, lanes: int) -> bytes:
+    """Compile a loop over stages that calls ``function`` with scalars."""
+    from numba import types
+
+    from integrators.kernel.lanes import strided
+
+    scalar = _jit(function)
+
+    def loop(t, stages, par, values):
+        for stage in range(lanes):
+            time = strided(t, 1)[stage]
+            scalar(
+                time, strided(stages + 8 * stage, lanes), strided(par, 1), strided(values + 8 * stage, lanes)
+            )
+
+    return native.build(_jit(loop), [(types.int64, "i64")] * 4)
+
+
+def _jit(function: Any) -> Any:
+    import numba
+
+    njit: Any = numba.njit
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)

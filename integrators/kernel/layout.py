@@ -1,0 +1,113 @@
+"""Where things are: the slots of a context, the block of memory a trajectory is integrated in.
+
+A context is 96 words of eight bytes, integers and doubles side by side: the
+addresses of all tables and arrays, and the state of the nonlinear solver.
+Compiled functions take its address and nothing else, so their signature does
+not change with what they do, and a batch is a row of contexts.
+
+Stage memory is a structure of arrays: BLOCKS blocks of PADDED rows of LANES
+doubles; row d of a block holds component d of the block's stages, side by
+side, as the vector field wants it.
+"""
+
+# What is integrated, and how.
+FIELD = 0  # address of void(t, stages, par, values) on one block of LANES stages
+PAR = 1
+ROWS = 2  # components of a stage: dof in second-order form, dim in first-order form
+PADDED = 3  # ROWS rounded up to a multiple of 8
+LANES = 4  # stages per call of the field: 8 or 16
+BLOCKS = 5  # calls of the field per evaluation
+CHUNKS = 6  # groups of 8 stages that carry weight
+ROUTE = 7  # 8, 16: one matrix of so many columns; WIDE: a larger one; THROUGH: by Legendre coefficients
+SECOND = 8  # 1: second-order form
+UNIT = 9  # 1: the row's factor is in the matrix
+STAGES = 10  # k, for the counters
+DEGREE = 11  # s
+
+# Tables.
+RAW_MATRIX = 12  # the field's values -> stages (THROUGH: coefficients -> stages), for a step of 1
+MATRIX = 13  # the same for the step H
+EXTRAPOLATION = 14  # the previous step's values -> stages
+MATRIX_SIZE = 15  # in vectors of 8
+PROJECTION = 16  # the field's values -> coefficients
+COEFFICIENT_CHUNKS = 17  # groups of 8 coefficients
+FIRST_COEFFICIENT = 18  # where gamma_0 is among them
+MODE_PROJECTION = 19  # the field's values -> the coefficients that are extrapolated
+MODE_CHUNKS = 20
+MODES = 21
+BASIS = 22  # room for a table made on the way
+NODES = 23
+NODES_LOW = 24
+WEIGHTS = 25
+WEIGHTS_LOW = 26
+POSITION_WEIGHTS = 27
+POSITION_WEIGHTS_LOW = 28
+VELOCITY = 29  # q' = VELOCITY * p, by row
+ROW_FACTOR = 30  # h * VELOCITY by row; 1 in first-order form
+STEP_FACTOR = 31  # the same in blocks [kh kh kh kh 0 0 0 0]
+KICK_FACTOR = 32  # and in blocks [1 1 1 1 kh kh kh kh]
+
+# Stage memory.
+Q = 33
+OTHER_Q = 34  # the stages before the last product, where changes are measured
+F = 35
+BASE = 36  # what a stage has besides the state and the forces
+SUM = 37
+COEFFICIENTS = 38
+TIMES = 39
+
+# State and what belongs to a row.
+STATE = 40  # second-order form: blocks [p p p p q q q q]; first-order form: y
+ERROR = 41  # what STATE lacks, in the same places
+NEXT_STATE = 42
+NEXT_ERROR = 43
+ROW_STATE = 44
+ROW_ERROR = 45
+ROW_DRIFT = 46  # h q'
+ROW_DRIFT_LOW = 47
+STRICT = 48  # 1 / size of the row's block
+FLOORED = 49  # 1 / size of the row's block, small ones raised to a part of the largest in the group
+SIZE = 50
+LARGEST = 51
+BLOCK = 52  # integers: block of each row
+GROUP = 53  # integers: group of each block
+BLOCK_COUNT = 54
+GROUP_COUNT = 55
+
+# The state of a trajectory besides the arrays above, and of its nonlinear solver.
+H = 56  # double
+T0 = 57  # double
+N = 58  # steps since T0
+LENGTH = 59  # double: length of the step that F belongs to; 0: none
+SOLVED = 60  # 1: F solves the step ahead
+AGE = 61  # steps until sizes are taken anew
+FREE = 62  # iterations without a test
+TESTS = 63
+TRIED = 64  # iterations of this start
+PREDICTED = 65  # 1: the start was extrapolated
+STALLED = 66
+BEST = 67  # double
+LAST = 68  # double
+TOLERANCE = 69  # double
+OUTCOME = 70
+UNTESTED = 71  # iterations left before the first test, in a batch
+ALIVE = 72  # 1: takes part in a batch
+MADE = 73  # samples made
+
+# Counters.
+STEPS = 74
+ITERATIONS = 75
+EVALUATIONS = 76
+RESTARTS = 77
+PARTIAL = 78
+
+CONTEXT = 96
+
+# Routes of a product that are not a number of columns.
+WIDE, THROUGH = 0, 1
+
+# How a step, or an advance, ended.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET = range(5)
+
+# How states between steps are made.
+SIDE, LAND, DENSE = range(3)

@@ -1,0 +1,197 @@
+"""Numba functions as machine code that needs no numba to be loaded again.
+
+`build` compiles a function of plain numbers and addresses to one object file
+with one C entry, and `load` puts such a file into this process through
+llvmlite. A process that finds its code in the store therefore never imports
+numba, which costs more than everything else it does before its first step.
+"""
+
+import ctypes.util
+import hashlib
+import os
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from integrators.kernel import store
+
+ENTRY = "hbvm_entry"
+
+_lock = threading.RLock()
+_loaded: dict[str, "Native"] = {}
+_engines: list[Any] = []  # an engine owns its code: none may be collected
+
+
+@dataclass(frozen=True)
+class Native:
+    """Machine code in this process.
+
+    Attributes
+    ----------
+    address : int
+        Of its C function.
+    note : str
+        What its maker says about it, one character.
+    from_cache : bool
+        Whether it came from the store, or from this process's memory.
+    seconds : float
+        What compiling or loading it took.
+    """
+
+    address: int
+    note: str
+    from_cache: bool
+    seconds: float
+
+
+@lru_cache(maxsize=1)
+def platform() -> str:
+    """Return all that machine code depends on besides its source, as text."""
+    parts = [
+        llvm.get_host_cpu_name(),
+        llvm.get_host_cpu_features().flatten(),
+        llvm.get_process_triple(),
+        version("numba"),
+        llvmlite.__version__,
+        *(
+            f"{name}={os.environ.get(name, '')}"
+            for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT")
+        ),
+    ]
+    return "\n".join(parts)
+
+
+@lru_cache(maxsize=32)
+def sources(*modules: str) -> str:
+    """Return the digest of modules of this package: an edit voids what was compiled from them."""
+    digest = hashlib.sha256()
+    for name in modules:
+        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+    return digest.hexdigest()
+
+
+def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:
+    """Return the code of a key: from this process, from the store, or by making it.
+
+    Parameters
+    ----------
+    name : str
+        A key of `store.key`, of everything the code depends on but `platform`.
+    make : callable
+        Returns a note of one character and the object file.
+    """
+    with _lock:
+        if (known := _loaded.get(name)) is not None:
+            return Native(known.address, known.note, True, 0.0)
+        started = perf_counter()
+        full = store.key(name, platform())
+        kept = store.get(full)
+        if kept:
+            note, code = chr(kept[0]), kept[1:]
+        else:
+            note, code = make()
+            store.put(full, note.encode("ascii") + code)
+        native = Native(load(code), note, bool(kept), perf_counter() - started)
+        _loaded[name] = native
+        return native
+
+
+def build(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> bytes:
+    """Compile a numba function to an object file with the C function `ENTRY`.
+
+    Parameters
+    ----------
+    function : numba dispatcher
+        Must allocate nothing and raise nothing.
+    arguments : sequence of (numba type, LLVM type)
+        The C function takes the LLVM types. A vector is passed by the address
+        of its lanes, since its place in a call depends on the processor.
+    returns : {"void", "i64"}
+        What the function returns.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If it cannot be compiled for these types.
+    """
+    with _lock:
+        kinds = tuple(kind for kind, _ in arguments)
+        function.compile(kinds)
+        inner = function.overloads[kinds].fndesc.llvm_func_name
+        module = llvm.parse_assembly(function.inspect_llvm(kinds))
+        module.link_in(llvm.parse_assembly(_entry(inner, [text for _, text in arguments], returns)))
+        for value in [*module.functions, *module.global_variables]:
+            if not value.is_declaration and value.name != ENTRY:
+                value.linkage = "internal"
+        machine = _machine()
+        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+        builder.getModulePassManager().run(module, builder)
+        return machine.emit_object(module)
+
+
+def load(code: bytes) -> int:
+    """Put an object file into this process; return the address of its `ENTRY`."""
+    with _lock:
+        _initialize()
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        _engines.append(engine)
+        return engine.get_function_address(ENTRY)
+
+
+@lru_cache(maxsize=1)
+def _initialize() -> None:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    # Fields may call pow, tan, ... of the C library, which Python need not have loaded for all to see.
+    if llvm.address_of_symbol("pow") is None and (library := ctypes.util.find_library("m")) is not None:
+        llvm.load_library_permanently(library)
+
+
+def _machine() -> Any:
+    _initialize()
+    return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
+        cpu=os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name(),
+        features=os.environ.get("NUMBA_CPU_FEATURES") or llvm.get_host_cpu_features().flatten(),
+        opt=3,
+        reloc="static",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+def _entry(inner: str, kinds: Sequence[str], returns: str) -> str:
+    """Write the C function around numba's own calling convention, which returns through a pointer."""
+    vectors = [kind.startswith("<") for kind in kinds]
+    outer = ", ".join(
+        f"ptr %a{i}" if v else f"{kind} %a{i}" for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+    )
+    loads = "\n".join(
+        f"  %v{i} = load {kind}, ptr %a{i}, align 64"
+        for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+        if v
+    )
+    values = ", ".join(
+        f"{kind} %{'v' if v else 'a'}{i}" for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+    )
+    slot = "ptr" if returns == "void" else returns
+    result = "  ret void" if returns == "void" else f"  %z = load {returns}, ptr %result\n  ret {returns} %z"
+    return f"""
+declare i32 @"{inner}"(ptr, ptr, {", ".join(kinds)})
+define {returns} @{ENTRY}({outer}) {{
+  %result = alloca {slot}
+  %exception = alloca ptr
+{loads}
+  %status = call i32 @"{inner}"(ptr %result, ptr %exception, {values})
+{result}
+}}
+"""

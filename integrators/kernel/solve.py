@@ -1,0 +1,136 @@
+"""The nonlinear solver: fixed-point iteration with one stopping rule."""
+
+from integrators.kernel import layout as at
+from integrators.kernel.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.products import change, compiled, evaluate, product, product_tested
+from integrators.kernel.step import prepare, start, start_plain, take_sizes
+
+MAX_ITERATIONS = 200
+STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
+ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
+PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION
+INFINITY = float("inf")
+
+
+@compiled
+def rewind(ctx):
+    """Begin to count the iterations of a start."""
+    put_int(ctx, at.OUTCOME, at.RUNNING)
+    put_int(ctx, at.TESTS, 0)
+    put_int(ctx, at.TRIED, 0)
+    put_int(ctx, at.STALLED, 0)
+    put_float(ctx, at.BEST, INFINITY)
+    put_float(ctx, at.LAST, INFINITY)
+
+
+@compiled
+def begin(ctx):
+    """Start the step from STATE; return how many iterations to do before the first test."""
+    rewind(ctx)
+    prepare(ctx)
+    start(ctx)
+    age = get_int(ctx, at.AGE) - 1
+    put_int(ctx, at.AGE, age)
+    predicted = get_int(ctx, at.PREDICTED)
+    if age < 0 or predicted == 0:
+        take_sizes(ctx)
+    return get_int(ctx, at.FREE) if predicted else 0
+
+
+@compiled
+def sweep(ctx):
+    """Iterate once, without a test."""
+    evaluate(ctx)
+    product(ctx, get_int(ctx, at.MATRIX))
+    put_int(ctx, at.TRIED, get_int(ctx, at.TRIED) + 1)
+
+
+@compiled
+def sweep_tested(ctx):
+    """Iterate once and apply the stopping rule; OUTCOME says what came of it.
+
+    The iteration ends when the change, relative to its block, is at most
+    TOLERANCE, or when it has stopped decreasing where rounding accounts for it.
+    """
+    evaluate(ctx)
+    strict = product_tested(ctx, get_int(ctx, at.MATRIX))
+    tried = get_int(ctx, at.TRIED) + 1
+    last = get_float(ctx, at.LAST)
+    put_int(ctx, at.TRIED, tried)
+    put_int(ctx, at.TESTS, get_int(ctx, at.TESTS) + 1)
+    put_float(ctx, at.LAST, strict)
+    if get_int(ctx, at.AGE) == 0:
+        take_sizes(ctx)
+    if not strict < INFINITY:
+        # Growing changes overflow in the end; a NaN out of the blue is the field's own.
+        restart(ctx, at.DIVERGED if 1.0 < last < INFINITY else at.NOT_FINITE)
+    elif strict <= get_float(ctx, at.TOLERANCE):
+        put_int(ctx, at.OUTCOME, at.DONE)
+    elif strict < get_float(ctx, at.BEST):
+        put_float(ctx, at.BEST, strict)
+        put_int(ctx, at.STALLED, 0)
+        if tried >= MAX_ITERATIONS:
+            restart(ctx, at.DIVERGED)
+    else:
+        stalled = get_int(ctx, at.STALLED) + 1
+        put_int(ctx, at.STALLED, stalled)
+        if change(ctx, get_int(ctx, at.FLOORED)) < (ROUNDING if stalled < PATIENCE else STAGNATION):
+            put_int(ctx, at.OUTCOME, at.DONE)
+        elif tried >= MAX_ITERATIONS:
+            restart(ctx, at.DIVERGED)
+
+
+@compiled
+def count(ctx):
+    """Add the evaluations of a start to the counters."""
+    tried = get_int(ctx, at.TRIED)
+    put_int(ctx, at.ITERATIONS, get_int(ctx, at.ITERATIONS) + tried)
+    put_int(ctx, at.EVALUATIONS, get_int(ctx, at.EVALUATIONS) + tried * get_int(ctx, at.STAGES))
+
+
+@compiled
+def restart(ctx, outcome):
+    """Try again without extrapolation, if there was any; else the step has failed."""
+    if get_int(ctx, at.PREDICTED) == 0:
+        put_int(ctx, at.OUTCOME, outcome)
+    else:
+        count(ctx)
+        put_int(ctx, at.RESTARTS, get_int(ctx, at.RESTARTS) + 1)
+        rewind(ctx)
+        start_plain(ctx)
+        take_sizes(ctx)
+
+
+@compiled
+def close(ctx):
+    """Keep the books of a start that has come to its end."""
+    count(ctx)
+    if get_int(ctx, at.OUTCOME) == at.DONE:
+        put_int(ctx, at.SOLVED, 1)
+        if get_int(ctx, at.PREDICTED):
+            # Two tests tell that the change does not decrease any more; more mean that
+            # the first came early, and two or less that it may have come late.
+            tests = get_int(ctx, at.TESTS)
+            free = get_int(ctx, at.FREE) + (tests - 2 if tests > 2 else -1)
+            put_int(ctx, at.FREE, max(free, 0))
+    else:
+        put_float(ctx, at.LENGTH, 0.0)
+
+
+@compiled
+def settle(ctx):
+    """Iterate with tests until the step is solved or has failed; return the outcome."""
+    while get_int(ctx, at.OUTCOME) == at.RUNNING:
+        sweep_tested(ctx)
+    close(ctx)
+    return get_int(ctx, at.OUTCOME)
+
+
+@compiled
+def solve(ctx):
+    """Solve the step from STATE, unless that is done; return the outcome."""
+    if get_int(ctx, at.SOLVED):
+        return at.DONE
+    for _ in range(begin(ctx)):
+        sweep(ctx)
+    return settle(ctx)

@@ -1,0 +1,221 @@
+"""One trajectory of HBVM(k, s) under way: a `Stepper` over the compiled kernel."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.grid import Counts, plan
+from integrators.kernel import engine, layout
+from integrators.kernel.workspace import Integers
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
+from problems.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from integrators.kernel.program import HBVMProgram
+
+CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+
+# What a checkpoint holds besides STATE and ERROR; F matters to the next start.
+WORDS = (layout.H, layout.T0, layout.N, layout.LENGTH, layout.SOLVED, layout.AGE, layout.FREE)
+ARRAYS = ("F", "STRICT", "FLOORED")
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """All that the continuation of an `HBVMStepper` depends on."""
+
+    identity: tuple[str, int, int, bool]
+    words: Integers
+    state: Array
+    e: Array
+    arrays: tuple[Array, ...]
+    status: Status
+    reason: str
+
+
+class HBVMStepper:
+    """A trajectory of HBVM(k, s); satisfies `integrators.protocol.Stepper`.
+
+    The present time is ``t0 + n h`` with an integer n, never an accumulated sum.
+    ``advance`` offers every sampling:
+
+    ``"side"`` (default)
+        A throw-away step of the missing length from the last own step: order 2s,
+        energy as at the own steps, and the own steps are untouched.
+    ``"steps"``
+        The own steps themselves, up to the last time (and the present state, if
+        the first time is the present).
+    ``"land"``
+        The last step before each time is shortened onto it and the next begins
+        there. This changes the sequence of steps, which costs a symplectic
+        method (k = s) its long-time behaviour.
+    ``"dense"``
+        The polynomial of the step: free, but of order s + 1 only, and it does not
+        keep the energy.
+    """
+
+    def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
+        self._program = program
+        self._context = program.context()
+        self._side = program.context(side=True)
+        for context in (self._context, self._side):
+            program.load(context, par)
+        self._dim = y.size
+        self._context.reals[layout.H] = program.h
+        self._context.reals[layout.T0] = t0
+        engine.call(engine.RESET, self._context.address, y.ctypes.data)
+        self._status, self._reason = Status.RUNNING, ""
+
+    @property
+    def t(self) -> float:
+        """Time of the last own step."""
+        words, reals = self._context.words, self._context.reals
+        return float(reals[layout.T0]) + int(words[layout.N]) * float(reals[layout.H])
+
+    @property
+    def y(self) -> Array:
+        """A copy of the state at the last own step."""
+        return self._context.state()
+
+    @property
+    def status(self) -> Status:
+        """How the integration stands."""
+        return self._status
+
+    @property
+    def reason(self) -> str:
+        """One sentence on a failure; empty otherwise."""
+        return self._reason
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of the work done.
+
+        ``extra`` holds: partial steps made; restarts from a bad extrapolation;
+        ``"lanes"``, whether the field runs on all stages at once; ``"form"``, whether
+        stages hold the positions only ("second") or the whole state ("first").
+        """
+        words = self._context.words
+        return Stats(
+            steps=int(words[layout.STEPS]),
+            rejections=0,
+            evaluations=int(words[layout.EVALUATIONS]),
+            iterations=int(words[layout.ITERATIONS]),
+            solver="fixed point",
+            extra={
+                "partial_steps": int(words[layout.PARTIAL]),
+                "restarts": int(words[layout.RESTARTS]),
+                "lanes": self._program.lanes,
+                "form": "second" if self._program.second else "first",
+            },
+        )
+
+    def step(self) -> Status:
+        """Take one step of length h; after a failure, do nothing."""
+        if not self._status.failed:
+            n = int(self._context.words[layout.N])
+            self._run(layout.SIDE, np.zeros(1), np.array([n + 1]), np.zeros(1))
+        return self._status
+
+    def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
+        """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
+        if sample is not None and sample not in SAMPLINGS:
+            raise unknown("sampling", str(sample), SAMPLINGS)
+        grid = check_times(times, self.t)
+        if self._status.failed:
+            return Samples(grid[:0], np.empty((0, self._dim)), self._status, self._reason)
+        words, reals = self._context.words, self._context.reals
+        t0, n, h = float(reals[layout.T0]), int(words[layout.N]), float(reals[layout.H])
+        turn = (grid[-1] - self.t) * h < 0.0
+        if turn:  # steps are counted from here
+            t0, n, h = self.t, 0, -h
+        between = {"land": layout.LAND, "dense": layout.DENSE}.get(sample or "side", layout.SIDE)
+        bases = np.full(grid.size, t0)
+        if sample == "land":
+            bases[1:] = grid[:-1]
+        targets, parts = plan(grid, bases, h)
+        if sample == "steps":
+            targets = np.arange(n + (grid[0] != self.t), targets[-1] + 1)
+            grid, parts = t0 + targets * h, np.zeros(targets.size)
+        if turn:
+            self._turn(t0)
+        return self._run(between, grid, targets, parts)
+
+    def _turn(self, t0: float) -> None:
+        """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""
+        words, reals = self._context.words, self._context.reals
+        reals[layout.T0], words[layout.N] = t0, 0
+        self._set_step(-float(reals[layout.H]))
+        if words[layout.SOLVED]:
+            words[layout.SOLVED], reals[layout.LENGTH] = 0, 0.0
+
+    def _set_step(self, h: float) -> None:
+        self._context.point(self._program.scaled(h))
+        self._context.set_factors(h)
+
+    def checkpoint(self) -> Checkpoint:
+        """Return a copy of all that the continuation depends on."""
+        context = self._context
+        return Checkpoint(
+            self._identity,
+            context.words[list(WORDS)],
+            context.array(layout.STATE).copy(),
+            context.array(layout.ERROR).copy(),
+            tuple(context[name].copy() for name in ARRAYS),
+            self._status,
+            self._reason,
+        )
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go back to a checkpoint of the same program; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the checkpoint is that of another system or method.
+        """
+        if checkpoint.identity != self._identity:
+            raise InputError("this checkpoint belongs to another method or system.")
+        context = self._context
+        context.words[list(WORDS)] = checkpoint.words
+        self._set_step(float(context.reals[layout.H]))
+        context.array(layout.STATE)[:] = checkpoint.state
+        context.array(layout.ERROR)[:] = checkpoint.e
+        for name, array in zip(ARRAYS, checkpoint.arrays, strict=True):
+            context[name][:] = array
+        self._status, self._reason = checkpoint.status, checkpoint.reason
+
+    @property
+    def _identity(self) -> tuple[str, int, int, bool]:
+        constants = self._program.constants
+        return self._program.system.fingerprint, constants.k, constants.s, self._program.second
+
+    def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
+        """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""
+        context = self._context
+        out = np.empty((times.size, self._dim))
+        arrays = [np.ascontiguousarray(array) for array in (times, targets, parts)]
+        outcome, made = layout.BUDGET, 0
+        while outcome == layout.BUDGET:
+            outcome = engine.call(
+                engine.ADVANCE, context.address, self._side.address, between, times.size,
+                *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
+            )  # fmt: skip
+            made = int(context.words[layout.MADE])
+        status = Status.FINISHED
+        if outcome != layout.DONE:
+            status, self._reason = failure(outcome, self.t, context.reals)
+            self._status = status
+        return Samples(times[:made], out[:made], status, self._reason)
+
+
+def failure(outcome: int, t: float, reals: Array) -> tuple[Status, str]:
+    """Return the status that an outcome of the kernel stands for, and the reason as a sentence."""
+    if outcome == layout.NOT_FINITE:
+        return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
+    return Status.NONLINEAR_DIVERGENCE, (
+        f"the fixed-point iteration did not converge in the step from t = {t!r}, "
+        f"h = {float(reals[layout.H])!r} (last relative change {reals[layout.LAST]:.1e}); take a smaller h."
+    )

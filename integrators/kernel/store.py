@@ -1,0 +1,62 @@
+"""Compiled code kept on disk: one file per key, written at once or not at all.
+
+Several processes may start together, and a file may be cut short by a full
+disk: each file carries the digest of its content, is written under another
+name and renamed, and is dropped and made anew when it does not check out.
+"""
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+from problems.emit.cache import directory
+
+DIGEST = 32
+
+
+def key(*parts: str | bytes) -> str:
+    """Return the name (sha256, hex) of whatever follows from ``parts``."""
+    digest = hashlib.sha256()
+    for part in parts:
+        data = part.encode() if isinstance(part, str) else part
+        digest.update(len(data).to_bytes(8, "little"))
+        digest.update(data)
+    return digest.hexdigest()
+
+
+def _path(name: str) -> Path:
+    return directory() / "native" / name[:2] / name
+
+
+def get(name: str) -> bytes | None:
+    """Return what is kept under a key, or ``None``: nothing there, not readable, or damaged."""
+    try:
+        data = _path(name).read_bytes()
+    except OSError:
+        return None
+    digest, content = data[:DIGEST], data[DIGEST:]
+    if hashlib.sha256(content).digest() == digest:
+        return content
+    with contextlib.suppress(OSError):
+        _path(name).unlink()
+    return None
+
+
+def put(name: str, content: bytes) -> bool:
+    """Keep ``content`` under a key; return whether the disk took it."""
+    path = _path(name)
+    temporary = None
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".")
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        Path(temporary).replace(path)
+    except OSError:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                Path(temporary).unlink()
+        return False
+    return True

@@ -1,0 +1,268 @@
+"""The tables of HBVM(k, s) as the kernel wants them: padded to lanes, in columns of eight stages.
+
+A product of the kernel takes each row of ``h A`` as doubles. What rounding does
+to a row acts like a wrong node or a wrong weight in every single step, and over
+a million steps even a relative 1e-17 of it shows as a linear drift of the
+energy (measured on the outer Solar System: up to 8e-19 per year for some h,
+against 1e-19 or less with the rule that follows). So rows are rounded such that
+they keep their first moments: what they make of a field that is constant,
+linear or quadratic over the step is right to 1e-19 or so. This costs nothing
+when the rows are used.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel import layout as at
+from integrators.kernel import native, store
+from problems.dd import DD
+
+Array = NDArray[np.float64]
+
+MODES = 14  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
+MOMENTS = 3
+
+NAMES = (
+    "nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low",
+    "matrix", "matrix_low", "projection", "into_modes", "beyond", "basis",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Constants:
+    """What the tables are made of; independent of the step.
+
+    Attributes
+    ----------
+    k, s, lanes : int
+        Stages, degree, and stages per call of the field.
+    second : bool
+        Whether for the second-order form.
+    route : int
+        How a product is done; see `layout`.
+    columns : int
+        Of the matrix.
+    arrays : dict of str to ndarray
+        ``matrix`` + ``matrix_low`` (k, k), or (k, s) on the route THROUGH; ``projection``
+        (s, k) and ``into_modes`` (modes, k) onto coefficients; ``beyond`` (k, modes), the
+        modes at the nodes of the next step; ``basis`` (k, moments); and vectors (k,).
+    """
+
+    k: int
+    s: int
+    lanes: int
+    second: bool
+    route: int
+    modes: int
+    arrays: dict[str, Array]
+
+    @property
+    def first(self) -> int:
+        """Coefficients that come before gamma_0: on the route THROUGH the first ones are there twice."""
+        return min(MOMENTS, self.s) if self.route == at.THROUGH else 0
+
+
+def lanes_for(k: int) -> int:
+    """Return how many stages the field should take at a time."""
+    return 16 if 8 < k <= 16 else 8
+
+
+def route_for(k: int, s: int, lanes: int) -> int:
+    """Return the cheapest route of a product; see `layout`."""
+    if k <= lanes:
+        return lanes
+    chunks, modes = _up(k) // 8, _up(s + MOMENTS) // 8
+    return at.THROUGH if 2 * modes < chunks else at.WIDE
+
+
+@lru_cache(maxsize=64)
+def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
+    """Return the constants of HBVM(k, s), from disk if they have been made before.
+
+    Making them takes 50-digit arithmetic, and importing it alone takes longer
+    than loading them.
+    """
+    route = route_for(k, s, lanes)
+    shapes = _shapes(k, s, route)
+    name = store.key("tables", f"{k} {s} {second} {route}", native.sources("tables", "../legendre"))
+    kept = store.get(name)
+    if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
+        arrays = _make(k, s, second, route)
+        store.put(name, b"".join(arrays[part].astype("<f8").tobytes() for part in NAMES))
+    else:
+        arrays, start = {}, 0
+        for part, (rows, columns) in zip(NAMES, shapes, strict=True):
+            arrays[part] = np.frombuffer(kept, "<f8", rows * columns, start).reshape(rows, columns)
+            start += 8 * rows * columns
+    return Constants(k, s, lanes, second, route, min(k, MODES), arrays)
+
+
+def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
+    modes = min(k, MODES)
+    inner = s if route == at.THROUGH else k
+    return [(k, 1)] * 6 + [(k, inner)] * 2 + [(s, k), (modes, k), (k, modes), (k, min(MOMENTS, k))]
+
+
+def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
+    import integrators.legendre as legendre
+
+    t = legendre.tables(k, s)
+    modes = min(k, MODES)
+    integrals = t.double_integrals if second else t.integrals
+    matrix = (integrals.hi, integrals.lo)
+    if route != at.THROUGH:
+        matrix = _product(matrix, (t.projection.hi, t.projection.lo))
+    basis = legendre.legendre(t.nodes.hi, max(modes, MOMENTS))
+    return {
+        "nodes": t.nodes.hi,
+        "nodes_low": t.nodes.lo,
+        "weights": t.weights.hi,
+        "weights_low": t.weights.lo,
+        "position_weights": t.position_weights.hi,
+        "position_weights_low": t.position_weights.lo,
+        "matrix": matrix[0],
+        "matrix_low": matrix[1],
+        "projection": keep_moments(t.projection.hi, t.projection.lo, basis[:, : min(MOMENTS, k)]),
+        "into_modes": (basis[:, :modes] * t.weights.hi[:, None]).T,
+        "beyond": legendre.legendre(1.0 + t.nodes.hi, modes),
+        "basis": basis[:, : min(MOMENTS, k)],
+    }
+
+
+def keep_moments(high: Array, low: Array, basis: Array) -> Array:
+    """Round the rows of ``high + low`` to doubles that keep their products with ``basis``.
+
+    Parameters
+    ----------
+    high, low : ndarray, shape (n, k)
+        The matrix, as a sum of two doubles.
+    basis : ndarray, shape (k, m)
+        Columns with which the rounded rows shall have the products that the exact rows have.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Per row, the m entries that are smallest, and so are rounded most finely,
+        have moved by some units of the row's own rounding error.
+    """
+    rounded = high.copy()
+    m = basis.shape[1]
+    for i in range(high.shape[0]):
+        at_will = np.argsort(np.abs(high[i]))[:m]
+        for _ in range(3):
+            # high - rounded is exact: they differ by a few units in the last place.
+            lost = ((high[i] - rounded[i]) + low[i]) @ basis
+            rounded[i, at_will] += np.linalg.solve(basis[at_will].T, lost)
+    return rounded
+
+
+# --- tables for one step length ---------------------------------------------------------------------
+
+
+def unit(constants: Constants, velocity: Array) -> bool:
+    """Whether the rows' factors can be part of the matrix: all velocities 1, or first-order form."""
+    return not constants.second or (constants.route > 1 and bool((velocity == 1.0).all()))
+
+
+def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]:
+    """Return MATRIX, EXTRAPOLATION and PROJECTION for the step h, in the kernel's layout.
+
+    Parameters
+    ----------
+    constants : Constants
+        From `constants`.
+    h : float
+        The step, negative backwards.
+    squared : bool
+        Whether the matrix takes h twice, as it does in the second-order form
+        where no factor follows.
+    """
+    a = constants.arrays
+    high, low = _times(a["matrix"], a["matrix_low"], h)
+    if squared:
+        high, low = _times(high, low, h)
+    projection = a["projection"]
+    if constants.route == at.THROUGH:
+        # What rounding takes from the first columns goes into columns of its own, before
+        # the others, so that a chain of products holds it before it is rounded.
+        first = constants.first
+        matrix = np.hstack([low[:, :first], high])
+        extrapolation = high @ projection @ a["beyond"]
+        projection = np.vstack([projection[:first], projection])
+    else:
+        matrix = keep_moments(high, low, a["basis"])
+        extrapolation = high @ a["beyond"] @ a["into_modes"]
+    columns = constants.route if constants.route > 1 else None
+    return {
+        "MATRIX": _matrix(matrix, columns=columns, repeat=True),
+        "EXTRAPOLATION": _matrix(extrapolation, columns=columns, repeat=True),
+        "PROJECTION": _matrix(projection),
+    }
+
+
+def fixed(constants: Constants) -> dict[str, Array]:
+    """Return the tables that do not depend on the step, in the kernel's layout."""
+    a = constants.arrays
+    columns = constants.route if constants.route > 1 else None
+    raw = a["matrix"]
+    if constants.route == at.THROUGH:
+        raw = np.hstack([np.zeros((constants.k, constants.first)), raw])
+    return {
+        "RAW_MATRIX": _matrix(raw, columns=columns, repeat=True),
+        "MODE_PROJECTION": _matrix(a["into_modes"]),
+        "NODES": _vector(a["nodes"], repeat=True),
+        "NODES_LOW": _vector(a["nodes_low"], repeat=True),
+        "WEIGHTS": _vector(a["weights"]),
+        "WEIGHTS_LOW": _vector(a["weights_low"]),
+        "POSITION_WEIGHTS": _vector(a["position_weights"]),
+        "POSITION_WEIGHTS_LOW": _vector(a["position_weights_low"]),
+    }
+
+
+def _times(high: Array, low: Array, h: float) -> tuple[Array, Array]:
+    product = DD(high, low) * h
+    return product.hi, product.lo
+
+
+def _product(left: tuple[Array, Array], right: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return left @ right as a sum of two doubles, to about 30 digits."""
+    total = DD(np.zeros((left[0].shape[0], right[0].shape[1])))
+    for j in range(left[0].shape[1]):
+        total = total + DD(left[0][:, j : j + 1], left[1][:, j : j + 1]) * DD(right[0][j], right[1][j])
+    return total.hi, total.lo
+
+
+def aligned(n: int) -> Array:
+    """Return n zeros at an address that is a multiple of 64."""
+    room = np.zeros(n + 8)
+    start = (-room.ctypes.data % 64) // 8
+    return room[start : start + n]
+
+
+def _up(n: int) -> int:
+    return (n + 7) // 8 * 8
+
+
+def _vector(values: Array, *, repeat: bool = False) -> Array:
+    """Pad to a multiple of eight: with the last value, so that idle stages are like a real one, or 0."""
+    values = values.reshape(-1)
+    out = aligned(_up(values.size))
+    out[: values.size] = values
+    if repeat:
+        out[values.size :] = values[-1]
+    return out
+
+
+def _matrix(matrix: Array, *, columns: int | None = None, repeat: bool = False) -> Array:
+    """Pad to multiples of eight and lay out as groups of eight rows, each column by column."""
+    n, m = matrix.shape
+    padded = np.zeros((_up(n), _up(m) if columns is None else columns))
+    padded[:n, :m] = matrix
+    if repeat:
+        padded[n:] = padded[n - 1]
+    out = aligned(padded.size)
+    out[:] = padded.reshape(-1, 8, padded.shape[1]).transpose(0, 2, 1).reshape(-1)
+    return out

@@ -1,0 +1,140 @@
+"""The memory of a trajectory: a context and the arrays it points to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel import layout as at
+from integrators.kernel.tables import Constants, aligned
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What the memory of all trajectories of a program has in common.
+
+    Attributes
+    ----------
+    rows : int
+        Components of a stage.
+    second : bool
+        Second-order form: a stage holds positions, the state (q, p).
+    unit : bool
+        Whether the rows' factors are in the matrix.
+    field : int
+        Address of the vector field.
+    parameters : int
+        Length of the parameter vector.
+    block, group : ndarray of int
+        Block of each row, group of each block.
+    constants : Constants
+        The method's.
+    """
+
+    rows: int
+    second: bool
+    unit: bool
+    field: int
+    parameters: int
+    block: Integers
+    group: Integers
+    constants: Constants
+
+    @property
+    def dim(self) -> int:
+        """Length of the state."""
+        return self.rows * (2 if self.second else 1)
+
+
+class Context:
+    """A context and its arrays; shares the tables that do not change with other contexts.
+
+    Parameters
+    ----------
+    shape : Shape
+        Of the program.
+    tables : mapping of str to ndarray
+        Tables by their slot's name; not copied.
+
+    Attributes
+    ----------
+    words, reals : ndarray, shape (CONTEXT,)
+        The context as integers and as doubles: the same memory.
+    """
+
+    def __init__(self, shape: Shape, tables: Mapping[str, Array]):
+        self.words: Integers = aligned(at.CONTEXT).view(np.int64)
+        self.reals: Array = self.words.view(np.float64)
+        self.shape = shape
+        self._kept: dict[str, Array] = {}
+        c = shape.constants
+        rows, lanes = shape.rows, c.lanes
+        padded = -(-rows // 8) * 8
+        blocks, chunks = -(-c.k // lanes), -(-c.k // 8)
+        sizes = {
+            "FIELD": shape.field, "ROWS": rows, "PADDED": padded, "LANES": lanes, "BLOCKS": blocks,
+            "CHUNKS": chunks, "ROUTE": c.route, "SECOND": int(shape.second), "UNIT": int(shape.unit),
+            "STAGES": c.k, "DEGREE": c.s, "MODES": c.modes, "MODE_CHUNKS": -(-c.modes // 8),
+            "FIRST_COEFFICIENT": c.first, "COEFFICIENT_CHUNKS": -(-(c.s + c.first) // 8),
+            "BLOCK_COUNT": shape.group.size, "GROUP_COUNT": int(shape.group.max()) + 1,
+        }  # fmt: skip
+        for name, value in sizes.items():
+            self.words[getattr(at, name)] = value
+        self.point(tables)
+        self.words[at.MATRIX_SIZE] = tables["RAW_MATRIX"].size // 8
+        stage, modes = blocks * padded * lanes, -(-max(c.modes, c.s + c.first) // 8)
+        lengths = {
+            "PAR": shape.parameters, "MATRIX": tables["RAW_MATRIX"].size, "BASIS": 64 * chunks * modes,
+            "VELOCITY": padded, "ROW_FACTOR": padded, "STEP_FACTOR": 2 * padded, "KICK_FACTOR": 2 * padded,
+            "Q": stage, "OTHER_Q": stage, "F": stage, "BASE": stage, "SUM": stage,
+            "COEFFICIENTS": 8 * modes * padded, "TIMES": blocks * lanes,
+            "STATE": 2 * padded, "ERROR": 2 * padded, "NEXT_STATE": 2 * padded, "NEXT_ERROR": 2 * padded,
+            "ROW_STATE": padded, "ROW_ERROR": padded, "ROW_DRIFT": padded, "ROW_DRIFT_LOW": padded,
+            "STRICT": padded, "FLOORED": padded, "SIZE": shape.group.size, "LARGEST": shape.group.size,
+        }  # fmt: skip
+        self.point({name: aligned(n) for name, n in lengths.items() if name not in tables})
+        self._kept["ROW_FACTOR"][:] = 1.0
+        self._kept["KICK_FACTOR"].reshape(-1, 8)[:, :4] = 1.0
+        self.point({"BLOCK": shape.block.view(np.float64), "GROUP": shape.group.view(np.float64)})
+
+    def point(self, arrays: Mapping[str, Array]) -> None:
+        """Let slots point to arrays, and keep these alive."""
+        for name, array in arrays.items():
+            self._kept[name] = array
+            self.words[getattr(at, name)] = array.ctypes.data
+
+    @property
+    def address(self) -> int:
+        """Of the context, for compiled functions."""
+        return self.words.ctypes.data
+
+    def __getitem__(self, name: str) -> Array:
+        """Return an array by the name of its slot; not those that compiled code exchanges."""
+        return self._kept[name]
+
+    def array(self, slot: int) -> Array:
+        """Return the array that a slot points to now; for those that compiled code exchanges."""
+        return next(kept for kept in self._kept.values() if kept.ctypes.data == self.words[slot])
+
+    def state(self) -> Array:
+        """Return a copy of the state, as (q, p) or y; shape (dim,)."""
+        state, rows = self.array(at.STATE), self.shape.rows
+        if not self.shape.second:
+            return state[:rows].copy()
+        places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+        return state[np.concatenate([places + 4, places])]
+
+    def set_factors(self, h: float) -> None:
+        """Set H and what is h times the velocities."""
+        self.reals[at.H] = h
+        if self.shape.second:
+            rows = self.shape.rows
+            kh = h * self["VELOCITY"][:rows]
+            places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+            self["ROW_FACTOR"][:rows] = kh
+            self["STEP_FACTOR"][places] = kh
+            self["KICK_FACTOR"][places + 4] = kh
