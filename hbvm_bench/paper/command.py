@@ -1,0 +1,104 @@
+"""``hbvm-bench paper``: run the paper's experiments and write the report."""
+
+import csv
+import io
+import os
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated
+
+import typer
+
+from hbvm_bench import terminal
+from hbvm_bench.store import atomic, ensure_writable
+from problems.errors import unknown
+
+PARTS = ("sitnikov", "henon-heiles", "period-annulus", "claims")
+DEFAULT = Path("reports/paper")
+
+
+def paper(
+    part: Annotated[str | None, typer.Argument(help=f"One of {', '.join(PARTS)}; all by default.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Default: reports/paper, or runs/paper-PART for one part.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+) -> None:
+    """Run the seed paper's experiments again and write the report: claim, paper, here."""
+    if part is not None and part not in PARTS:
+        raise unknown("part of the paper", part, PARTS)
+    directory = out or (DEFAULT if part is None else Path("runs") / f"paper-{part}")
+    ensure_writable(directory / "figures")
+    command = "hbvm-bench paper" + (f" {part}" if part else "")
+    seconds = write_report(
+        PARTS if part is None else (part,), directory, jobs or len(os.sched_getaffinity(0)), command
+    )
+    terminal.console(stderr=True).print(f"{directory / 'index.html'} written in {seconds:.0f} s")
+
+
+def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: str) -> float:
+    """Compute the named parts and write ``report.md``, ``index.html``, ``figures/`` and ``data/``.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Among `PARTS`.
+    directory : Path
+        Made if missing.
+    jobs : int
+        Processes.
+    command : str
+        What to print as the way to get it again.
+
+    Returns
+    -------
+    float
+        Seconds that it took.
+    """
+    from hbvm_bench.paper.page import markdown, page
+    from hbvm_bench.paper.tasks import run_all
+
+    started = time.perf_counter()
+    modules = [_module(name) for name in names]
+    tasks = [task for module in modules for task in module.tasks()]
+    console = terminal.console(stderr=True)
+    count = 0
+
+    def done(key: str, seconds: float) -> None:
+        nonlocal count
+        count += 1
+        console.print(f"  {count}/{len(tasks)} {key}: {seconds:.1f} s", markup=False)
+
+    results = run_all(tasks, jobs, done)
+    parts = [module.part(results) for module in modules]
+    files: dict[Path, bytes] = {
+        Path("report.md"): markdown(parts, command).encode(),
+        Path("index.html"): page(parts, command).encode(),
+    }
+    for part in parts:
+        for picture in part.pictures:
+            files[Path("figures") / f"{picture.key}.svg"] = picture.svg.encode()
+            files[Path("figures") / f"{picture.key}.png"] = picture.png
+        for table in part.tables:
+            files[Path("data") / f"{table.key}.csv"] = _csv([table.head, *table.rows])
+    claims = [(part.title, c.words, c.paper, c.here, c.verdict) for part in parts for c in part.claims]
+    files[Path("data") / "claims.csv"] = _csv([("part", "claim", "paper", "here", "verdict"), *claims])
+    for name, data in files.items():
+        (directory / name).parent.mkdir(parents=True, exist_ok=True)
+        with atomic(directory / name) as temporary:
+            temporary.write_bytes(data)
+    return time.perf_counter() - started
+
+
+def _module(name: str) -> ModuleType:
+    from hbvm_bench.paper import henon_heiles_part, period_annulus_part, properties_part, sitnikov_part
+
+    modules = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
+    return modules[PARTS.index(name)]
+
+
+def _csv(rows: list[tuple[str, ...]]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()

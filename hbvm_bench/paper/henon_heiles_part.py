@@ -1,0 +1,171 @@
+"""The Henon-Heiles experiment in words: what the paper claims, what came out."""
+
+from functools import partial
+
+import numpy as np
+
+from hbvm_bench.paper import henon_heiles as experiment
+from hbvm_bench.paper import henon_heiles_figures as figures
+from hbvm_bench.paper import others
+from hbvm_bench.paper.document import Claim, Part, Table, number
+from hbvm_bench.paper.henon_heiles import GAUSS, HBVM_4, Orbit
+from hbvm_bench.paper.tasks import Results, Task
+from integrators.protocol import Array
+from problems.henon_heiles import ESCAPE, SADDLES
+
+PRINTED = 7000.0  # the paper's escape time, "t ≃ 7000"
+CHUNKS = 4
+FAMILIES = {"gauss": GAUSS, "hbvm": HBVM_4}
+
+
+def tasks() -> list[Task]:
+    """Return the computations of this part."""
+    starts = np.array_split(np.arange(experiment.NEIGHBOURS), CHUNKS)
+    gaps = np.array_split(np.asarray(experiment.GAPS), CHUNKS)
+    return [
+        Task("henon-heiles/gauss", gauss_orbit, 20),
+        Task("henon-heiles/hbvm", partial(experiment.orbit, HBVM_4), 3),
+        Task("henon-heiles/truth", experiment.true_orbit, 1),
+        *(
+            Task(f"henon-heiles/escapes {i}", partial(experiment.escapes, GAUSS, chunk.tolist()), 6)
+            for i, chunk in enumerate(starts)
+        ),
+        *(
+            Task(f"henon-heiles/map {family} {i}", partial(experiment.escape_map, method, chunk.tolist()), 15)
+            for family, method in FAMILIES.items()
+            for i, chunk in enumerate(gaps)
+        ),
+        *(
+            Task(f"henon-heiles/other {text}", partial(others.on_henon_heiles, text), 8)
+            for text in others.HENON_HEILES
+        ),
+    ]
+
+
+def gauss_orbit() -> tuple[int, Orbit]:
+    """Return the neighbouring start whose escape is nearest to the paper's time, and its orbit."""
+    times = experiment.escapes(GAUSS, t_end=2 * PRINTED)
+    nearest = min(range(len(times)), key=lambda i: abs((times[i] or np.inf) - PRINTED))
+    return nearest, experiment.orbit(GAUSS, offset=nearest)
+
+
+def part(results: Results) -> Part:
+    """Return this part of the report."""
+    offset, gauss = results["henon-heiles/gauss"]
+    hbvm: Orbit = results["henon-heiles/hbvm"]
+    times = [time for i in range(CHUNKS) for time in results[f"henon-heiles/escapes {i}"]]
+    maps = {
+        family: np.vstack([results[f"henon-heiles/map {family} {i}"] for i in range(CHUNKS)])
+        for family in FAMILIES
+    }
+    q1, q2, angle = experiment.START
+    return Part(
+        key="henon-heiles",
+        title="The Hénon–Heiles problem",
+        lead=[
+            "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” 1/6; "
+            "it does not say "
+            f"which. Here: (q₁, q₂) = ({q1:g}, {q2:g}), momentum at an angle of {angle:g} rad, H₀ = 1/6 − "
+            f"{experiment.GAP:g}. The "
+            "motion is chaotic, so the last bit of the start decides when Gauss loses the orbit: "
+            f"{experiment.NEIGHBOURS} starts were tried that differ in the last bits of one momentum, and "
+            "the one drawn (number "
+            f"{offset}) is the one that escapes nearest to the paper's time.",
+        ],
+        claims=_claims(gauss, hbvm, times, maps),
+        blocks=[
+            figures.level_curves(results["henon-heiles/truth"]),
+            figures.plane(
+                gauss, "gauss", 2,
+                "Every step until the orbit leaves; circles: the last steps, as in the paper.",
+            ),
+            figures.plane(
+                hbvm, "hbvm", 3,
+                "All 50,000 steps from the first of the starts.",
+            ),
+            figures.hamiltonian(gauss, hbvm),
+            figures.fates(times, repr(GAUSS), PRINTED),
+            figures.maps(
+                maps["gauss"], maps["hbvm"], experiment.GAPS, experiment.DIRECTIONS, experiment.MAP_END
+            ),
+            _others(results),
+        ],
+    )  # fmt: skip
+
+
+def _claims(gauss: Orbit, hbvm: Orbit, times: list[float | None], maps: dict[str, Array]) -> list[Claim]:
+    gone = sorted(time for time in times if time is not None)
+    inside = gauss.t <= (gauss.left or np.inf) - 3
+    slopes = max(float(np.abs(_slope(*point)).max()) for point in SADDLES)
+    heights = [float(experiment.potential(np.array(x), np.array(y))) for x, y in SADDLES]
+    left = {family: int(np.count_nonzero(~np.isnan(found))) for family, found in maps.items()}
+    median = float(np.median([np.inf if time is None else time for time in times]))
+    return [
+        Claim(
+            "The vertices of the triangle U = 1/6 are saddle points of U",
+            "(0, 1), (±√3/2, −1/2)",
+            f"|∇U| ≤ {number(slopes)}, |U − 1/6| ≤ {number(max(abs(height - ESCAPE) for height in heights))} "
+            "there",
+            "holds",
+        ),
+        Claim(
+            "Gauss of order four with h = 1 lets the orbit escape",
+            "t ≃ 7000",
+            f"{len(gone)} of {len(times)} starts escape before t = 50,000, at times from {gone[0]:.0f} on "
+            "with median "
+            f"{median:.0f}; the one drawn at {gauss.left:.0f}"
+            if gone
+            else "none escapes",
+            "holds" if gauss.left is not None else "no",
+        ),
+        Claim(
+            "Under HBVM(4,2) the orbit stays in the triangle at all times",
+            "50,000 points",
+            f"{len(hbvm.t) - 1:,} points, {hbvm.outside} outside; also none of {maps['hbvm'].size} other "
+            "starts and energies "
+            f"leaves ({left['hbvm']}), where under Gauss {left['gauss']} do",
+            "holds" if hbvm.left is None and hbvm.outside == 0 and left["hbvm"] == 0 else "no",
+        ),
+        Claim(
+            "HBVM(4,2) precisely conserves the total energy",
+            "Figure 4",
+            f"largest relative error {number(hbvm.error)} over 50,000 steps",
+            "holds" if hbvm.error < 1e-11 else "no",
+        ),
+        Claim(
+            "Gauss makes H oscillate irregularly about its value, which costs the stability",
+            "Figure 4",
+            f"H between {gauss.energy[inside].min():.5f} and {gauss.energy[inside].max():.5f}, across 1/6 = "
+            "0.16667",
+            "holds" if gauss.energy[inside].max() > ESCAPE else "no",
+        ),
+    ]
+
+
+def _slope(x: float, y: float) -> Array:
+    return np.array([x + 2 * x * y, y + x * x - y * y])
+
+
+def _others(results: Results) -> Table:
+    rows = [results[f"henon-heiles/other {text}"] for text in others.HENON_HEILES]
+    return Table(
+        key="henon-heiles-others",
+        title="The same start with other integrators",
+        head=("method", "energy", "outside by", "agrees until t", "remark"),
+        rows=tuple(
+            (
+                row.method,
+                number(row.numbers.get("energy")),
+                number(row.numbers.get("outside")),
+                f"{row.numbers['agrees']:.0f}" if "agrees" in row.numbers else "–",
+                row.remark,
+            )
+            for row in rows
+        ),
+        numbers=frozenset(range(1, 4)),
+        caption=f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
+        "triangle; time at which the "
+        f"orbit is {others.AGREES:g} from the one of HBVM(15,10) with h = 1/4. Chaos doubles every error "
+        "about every five units of "
+        "time, so no double precision orbit agrees much longer than two hundred.",
+    )

@@ -1,0 +1,136 @@
+"""The paper report as markdown and as one self-contained page."""
+
+import re
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from hbvm_bench.paper.document import GAUSS, GAUSS_DARK, HBVM, HBVM_DARK, VERDICTS, Part, Table
+from hbvm_bench.report.canvas import Picture, inline_svg
+from hbvm_bench.report.markdown import code, plain
+from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS
+
+TITLE = "The seed paper, run again"
+PAPER = (
+    "L. Brugnano, F. Iavernaro, T. Susca: Numerical comparisons between Gauss–Legendre methods and "
+    "Hamiltonian BVMs defined over Gauss points"
+)
+LEAD = (
+    "Every experiment, figure and table of the paper from one command, beside what the paper says. Where the "
+    "two "
+    "differ, the difference is explained; where the paper is silent, it is measured."
+)
+ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
+COLOURS = {GAUSS: "--gauss", HBVM: "--hbvm"}
+
+
+def markdown(parts: Sequence[Part], command: str) -> str:
+    """Return the report as markdown with relative links to its figures."""
+    environment = _environment(autoescape=False)
+    environment.filters |= {"plain": plain, "code": code, "prose": prose}
+    environment.globals |= {"kind": kind, "cell": markdown_cell}
+    text = environment.get_template("paper.md.j2").render(**_values(parts, command))
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def page(parts: Sequence[Part], command: str) -> str:
+    """Return the report as an HTML document from which no request leaves."""
+    environment = _environment(autoescape=True)
+    environment.filters |= {"prose": html_prose}
+    environment.globals |= {
+        "kind": kind,
+        "cell": html_cell,
+        "figure": drawing,
+    }
+    return environment.get_template("paper.html.j2").render(
+        **_values(parts, command),
+        css=Markup(_style("hbvm_bench.report", "style.css") + _style("hbvm_bench.paper", "paper.css")),
+        script=Markup(_style("hbvm_bench.report", "script.js")),
+        light=_variables(
+            {name: colour for colour, name in NEUTRALS.items()} | {"--gauss": GAUSS, "--hbvm": HBVM}
+        ),
+        dark=_variables(DARK_NEUTRALS | {"--gauss": GAUSS_DARK, "--hbvm": HBVM_DARK}),
+    )
+
+
+def drawing(picture: Picture) -> Markup:
+    """Return the SVG of a figure for the page, no wider than its text allows."""
+    width = float(re.findall(r'viewBox="0 0 ([\d.]+)', picture.svg)[0])
+    svg = inline_svg(picture, COLOURS)
+    return Markup(svg.replace("<svg ", f'<svg style="max-width:{width * ENLARGED:.0f}px" ', 1))
+
+
+def kind(block: object) -> str:
+    """Return what a block of a part is: ``text``, ``picture`` or ``table``."""
+    return "picture" if isinstance(block, Picture) else "table" if isinstance(block, Table) else "text"
+
+
+def prose(text: str) -> str:
+    """Make a sentence harmless in markdown; what stands in backquotes stays code."""
+    pieces = text.split("`")
+    return "".join(code(piece) if i % 2 else plain(piece) for i, piece in enumerate(pieces))
+
+
+def html_prose(text: str) -> Markup:
+    """Escape a sentence for the page; what stands in backquotes becomes code."""
+    pieces = text.split("`")
+    return Markup("").join(
+        Markup("<code>{}</code>").format(piece) if i % 2 else html_cell(piece)
+        for i, piece in enumerate(pieces)
+    )
+
+
+def html_cell(text: str) -> Markup:
+    """Escape a text and set ``3.4e-15`` as a power of ten."""
+    return Markup(POWER.sub(_power, str(escape(text))))
+
+
+def markdown_cell(text: str) -> str:
+    """Return a table cell for markdown, calls of methods as code."""
+    return code(text) if CALL.fullmatch(text) else plain(text)
+
+
+CALL = re.compile(r"\w+\(.*\)")
+POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?![\w.]*\w)")
+
+
+def _power(match: re.Match[str]) -> str:
+    mantissa, exponent = match[1], match[2].replace("-", "−")
+    front = "" if mantissa == "1" else "−" if mantissa == "-1" else f"{mantissa}·"
+    return f'<span class="power">{front}10<sup>{exponent}</sup></span>'
+
+
+def _values(parts: Sequence[Part], command: str) -> Mapping[str, Any]:
+    claims = [claim for part in parts for claim in part.claims]
+    return {
+        "title": TITLE,
+        "lead": LEAD,
+        "paper": PAPER,
+        "parts": parts,
+        "command": command,
+        "verdicts": VERDICTS,
+        "counts": {key: sum(claim.verdict == key for claim in claims) for key in VERDICTS},
+        "total": len(claims),
+    }
+
+
+def _environment(*, autoescape: bool) -> Environment:
+    return Environment(
+        loader=PackageLoader("hbvm_bench.paper", "templates"),
+        autoescape=autoescape,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+    )
+
+
+def _variables(values: Mapping[str, str]) -> Markup:
+    return Markup("".join(f"{name}:{value};" for name, value in values.items()))
+
+
+def _style(package: str, name: str) -> str:
+    return (files(package) / "templates" / name).read_text(encoding="utf-8")

@@ -1,0 +1,203 @@
+"""What the paper says of the methods themselves, measured on its own polynomial problems."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+
+from integrators import integrate
+from integrators.gauss import Gauss
+from integrators.hbvm import HBVM
+from integrators.legendre import legendre
+from integrators.protocol import Array, MethodBase
+from integrators.tableau import tableau
+from problems import Problem, emit
+from problems.henon_heiles import henon_heiles
+from problems.period_annulus import period_annulus
+
+DEGREES = (1, 2, 3, 4, 5)
+BIG = 24  # more nodes than any degree here needs
+
+# Where the error is asymptotic and above round-off: the finest step and the ratio of two steps.
+ORDER_SPAN = 6.0
+ORDER_STEPS = {1: (64, 512), 2: (24, 192), 3: (16, 96), 4: (12, 48), 5: (10, 30)}
+
+
+@dataclass(frozen=True)
+class Order:
+    """Measured order of HBVM(k, s): errors against steps and the slope of the fit."""
+
+    s: int
+    k: int
+    h: list[float]
+    error: list[float]
+    slope: float
+
+
+def orders(degrees: Sequence[int] = DEGREES) -> list[Order]:
+    """Measure the order on the Henon-Heiles problem for k = s, s + 1, 2s and 3s."""
+    problem = henon_heiles(energy=0.12, t_end=ORDER_SPAN)
+    truth = integrate(problem, HBVM(k=20, s=10, h=0.05), times=[ORDER_SPAN]).y[0]
+    made = []
+    for s in degrees:
+        few, many = ORDER_STEPS[s]
+        counts = np.unique(np.geomspace(few, many, 5).round().astype(int))
+        for k in sorted({s, s + 1, 2 * s, 3 * s}):
+            h = ORDER_SPAN / counts
+            errors = [
+                float(
+                    np.abs(integrate(problem, HBVM(k=k, s=s, h=step), times=[ORDER_SPAN]).y[0] - truth).max()
+                )
+                for step in h
+            ]
+            slope = float(np.polyfit(np.log(h), np.log(errors), 1)[0])
+            made.append(Order(s, k, h.tolist(), errors, slope))
+    return made
+
+
+def reversal(method: MethodBase, t_end: float = 100.0) -> float:
+    """Return how far a run to ``t_end`` and back misses its start."""
+    problem = henon_heiles(energy=0.12, t_end=t_end)
+    stepper = method.compile(problem.system).start(problem.y0, problem.par, 0.0)
+    stepper.advance(np.array([t_end]))
+    back = stepper.advance(np.array([0.0]))
+    return float(np.abs(back.y[-1] - problem.y0).max())
+
+
+def stability(pairs: Sequence[tuple[int, int]]) -> tuple[float, float]:
+    """Return the largest | |R(iy)| - 1 |, and the largest |R| in the left half plane, over the (k, s).
+
+    |y| up to 1e4, and 2000 points with real parts down to -1e4.
+    """
+    y = np.concatenate([[0.0], np.geomspace(1e-3, 1e4, 400)])
+    rng = np.random.default_rng(7)
+    left = -(10.0 ** rng.uniform(-3, 4, 2000)) + 1j * rng.choice([-1, 1], 2000) * 10.0 ** rng.uniform(
+        -3, 4, 2000
+    )
+    edge, inside = 0.0, 0.0
+    for k, s in pairs:
+        method = tableau(k, s)
+        edge = max(edge, float(np.abs(np.abs(method.stability(1j * y)) - 1.0).max()))
+        inside = max(inside, float(np.abs(method.stability(left)).max()))
+    return edge, inside
+
+
+def collocation_gap(degrees: Sequence[int] = range(1, 9)) -> float:
+    """Return the largest difference of the HBVM(s, s) tableau from a_ij = int_0^{c_i} l_j, the paper's (2)."""
+    worst = 0.0
+    for s in degrees:
+        made = tableau(s, s)
+        x, w = leggauss(s)
+        for i in range(s):
+            u = made.c[i] * (1 + x) / 2
+            for j in range(s):
+                others = np.delete(made.c, j)
+                lagrange = np.prod((u[:, None] - others) / (made.c[j] - others), axis=1)
+                worst = max(worst, abs(made.c[i] * (w @ lagrange) / 2 - made.A[i, j]))
+    return worst
+
+
+def same_bits(t_end: float = 200.0) -> bool:
+    """Whether Gauss(s) and HBVM(s, s) give the same doubles, s = 1 .. 5."""
+    problem = henon_heiles(energy=0.12, t_end=t_end)
+    runs = [
+        [
+            integrate(problem, method, times=[t_end], sample="steps").y
+            for method in (Gauss(s=s, h=0.5), HBVM(k=s, s=s, h=0.5))
+        ]
+        for s in DEGREES
+    ]
+    return all(np.array_equal(gauss, hbvm) for gauss, hbvm in runs)
+
+
+def conservation(
+    problem: Problem, degrees: Sequence[int] = DEGREES, h: float = 1.0, t_end: float = 50.0
+) -> list[tuple[int, int, float]]:
+    """Return (s, k, largest relative error of H over t_end) for k = s .. s + 10."""
+    return [
+        (
+            s,
+            k,
+            float(
+                integrate(problem, HBVM(k=k, s=s, h=h), times=[t_end], sample="steps")
+                .errors()["energy"]
+                .max()
+            ),
+        )
+        for s in degrees
+        for k in range(s, s + 11)
+    ]
+
+
+def conservation_quintic() -> list[tuple[int, int, float]]:
+    """`conservation` on the quintic, whose degree 5 asks for k >= 5 s / 2."""
+    return conservation(period_annulus(start=0.3))
+
+
+def conservation_cubic() -> list[tuple[int, int, float]]:
+    """`conservation` on Henon-Heiles, whose degree 3 asks for k >= 3 s / 2."""
+    return conservation(henon_heiles(energy=0.12))
+
+
+def ranks(pairs: Sequence[tuple[int, int]]) -> list[int]:
+    """Return the ranks of the stage matrices A of the HBVM(k, s)."""
+    return [int(np.linalg.matrix_rank(tableau(k, s).A, tol=1e-10)) for k, s in pairs]
+
+
+def iterations(
+    ks: Sequence[int] = (2, 3, 4, 6, 9, 12, 18, 24, 36), h: float = 0.5
+) -> list[tuple[int, float]]:
+    """Return k and the fixed-point iterations per step of HBVM(k, 2) on Henon-Heiles."""
+    problem = henon_heiles(energy=0.12)
+    rows = []
+    for k in ks:
+        stats = integrate(problem, HBVM(k=k, s=2, h=h), times=[500.0], sample="steps").stats
+        rows.append((k, (stats.iterations or 0) / stats.steps))
+    return rows
+
+
+def extended_collocation(k: int, s: int, h: float = 0.5) -> float:
+    """Return the largest residual at the nodes of sigma' = sum_j P_j int P_j f(sigma) over one step.
+
+    sigma comes from dense output at s + 1 points; the integrals from a rule with `BIG` nodes.
+    """
+    problem = period_annulus(start=0.3)
+    method = HBVM(k=k, s=s, h=h)
+    points = np.linspace(0.0, 1.0, s + 1)[1:]
+    program = method.compile(problem.system)
+    values = program.start(problem.y0, problem.par, 0.0).advance(points * h, sample="dense").y
+    powers = np.vander(points, s + 1, increasing=True)[:, 1:]
+    sigma = np.linalg.solve(powers, values - problem.y0)  # coefficients of c, c^2, ...
+    c, b = (leggauss(BIG)[0] + 1) / 2, leggauss(BIG)[1] / 2
+    path = problem.y0 + np.vander(c, s + 1, increasing=True)[:, 1:] @ sigma
+    field = emit.numpy(problem.system, "field")
+    f = np.stack([field(0.0, y, problem.par) for y in path])
+    gamma = legendre(c, s).T @ (b[:, None] * f)
+    nodes = tableau(k, s).c
+    slope = np.arange(1, s + 1) * np.vander(nodes, s, increasing=True) @ sigma / h
+    return float(np.abs(slope - legendre(nodes, s) @ gamma).max())
+
+
+def symplectic_defect(method: MethodBase, delta: float = 1e-3) -> float:
+    """Return the largest entry of M' J M - J, M the derivative of one step on Henon-Heiles.
+
+    M from differences of order 4, which leave about 1e-12.
+    """
+    problem = henon_heiles(energy=0.12)
+    program = method.compile(problem.system)
+
+    def step(y0: Array) -> Array:
+        stepper = program.start(y0, problem.par, 0.0)
+        stepper.step()
+        return stepper.y
+
+    M = np.empty((4, 4))
+    for j in range(4):
+        unit = np.zeros(4)
+        unit[j] = delta
+        near = step(problem.y0 + unit) - step(problem.y0 - unit)
+        far = step(problem.y0 + 2 * unit) - step(problem.y0 - 2 * unit)
+        M[:, j] = (8 * near - far) / (12 * delta)
+    J = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.eye(2), np.zeros((2, 2))]])
+    return float(np.abs(M.T @ J @ M - J).max())
