@@ -70,9 +70,9 @@ class _ArrayWriter:
                     self.printer.assign(statement.node, self.reduced(value, len(statement.loop)))
 
     def write(self) -> None:
-        self._statements(self.plan.first)
         if self.plan.scatters:
             self.start()
+        self._statements(self.plan.first)
         for scatter in self.plan.scatters:
             self._scatter(scatter)
         self._statements(self.plan.last)

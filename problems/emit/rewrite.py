@@ -32,7 +32,9 @@ class Rewriter:
         self.rewrite(roots)
 
     def small(self, loop: Loop, roots: Sequence[Node]) -> bool:
-        return self.limit is None or len(loop) * len(body_of(roots, loop)) <= self.limit
+        # A root that does not vary in the loop still stands in each of its terms.
+        operations = max(len(body_of(roots, loop)), len(roots))
+        return self.limit is None or len(loop) * operations <= self.limit
 
     def rewrite(self, roots: Sequence[Node]) -> None:
         for node in reachable(list(roots)):

@@ -32,13 +32,13 @@ class _Writer:
 
     def write(self) -> None:
         self._statements(self.plan.first)
-        for low, high in _runs(self.plan.zeros):
+        for places in _runs(self.plan.zeros):
             # -0.0 is what leaves the first summand as it is, its sign included.
-            if high - low <= 3:
-                for place in range(low, high):
+            if len(places) <= 3:
+                for place in places:
                     self.printer.line(f"out[{place}] = -0.0")
             else:
-                self.printer.line(f"for k in range({low}, {high}):")
+                self.printer.line(f"for k in {places}:")
                 self.printer.line("    out[k] = -0.0")
         for scatter in self.plan.scatters:
             self._loop(scatter.loop, scatter.body, scatter)
@@ -221,14 +221,16 @@ def _carried(header: Range, scatter: Scatter) -> dict[int, int]:
     return pairs
 
 
-def _runs(places: list[int]) -> list[tuple[int, int]]:
-    """Return runs of consecutive places as half-open ranges."""
-    runs: list[tuple[int, int]] = []
+def _runs(places: list[int]) -> list[range]:
+    """Return increasing places as ranges."""
+    runs: list[range] = []
     for place in places:
-        if runs and runs[-1][1] == place:
-            runs[-1] = (runs[-1][0], place + 1)
+        last = runs[-1] if runs else range(0)
+        step = place - last[-1] if last else 0
+        if len(last) == 1 or (last and step == last.step):
+            runs[-1] = range(last.start, place + 1, step)
         else:
-            runs.append((place, place + 1))
+            runs.append(range(place, place + 1))
     return runs
 
 
