@@ -98,10 +98,10 @@ def find_file(problem: Problem, where: Path | None = None) -> ReferenceFile | No
 
 
 def _path(problem: Problem, where: Path | None) -> Path | None:
-    start, parameters = _start(problem), _hex(problem.par)
+    wanted = start(problem), hexadecimal(problem.par)
     for path in sorted((where or folder()).glob(f"{problem.name}*.json")):
         stored = _read(path)
-        if (stored.start, stored.parameters) == (start, parameters):
+        if (stored.start, stored.parameters) == wanted:
             return path
     return None
 
@@ -129,15 +129,15 @@ def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
     """
     # multiplied first: round numbers stay round, and are met by a sampling grid
     times = problem.t0 + (problem.t_end - problem.t0) * np.arange(intervals + 1) / intervals
-    states = _taylor128(problem, times, TOLERANCE)
-    check = _taylor128(problem, times, CHECK_TOLERANCE)
+    states = taylor(problem, times, TOLERANCE)
+    check = taylor(problem, times, CHECK_TOLERANCE)
     difference = max(
         abs(a - b) for row, other in zip(states, check, strict=True) for a, b in zip(row, other, strict=True)
     )
     return ReferenceFile(
         problem=repr(problem),
-        start=_start(problem),
-        parameters=_hex(problem.par),
+        start=start(problem),
+        parameters=hexadecimal(problem.par),
         provenance={
             "method": f"heyoka taylor_adaptive, fp_type=real128, tol={TOLERANCE}, high_accuracy=True",
             "heyoka": version("heyoka"),
@@ -145,7 +145,7 @@ def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
             "field": problem.system.fingerprint,
             "check": f"largest difference of any component from tol={CHECK_TOLERANCE}: {difference:.1e}",
         },
-        t=_hex(times),
+        t=hexadecimal(times),
         y=[[str(value) for value in row] for row in states],
     )
 
@@ -183,12 +183,14 @@ def _text(value: object) -> str:
     return msgspec.json.encode(value).decode()
 
 
-def _hex(values: Array) -> list[str]:
+def hexadecimal(values: Array) -> list[str]:
+    """Return doubles as text that loses nothing."""
     return [value.hex() for value in np.asarray(values, float).tolist()]
 
 
-def _start(problem: Problem) -> list[str]:
-    return [float(problem.t0).hex(), *_hex(problem.y0)]
+def start(problem: Problem) -> list[str]:
+    """Return the initial time and state of a problem, as in a file."""
+    return [float(problem.t0).hex(), *hexadecimal(problem.y0)]
 
 
 @lru_cache(maxsize=32)
@@ -209,7 +211,27 @@ def parse(stored: ReferenceFile) -> Reference:
     return Reference(np.array([float.fromhex(t) for t in stored.t]), high, low, stored.provenance)
 
 
-def _taylor128(problem: Problem, times: Array, tolerance: str) -> list[list[Decimal]]:
+def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "real128") -> list[list[Decimal]]:
+    """Return the states at given times by heyoka's Taylor method.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate; every number enters as the exact double.
+    times : ndarray, shape (n,)
+        Times from ``t0`` on.
+    tolerance : str
+        Decimal text.
+    precision : {"real128", "longdouble"}
+        Arithmetic: 113 or 64 bits.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        Without heyoka.
+    problems.errors.InputError
+        If the computation does not reach the last time.
+    """
     try:
         import heyoka as hy
     except ImportError:
@@ -218,7 +240,7 @@ def _taylor128(problem: Problem, times: Array, tolerance: str) -> list[list[Deci
         ) from None
     from problems import emit
 
-    real = hy.real128
+    real = hy.real128 if precision == "real128" else np.longdouble
     integrator = hy.taylor_adaptive(
         emit.heyoka(problem.system),
         np.array([real(value) for value in problem.y0.tolist()]),
