@@ -42,6 +42,8 @@ MethodOption = Annotated[
 SEPARATE = {
     "race": "hbvm_bench.race.command",
     "endure": "hbvm_bench.endure.command",
+    "engines": "hbvm_bench.commands.engines",
+    "inspect": "hbvm_bench.commands.inspect",
 }
 
 
@@ -282,7 +284,7 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, jobs: int | No
 
 def _print_results(records: list[Record], keys: list[str] | None, sort: str | None) -> None:
     console = terminal.console()
-    for table in terminal.results(records, keys, sort):
+    for table in terminal.results(records, keys, sort, console.width):
         console.print(table)
 
 

@@ -74,10 +74,11 @@ class Row:
 
 
 def columns(records: Sequence[Record], keys: Sequence[str] | None = None) -> list[Metric]:
-    """Return the metrics to show: those asked for, or the headline ones that any case has."""
+    """Return the metrics to show: those asked for, or the headline ones that any case has a value of."""
     if keys:
         return [find(key) for key in keys]
-    present = {key for record in records for key in record.result.metrics}
+    metrics = [item for record in records for item in record.result.metrics.items()]
+    present = {key for key, value in metrics if value.value is not None}
     return [METRICS[key] for key in HEADLINE if key in present or not present]
 
 

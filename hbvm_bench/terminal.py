@@ -11,9 +11,21 @@ from rich.table import Table
 from rich.text import Text
 
 from hbvm_bench.identity import Resolved
+from hbvm_bench.metrics import Metric
 from hbvm_bench.records import Record
 from hbvm_bench.table import GROUPS, Row, columns, numbers, rows, seconds, status_of
 
+NARROWEST = 24  # characters for the methods
+# Where a terminal is narrow, these columns are left out, in this order.
+GIVEN_UP = (
+    "compile_seconds",
+    "evaluations",
+    "z_end",
+    "steps",
+    "z_error",
+    "guard_max",
+    "angular_momentum_max",
+)
 PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded at 80
 
 
@@ -95,29 +107,46 @@ class Live:
 
 
 def results(
-    records: Sequence[Record], keys: Sequence[str] | None = None, sort: str | None = None
+    records: Sequence[Record],
+    keys: Sequence[str] | None = None,
+    sort: str | None = None,
+    width: int = PIPE_WIDTH,
 ) -> list[RenderableType]:
-    """Return, for each problem, its table and the remarks on its rows."""
+    """Return, for each problem, its table and the remarks on its rows.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The cases.
+    keys : sequence of str, optional
+        Only these metrics, whether they fit or not.
+    sort : str, optional
+        Metric to sort by.
+    width : int
+        Of the terminal, in characters.
+    """
     problems = list(dict.fromkeys(record.case.problem for record in records))
     return [
-        _results(problem, [r for r in records if r.case.problem == problem], keys, sort)
+        _results(problem, [r for r in records if r.case.problem == problem], keys, sort, width)
         for problem in problems
     ]
 
 
 def _results(
-    problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None
+    problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None, width: int
 ) -> RenderableType:
     shown = columns(records, keys)
+    lines = rows(records, sort)
+    hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
     made = Table(title=Text(problem), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    made.add_column("#", justify="right")
-    made.add_column("method", overflow="fold")
+    made.add_column("#", justify="right", no_wrap=True)
+    made.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:
         made.add_column(metric.short, justify="right", no_wrap=True)
     remarks = Table.grid(padding=(0, 2))
     group = ""
-    for row in rows(records, sort):
+    for row in lines:
         if row.group != group:
             if group:
                 made.add_section()
@@ -127,8 +156,31 @@ def _results(
         made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
         if row.remark:
             remarks.add_row(Text(number, justify="right"), Text(f"{row.record.case.method}: {row.remark}."))
-    brackets = Text("In brackets: void, for the row is another trajectory or only a part of it.", style="dim")
-    return Group(made, brackets, remarks, "")
+    note = "In brackets: void, for the row is another trajectory or only a part of it."
+    if hidden:
+        note += f" {hidden} columns do not fit; a wider terminal or --metric shows them."
+    return Group(made, Text(note, style="dim"), remarks, "")
+
+
+def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metric]:
+    """Return the columns that fit beside the methods, the least telling given up first."""
+    kept = list(shown)
+
+    def needed() -> int:
+        texts = [
+            max(
+                len(metric.short),
+                *(len(row.cells[metric.key].text) + 2 for row in lines if metric.key in row.cells),
+            )
+            for metric in kept
+        ]
+        return 5 + NARROWEST + sum(length + 3 for length in texts)
+
+    for key in GIVEN_UP:
+        if needed() <= width:
+            break
+        kept = [metric for metric in kept if metric.key != key]
+    return kept
 
 
 def _method(row: Row) -> Text:

@@ -84,6 +84,10 @@ def summary(records: Sequence[Record]) -> list[str]:
             sentences.append(_best(f"Fastest of the {len(fast)} that keep {level}", fast[:3], "warm_seconds"))
         elif any(r.timing for r in ranked):
             sentences.append(f"No case that was timed keeps {level}.")
+    elif groups["on"]:
+        sentences.append(
+            "There is no stored reference for this problem: positions are not measured, and nothing is ranked."
+        )
     for record in groups["ended"]:
         if record.result.outcome == "stalled":
             sentences.append(f"{record.case.method} {status_of(record)}, seen by the watchdog.")

@@ -319,3 +319,12 @@ def test_text_in_markdown_stays_in_its_cell(text):
 
 def test_the_rules_name_the_tolerance_that_is_used():
     assert any(f"{GUARD_TOLERANCE:g}" in rule for rule in words.RULES)
+
+
+def test_without_a_reference_nothing_is_ranked(run):
+    record = run.records()[0]
+    metrics = {k: v for k, v in record.result.metrics.items() if not k.startswith("position")}
+    bare = msgspec.structs.replace(record, result=msgspec.structs.replace(record.result, metrics=metrics))
+    said = words.summary([bare, bare])
+    assert any("no stored reference" in sentence for sentence in said)
+    assert not any(sentence.startswith(("Smallest", "Fastest")) for sentence in said)

@@ -1,9 +1,13 @@
+import io
+
 import pytest
+from rich.console import Console
 
 from hbvm_bench.campaign import Case
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record, Result, Value
 from hbvm_bench.table import columns, format_value, group_of, numbers, rows, seconds, status_of
+from hbvm_bench.terminal import results
 from problems.errors import InputError
 
 
@@ -102,3 +106,18 @@ def test_a_method_has_one_number_on_all_problems():
     other = Record(id="x", case=Case(problem="q()", method="near()"), role="peer", library="x", order=None,
                    result=Result(outcome="ok"))  # fmt: skip
     assert numbers([FAR, NEAR, other]) == {"far()": 1, "near()": 2, "x": 2}
+
+
+def test_a_narrow_terminal_gives_up_columns_and_keeps_the_methods():
+    metrics = {key: Value(value=1e-9) for key in METRICS}
+    full = record("HBVM(k=16, s=8, h=0.125)", metrics=metrics)
+    for width, hidden in ((60, True), (200, False)):
+        console = Console(width=width, record=True, file=io.StringIO())
+        for renderable in results([full], width=width):
+            console.print(renderable)
+        text = console.export_text()
+        assert "HBVM(k=16, s=8, h=0.125)" in text
+        assert "energy" in text
+        assert "position" in text
+        assert ("columns do not fit" in text) == hidden
+        assert ("compile" in text) != hidden
