@@ -26,9 +26,11 @@ Array = NDArray[np.float64]
 
 PER_DECADE = 4  # windows
 FEWEST_WINDOWS = 6
+FEWEST_ABOVE = 3  # windows in which a growth is above its floor: fewer may be an outlier
 SHORTEST = 1.2  # decades
 NOISE = 0.05  # of the logarithm: no fit is taken to be better than this
 CONFIDENCE = 0.95
+EVIDENCE = 6.0  # by which the criterion of a growth must beat a bound: strong evidence
 STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
 
 LAWS: dict[str, str] = {
@@ -151,12 +153,14 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
         name for name in LAWS if name != "power" or not any(slope[1] <= a <= slope[2] for a in (0.5, 1.0))
     ]
     law = min(named, key=lambda name: fits[name].score)
+    if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
+        law = "bounded"
     return _drift(
         law,
         "",
         slope,
         math.exp(fits[law].parameters[0]),
-        fits[law].parameters[2] if law == "exponential" else 0.0,
+        _rate_of_growth(times, rows, math.exp(fits[law].parameters[0])) if law == "exponential" else 0.0,
         drift,
         len(rows),
     )
@@ -164,9 +168,10 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
 
 @dataclass(frozen=True)
 class _Fit:
-    parameters: tuple[float, ...]
+    parameters: tuple[float, ...]  # ln of the floor, ln of the growth at the end, power or e-foldings
     score: float  # Bayesian information criterion
     spread: float  # standard error of the last parameter
+    above: int  # windows in which the growth has passed the floor
 
 
 def _growth(law: str, t: Array) -> Callable[[Array], Array]:
@@ -188,7 +193,7 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     logs = np.log(values)
     n = logs.size
     if law == "bounded":
-        return _Fit((float(np.mean(logs)),), _score(logs - np.mean(logs), 1), 0.0)
+        return _Fit((float(np.mean(logs)),), _score(logs - np.mean(logs), 1), 0.0, 0)
     low, high = float(logs.min()), float(logs.max())
     grown = _growth(law, t)
 
@@ -210,9 +215,18 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     parameters = found.x.tolist()
     normal = found.jac.T @ found.jac + 1e-12 * np.eye(found.x.size)
     variance = max(2.0 * found.cost / max(n - found.x.size, 1), NOISE**2) * np.linalg.inv(normal)[-1, -1]
-    if law == "exponential":
-        parameters[2] /= t[-1]
-    return _Fit(tuple(parameters), _score(residual(found.x), found.x.size), math.sqrt(max(variance, 0.0)))
+    above = int(np.sum(grown(found.x[1:]) > found.x[0]))
+    score = _score(residual(found.x), found.x.size)
+    return _Fit(tuple(parameters), score, math.sqrt(max(variance, 0.0)), above)
+
+
+def _rate_of_growth(t: Array, rows: Array, floor: float) -> float:
+    """Return the rate of an exponential from the samples well above the floor: a window is too wide for it."""
+    values = rms(rows)
+    clear = values > 10.0 * floor
+    if clear.sum() < 2:
+        return math.nan
+    return float(np.polyfit(t[clear], np.log(values[clear]), 1)[0])
 
 
 def _score(residual: NDArray[np.floating], parameters: int) -> float:
@@ -252,6 +266,7 @@ def _interval(mean: float, error: float, count: int) -> tuple[float, float]:
 def _windows(t: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return the middle of each window that has samples, and the number of the window of each sample."""
     number = np.floor((np.log10(t) - math.log10(t[0])) * PER_DECADE + 1e-9).astype(np.intp)
+    number[-1] = number[-2]  # the end alone is no window
     present, label = np.unique(number, return_inverse=True)
     middle = np.array([math.exp(np.mean(np.log(t[label == i]))) for i in range(present.size)])
     return middle, label

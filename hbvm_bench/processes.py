@@ -10,15 +10,17 @@ from collections.abc import Sequence
 from hbvm_bench import machine
 from hbvm_bench.worker import ENVIRONMENT
 
+STDERR = 2  # the file descriptor
+
 
 def wait(command: Sequence[str]) -> int:
     """Run a command with one thread for every library, and return its exit code.
 
-    What it prints goes where ours goes. On Ctrl-C, or whatever else ends the waiting, it
+    What it prints goes to our standard error. On Ctrl-C, or whatever else ends the waiting, it
     is killed first.
     """
     child = subprocess.Popen(
-        list(command), stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno(), env={**os.environ, **ENVIRONMENT}
+        list(command), stdin=subprocess.DEVNULL, stdout=STDERR, env={**os.environ, **ENVIRONMENT}
     )
     try:
         return child.wait()

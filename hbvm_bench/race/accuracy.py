@@ -65,7 +65,8 @@ def sample_times(t0: float, t_end: float, h: float | None) -> Array:
     if h is None:
         return np.unique(t0 + (t_end - t0) * share)
     steps = np.unique(np.rint((t_end - t0) * share / h))
-    return t0 + h * steps[(steps > 0) & (t0 + h * steps <= t_end)]
+    own = t0 + h * steps[(steps > 0) & (t0 + h * steps <= t_end)]
+    return own if own.size else np.array([t_end])
 
 
 def prepare(problem: Problem, setting: Setting, true: Reference, t_end: float) -> Entry:

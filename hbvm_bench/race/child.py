@@ -56,14 +56,25 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
 
 def main(path: Path) -> None:
     """Run the contests of a request and store their results."""
+    described = _machine()
     processes.settle()
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     for key in request.contests:
-        results.save(run(CONTESTS[key], request), Path(request.out))
+        results.save(run(CONTESTS[key], request, described), Path(request.out))
 
 
-def run(contest: Contest, request: Request) -> Race:
-    """Run one contest and return its result."""
+def run(contest: Contest, request: Request, described: dict[str, str | int]) -> Race:
+    """Run one contest and return its result.
+
+    Parameters
+    ----------
+    contest : Contest
+        What to run.
+    request : Request
+        How.
+    described : dict
+        The machine in words.
+    """
     started, start = datetime.now(UTC).isoformat(timespec="seconds"), time.perf_counter()
     problem = make_problem(contest.problem)
     true = truth.known(problem)
@@ -71,6 +82,7 @@ def run(contest: Contest, request: Request) -> Race:
     t_end = float(true.t[truth.nearest(true, problem.t0 + share * (problem.t_end - problem.t0))])
     declared = settings(contest.key, quick=request.quick)
     with _progress() as bar:
+        bar.console.print(f"{contest.key}: {len(declared)} settings", highlight=False)
         task = bar.add_task(f"{contest.key}: errors", total=len(declared), now="")
         entries = []
         for setting in declared:
@@ -82,6 +94,7 @@ def run(contest: Contest, request: Request) -> Race:
         def tell(number: int) -> None:
             bar.update(task, completed=number, now=f"round {number + 1}")
 
+        bar.console.print(f"{contest.key}: {request.rounds} rounds of timing", highlight=False)
         outcomes, calibration, load = time_rounds(entries, request.rounds, tell)
         bar.update(task, completed=request.rounds, now="compile times" if request.probes else "")
         families = list(dict.fromkeys(setting.family for setting in declared))
@@ -96,7 +109,7 @@ def run(contest: Contest, request: Request) -> Race:
         probes=probes,
         reference=true.provenance,
         load=load,
-        machine=_machine(),
+        machine=described,
         versions={name: _version(name) for name in LIBRARIES},
         command=request.command,
         started=started,

@@ -9,17 +9,15 @@ from typing import Annotated, Any
 
 import msgspec
 import typer
-from rich import box
-from rich.table import Table as RichTable
 from rich.text import Text
 
 from hbvm_bench import processes, terminal
+from hbvm_bench.cells import on_terminal
 from hbvm_bench.race import results, standings, tables
 from hbvm_bench.race.child import Request
 from hbvm_bench.race.contests import CONTESTS, chosen
 from hbvm_bench.race.results import Contest, Race
 from hbvm_bench.race.settings import FAMILIES, settings
-from hbvm_bench.race.tables import Table
 from hbvm_bench.store import ensure_writable
 
 ROUNDS = 9
@@ -167,19 +165,7 @@ def _declare(contests: Sequence[Contest], quick: bool, *, error: bool) -> None:
 def _show(races: Sequence[Race]) -> None:
     for table in [tables.headline(races), tables.goals(races), *map(tables.fastest, races)]:
         if table.rows:
-            terminal.console().print(_rich(table))
-
-
-def _rich(table: Table) -> RichTable:
-    made = RichTable(
-        title=Text(table.title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, caption=table.note
-    )
-    for index, head in enumerate(table.head):
-        words = index == 0 or index in table.words
-        made.add_column(Text(head), justify="left" if words else "right", overflow="fold")
-    for row in table.rows:
-        made.add_row(*(Text(cell) for cell in row))
-    return made
+            terminal.console().print(on_terminal(table))
 
 
 def _command(

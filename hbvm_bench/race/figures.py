@@ -29,12 +29,16 @@ def work_precision(race: Race) -> Picture | None:
         times = [outcome.median or 1.0 for outcome in shown]
         low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
         levels = asked(race)
+        figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
         for axes, title, level, key in (
             (left, "energy error", levels[0], "energy"),
             (right, "position error at the end", levels[1], "position"),
         ):
             log_axis(axes, "x", low, max(high, low + 1))
-            log_axis(axes, "y", FLOOR, TOP, most=9)
+            worst = max(_height(outcome, key) for outcome in shown)
+            log_axis(
+                axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9
+            )
             axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
             for family in standings.present(race):
                 _draw(axes, [o for o in shown if o.setting.family == family], family, key)

@@ -8,6 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.race import tables
 from hbvm_bench.race.accuracy import SAMPLES
 from hbvm_bench.race.figures import work_precision
@@ -15,7 +16,6 @@ from hbvm_bench.race.results import Race
 from hbvm_bench.race.rounds import SHORTEST
 from hbvm_bench.race.settings import FAMILIES
 from hbvm_bench.race.standings import calibrated, present
-from hbvm_bench.race.tables import Table
 from hbvm_bench.report.canvas import Picture, inline_svg
 from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, base_colours
@@ -127,7 +127,7 @@ def remarks(race: Race) -> list[str]:
 def markdown(sections: Sequence[Section], top: Sequence[Table]) -> str:
     """Return the report as markdown, with relative links to its figures."""
     environment = _environment(autoescape=False)
-    environment.filters |= {"plain": plain, "code": code}
+    environment.filters |= {"plain": plain, "code": code, "table": in_markdown}
     return environment.get_template("race.md.j2").render(**_content(sections, top))
 
 

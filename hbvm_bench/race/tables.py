@@ -1,9 +1,9 @@
 """The tables of a race, as text cells: the terminal and both reports print these."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from statistics import median
 
+from hbvm_bench.cells import Table
 from hbvm_bench.race import standings
 from hbvm_bench.race.results import Outcome, Probe, Race
 from hbvm_bench.race.settings import FAMILIES, OURS
@@ -17,31 +17,6 @@ CACHES = {
     "kernel": "our kernel, not this problem",
     "full": "everything",
 }
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of text.
-
-    Attributes
-    ----------
-    title : str
-        One line.
-    head : tuple of str
-        Column heads; the first column is text, the others are numbers unless in ``words``.
-    rows : list of tuple of str
-        Cells.
-    note : str
-        A sentence under the table.
-    words : tuple of int
-        Which other columns hold words.
-    """
-
-    title: str
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    note: str = ""
-    words: tuple[int, ...] = field(default=())
 
 
 def headline(races: Sequence[Race]) -> Table:

@@ -1,0 +1,126 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hbvm_bench import drift
+from problems.errors import InputError
+
+T = np.unique(np.rint(np.geomspace(10, 1e6, 120)))
+
+
+def walks(seed, starts=8, every=10.0):
+    """Return random walks of unit steps, looked at the times `T`."""
+    steps = np.random.default_rng(seed).standard_normal((starts, int(T[-1] / every)))
+    return np.cumsum(steps, axis=1)[:, (T / every).astype(int) - 1]
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=12, deadline=None)
+def test_a_random_walk_grows_like_the_square_root_and_has_no_drift(seed):
+    law = drift.fit(T, walks(seed))
+    assert law.law in ("square root", "power")
+    # measured over 200 seeds: slope 0.36 to 0.66
+    assert 0.25 < law.slope < 0.8
+    assert law.rate_low < law.rate < law.rate_high
+
+
+def test_the_interval_of_the_drift_of_random_walks_holds_zero_as_often_as_it_says():
+    held = 0
+    for seed in range(60):
+        _, low, high = drift.rate(T, walks(seed))
+        held += low < 0.0 < high
+    # 95 % of 60 is 57; measured 56
+    assert held >= 50
+
+
+@given(st.floats(1e-20, 1e-3), st.sampled_from([-1.0, 1.0]), st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_a_biased_walk_is_linear_and_its_rate_is_the_bias(bias, sign, seed):
+    law = drift.fit(T, sign * bias * T + bias * walks(seed))
+    assert law.law == "linear"
+    assert abs(law.slope - 1.0) < 0.02  # measured 2e-3
+    assert law.rate_low <= sign * bias <= law.rate_high or abs(law.rate - sign * bias) < 0.01 * bias
+
+
+@given(st.floats(1e-18, 1e-2), st.integers(0, 1000))
+@settings(max_examples=20, deadline=None)
+def test_noise_of_one_size_is_bounded(size, seed):
+    law = drift.fit(T, size * np.random.default_rng(seed).standard_normal((8, T.size)))
+    assert law.law == "bounded"
+    assert abs(law.floor / size - 1.0) < 0.3  # measured 0.1
+
+
+def test_an_oscillation_is_bounded():
+    assert drift.fit(T, 1e-9 * np.sin(1.3 * T)).law == "bounded"
+
+
+def test_an_unstable_orbit_is_exponential_and_its_rate_is_found():
+    noise = np.random.default_rng(3).standard_normal((4, T.size))
+    law = drift.fit(T, 1e-15 * (np.exp(T / 5e4) + noise))
+    assert law.law == "exponential"
+    assert abs(law.growth * 5e4 - 1.0) < 0.1  # measured 1e-3
+
+
+def test_growth_above_a_floor_is_seen_as_growth():
+    law = drift.fit(T, 1e-16 * (walks(5) + 30.0 * np.random.default_rng(5).standard_normal((8, T.size))))
+    assert law.law == "square root"
+    assert 1e-15 < law.floor < 1e-14  # measured 3.0e-15
+
+
+def test_another_power_is_called_a_power():
+    law = drift.fit(T, 1e-18 * T**2 * np.ones((3, 1)))
+    assert law.law == "power"
+    assert abs(law.slope - 2.0) < 0.02  # measured 3e-3
+
+
+@given(st.floats(1e-12, 1e12), st.floats(1e-6, 1e6))
+@settings(max_examples=20, deadline=None)
+def test_the_law_does_not_depend_on_the_units(scale, unit):
+    errors = walks(11)
+    plain, other = drift.fit(T, errors), drift.fit(unit * T, scale * errors)
+    assert other.law == plain.law
+    assert math.isclose(other.slope, plain.slope, abs_tol=1e-3)
+    assert math.isclose(other.rate, plain.rate * scale / unit, rel_tol=1e-9)
+
+
+def test_one_start_has_a_slope_but_no_interval_for_its_rate():
+    law = drift.fit(T, walks(1, starts=1)[0])
+    assert law.starts == 1
+    assert math.isfinite(law.slope_low)
+    assert law.rate_high == math.inf
+
+
+def test_an_error_of_exactly_zero_is_bounded_by_zero():
+    law = drift.fit(T, np.zeros((4, T.size)))
+    assert (law.law, law.floor, law.slope) == ("bounded", 0.0, 0.0)
+
+
+def test_too_few_samples_have_no_law_and_say_why():
+    law = drift.fit([1.0, 2.0, 3.0], [1.0, 2.0, 3.0])
+    assert law.law is None
+    assert "windows" in law.why
+
+
+def test_errors_without_a_sign_have_no_rate():
+    assert math.isnan(drift.fit(T, np.abs(walks(2)), signed=False).rate)
+
+
+@pytest.mark.parametrize(
+    ("t", "errors", "words"),
+    [
+        ([1.0, 2.0], [1.0], "do not belong"),
+        ([1.0, 2.0], [1.0, math.nan], "finite"),
+        ([0.0, 2.0], [1.0, 1.0], "positive"),
+        ([2.0, 1.0], [1.0, 1.0], "ascending"),
+    ],
+)
+def test_what_is_no_series_is_refused(t, errors, words):
+    with pytest.raises(InputError, match=words):
+        drift.fit(t, errors)
+
+
+def test_the_rms_is_over_the_trajectories_and_does_not_overflow():
+    assert drift.rms([[3e200, 0.0], [4e200, 0.0]]).tolist() == pytest.approx([math.sqrt(12.5) * 1e200, 0.0])
