@@ -74,21 +74,18 @@ def chaos(
         right.set_xlabel("z")
         right.set_ylabel("velocity")
         right.set_title(f"at every apocentre of the primaries, e = {e:g}", color=INK)
-        right.legend(loc="upper right")
+        right.legend(loc="upper right", markerscale=3)
         at = min(rows, key=lambda row: abs(row.e - e))
         return picture(
             figure,
             "sitnikov-chaos",
             "Beyond the paper · is it chaos?",
             "Left: the rate at which a small offset grows. Along the axis it falls with the length of the "
-            "run, as the "
-            "logarithm of time over time: the orbit of this start is regular at every eccentricity shown. "
-            "Off the axis it "
-            "is large at every eccentricity. Right: orbits of many starts, seen once per revolution. The "
-            "paper's start is on "
-            "a closed curve inside the regular region; outside, planetoids wander and leave. The massless "
-            "planetoid; "
-            "orbits mirrored in the velocity.",
+            "run, as the logarithm of time over time, up to e ≈ 0.8: the orbit of this start is regular "
+            "there. Beyond, it no longer falls, and the orbit is chaotic. Off the axis it is large at every "
+            "eccentricity. Right: orbits of many starts, seen once per revolution. The paper's start is on "
+            "a closed curve inside the regular region; outside, planetoids wander and leave. Mass of the "
+            "planetoid neglected.",
             f"At e = {at.e:g}: along the axis "
             + ", ".join(f"{rate:.1e} after {turn} revolutions" for turn, rate in at.along)
             + f"; off the axis {at.across:.3f}, a factor e every {1 / at.across:.2f} units of time.",
@@ -139,9 +136,7 @@ def territory(
             "sitnikov-territory",
             "Beyond the paper · who stays on the axis",
             "For each eccentricity of the primaries and each speed at the start: how long the planetoid "
-            "stays, on the axis "
-            "and without rounding's help or harm. The edge of the blank region is the end of regular motion; "
-            "the paper's run "
-            "lies inside it.",
+            "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
+            "end of regular motion; the paper's run lies inside it.",
             f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
         )

@@ -4,6 +4,7 @@ import csv
 import io
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated
@@ -56,7 +57,7 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
     float
         Seconds that it took.
     """
-    from hbvm_bench.paper.page import markdown, page
+    from hbvm_bench.paper.page import flat_heads, markdown, page
     from hbvm_bench.paper.tasks import run_all
 
     started = time.perf_counter()
@@ -81,7 +82,7 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
             files[Path("figures") / f"{picture.key}.svg"] = picture.svg.encode()
             files[Path("figures") / f"{picture.key}.png"] = picture.png
         for table in part.tables:
-            files[Path("data") / f"{table.key}.csv"] = _csv([table.head, *table.rows])
+            files[Path("data") / f"{table.key}.csv"] = _csv([flat_heads(table), *table.rows])
     claims = [(part.title, c.words, c.paper, c.here, c.verdict) for part in parts for c in part.claims]
     files[Path("data") / "claims.csv"] = _csv([("part", "claim", "paper", "here", "verdict"), *claims])
     for name, data in files.items():
@@ -98,7 +99,7 @@ def _module(name: str) -> ModuleType:
     return modules[PARTS.index(name)]
 
 
-def _csv(rows: list[tuple[str, ...]]) -> bytes:
+def _csv(rows: Sequence[Sequence[str]]) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()

@@ -48,7 +48,21 @@ class Claim:
 
 @dataclass(frozen=True)
 class Table:
-    """A table: ``head`` names the columns; columns in ``numbers`` are set right."""
+    """A table.
+
+    Attributes
+    ----------
+    key, title, caption : str
+        Anchor and file name, heading, what the columns mean.
+    head : tuple of str
+        Names of the columns.
+    rows : tuple of tuple of str
+        The cells.
+    numbers : frozenset of int
+        Columns that are set right; the first one is code where it is not among them.
+    groups : tuple of (str, int)
+        Labels over columns, each with how many it is over; may be empty.
+    """
 
     key: str
     title: str
@@ -56,6 +70,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     numbers: frozenset[int] = frozenset()
     caption: str = ""
+    groups: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,7 +112,9 @@ def number(value: float | None, digits: int = 2) -> str:
         return "–"
     if value == 0:
         return "0"
-    if 1e-2 <= abs(value) < 1e5:
+    if 1e3 <= abs(value) < 1e6:
+        return f"{value:,.0f}"
+    if 1e-2 <= abs(value) < 1e3:
         return f"{value:.{digits + 1}g}"
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}e{int(exponent)}"

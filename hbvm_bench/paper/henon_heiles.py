@@ -25,7 +25,7 @@ NEIGHBOURS = 32
 
 DIRECTIONS = tuple((np.arange(36) * 2 * math.pi / 36).tolist())
 GAPS = tuple((10.0 ** np.linspace(-5.0, -2.0, 19)).tolist())
-MAP_END = 1e4
+MAP_END = 2e4
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from hbvm_bench import reference as references
 from hbvm_bench.identity import make_method
 from hbvm_bench.paper import henon_heiles, period_annulus, sitnikov
-from integrators import integrate
+from integrators import Solution, integrate
 from integrators.protocol import MethodBase
 from problems import Problem, load
 from problems.errors import InputError
@@ -91,7 +91,7 @@ def on_sitnikov(text: str) -> Row:
     }
     known = references.find(problem)
     if solution.status.failed:
-        return Row(text, {}, solution.reason)
+        return Row(text, {}, _ended(solution))
     if known is not None:
         numbers["z"] = float(abs(solution.y[-1, 8] - known.high[-1, 8]))
     return Row(text, numbers, "")
@@ -118,7 +118,7 @@ def on_henon_heiles(text: str) -> Row:
         "outside": float(solution.guards()["beyond_triangle"][finite].max()),
         "agrees": float(solution.t[parted[0]] if parted.size else solution.t[-1]),
     }
-    return Row(text, numbers, solution.reason)
+    return Row(text, numbers, _ended(solution) if solution.status.failed else "")
 
 
 def on_period_annulus(text: str) -> Row:
@@ -131,6 +131,10 @@ def on_period_annulus(text: str) -> Row:
     every = None if method.library == "hbvm-bench" else LOOK
     found = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
     return Row(text, {"c": found.c, "error": period_annulus.error_of(found.c)}, "")
+
+
+def _ended(solution: Solution) -> str:
+    return f"{solution.status.replace('_', ' ')} at t = {solution.t_stop:.5g}"
 
 
 def _refused(method: MethodBase, problem: Problem) -> str | None:

@@ -19,9 +19,8 @@ PAPER = (
     "Hamiltonian BVMs defined over Gauss points"
 )
 LEAD = (
-    "Every experiment, figure and table of the paper from one command, beside what the paper says. Where the "
-    "two "
-    "differ, the difference is explained; where the paper is silent, it is measured."
+    "Every experiment, figure and table of the paper from one command, beside what the paper says. Where "
+    "the two differ, the difference is explained; where the paper is silent, it is measured."
 )
 ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
 COLOURS = {GAUSS: "--gauss", HBVM: "--hbvm"}
@@ -31,7 +30,7 @@ def markdown(parts: Sequence[Part], command: str) -> str:
     """Return the report as markdown with relative links to its figures."""
     environment = _environment(autoescape=False)
     environment.filters |= {"plain": plain, "code": code, "prose": prose}
-    environment.globals |= {"kind": kind, "cell": markdown_cell}
+    environment.globals |= {"kind": kind, "cell": markdown_cell, "heads": flat_heads}
     text = environment.get_template("paper.md.j2").render(**_values(parts, command))
     return re.sub(r"\n{3,}", "\n\n", text)
 
@@ -57,15 +56,22 @@ def page(parts: Sequence[Part], command: str) -> str:
 
 
 def drawing(picture: Picture) -> Markup:
-    """Return the SVG of a figure for the page, no wider than its text allows."""
+    """Return the SVG of a figure for the page, at sizes at which its text can be read."""
     width = float(re.findall(r'viewBox="0 0 ([\d.]+)', picture.svg)[0])
     svg = inline_svg(picture, COLOURS)
-    return Markup(svg.replace("<svg ", f'<svg style="max-width:{width * ENLARGED:.0f}px" ', 1))
+    size = f"max-width:{width * ENLARGED:.0f}px;min-width:{width:.0f}px"
+    return Markup(svg.replace("<svg ", f'<svg style="{size}" ', 1))
 
 
 def kind(block: object) -> str:
     """Return what a block of a part is: ``text``, ``picture`` or ``table``."""
     return "picture" if isinstance(block, Picture) else "table" if isinstance(block, Table) else "text"
+
+
+def flat_heads(table: Table) -> list[str]:
+    """Return one head per column, with its group's label before it."""
+    labels = [label for label, width in table.groups for _ in range(width)] or [""] * len(table.head)
+    return [f"{label}: {word}" if label else word for label, word in zip(labels, table.head, strict=True)]
 
 
 def prose(text: str) -> str:
@@ -98,8 +104,8 @@ POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?![\w.]*\w)")
 
 
 def _power(match: re.Match[str]) -> str:
-    mantissa, exponent = match[1], match[2].replace("-", "−")
-    front = "" if mantissa == "1" else "−" if mantissa == "-1" else f"{mantissa}·"
+    mantissa, exponent = match[1].replace("-", "−"), str(int(match[2])).replace("-", "−")
+    front = mantissa.removesuffix("1") if mantissa in ("1", "−1") else f"{mantissa}·"
     return f'<span class="power">{front}10<sup>{exponent}</sup></span>'
 
 

@@ -10,6 +10,7 @@ from hbvm_bench.paper.departure import departure
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
+from problems import emit
 from problems.period_annulus import C_STAR, H_STAR, P1, period_annulus
 
 TOLERANCE = 2.0**-52
@@ -128,19 +129,21 @@ def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
     return [(error_of(C_STAR * (1 - gap)), _period(program, C_STAR * (1 - gap), method.h)) for gap in gaps]
 
 
-def saddle_rate() -> float:
-    """Return the positive eigenvalue of the linearised field at P1; the period grows as log(1/gap)/rate."""
-    from problems import emit
-
+def eigenvalues(point: Sequence[float]) -> NDArray[np.complex128]:
+    """Return the two eigenvalues of the field linearised at a point (q, p), by central differences."""
     field = emit.numpy(PROBLEM.system, "field")
     J = np.empty((2, 2))
     for j in range(2):
         step = np.zeros(2)
         step[j] = 1e-5
-        J[:, j] = (
-            field(0.0, np.array(P1) + step, PROBLEM.par) - field(0.0, np.array(P1) - step, PROBLEM.par)
-        ) / 2e-5
-    return float(np.linalg.eigvals(J).real.max())
+        ahead, behind = (field(0.0, np.array(point) + side * step, PROBLEM.par) for side in (1, -1))
+        J[:, j] = (ahead - behind) / 2e-5
+    return np.linalg.eigvals(J).astype(complex)
+
+
+def saddle_rate() -> float:
+    """Return the positive eigenvalue at P1; the period grows as log(1/gap)/rate."""
+    return float(eigenvalues(P1).real.max())
 
 
 def _period(program: Program, c: float, h: float) -> float:

@@ -37,8 +37,8 @@ def level_curves() -> Picture:
             figure,
             "period-annulus-1",
             "Figure 1 · level curves",
-            f"The edge of the period annulus is the loop of H* = {H_STAR:.10f} that leaves the saddle P₁ and "
-            "returns to it.",
+            f"The edge of the period annulus is the loop of H* = {H_STAR:.10f} that leaves the saddle P₁ "
+            "and returns to it.",
             "Closed curves around P0 up to the loop through P1; open ones beyond.",
         )
 
@@ -81,8 +81,7 @@ def closeup(gauss: Path, hbvm: Path, names: tuple[str, str]) -> Picture:
             "period-annulus-2",
             "Figure 2 · the two orbits from the points found",
             "Left: the error of the Hamiltonian. Right: the orbits near the saddle, where the line is the "
-            "loop H*. Gauss "
-            "scatters about it; the points of HBVM lie on it and run into P₁.",
+            "loop H*. Gauss scatters about it; the points of HBVM lie on it and run into P₁.",
             f"{names[0]}: H varies by {spread[0]:.1e}, closest to P1 {near[0]:.1e}; {names[1]}: "
             f"{spread[1]:.1e}, {near[1]:.1e}.",
         )
@@ -108,8 +107,8 @@ def periods(rows: Sequence[tuple[float, float]], rate: float) -> Picture:
             figure,
             "period-annulus-period",
             "The period grows without bound",
-            "The period against the distance from the edge: it grows as the logarithm, at the rate 1/λ with "
-            f"λ = {rate:.6f}. At H = H* the orbit never returns.",
+            "The period against the distance from the edge: it grows as the logarithm, at the rate 1/λ "
+            f"with λ = {rate:.6f}. At H = H* the orbit never returns.",
             f"From {period.min():.3f} near the centre to {period.max():.3f} at a relative distance of "
             f"{gap.min():.0e}.",
         )
@@ -127,12 +126,11 @@ def fates(series: Mapping[str, Sequence[tuple[float, float | None]]]) -> Picture
             axes.plot(stay, np.full(stay.size, 1.75 * SPAN), "|", color=colour, markersize=7, mew=0.9)
             axes.plot(*gone.T, ".", color=colour, markersize=3.2)
             axes.axhline(SPAN, color=MUTED, linewidth=0.6)
-            axes.set_ylim(2.0, 3 * SPAN)
-            log_axis(axes, "y", 1, 3)
-            axes.set_ylim(8.0, 3 * SPAN)
+            log_axis(axes, "y", 0, 3)
+            axes.set_ylim(4.0, 3 * SPAN)
             axes.text(1.005, 0.5, name, transform=axes.transAxes, va="center", fontsize=8.5, color=INK)
         low = int(np.floor(np.log10(min(gap for rows in series.values() for gap, _ in rows))))
-        log_axis(panels[-1], "x", low, 0, most=9)
+        log_axis(panels[-1], "x", low, -1, most=9)
         panels[-1].invert_xaxis()
         panels[-1].set_xlabel("relative distance of the start inside the true edge, 1 − c/c*")
         figure.supylabel("departs at time (upper row of each: stays)", fontsize=8.5)
@@ -141,12 +139,9 @@ def fates(series: Mapping[str, Sequence[tuple[float, float | None]]]) -> Picture
             "period-annulus-fates",
             "Beyond the paper · why the Gauss entries are what they are",
             "All these starts lie inside the annulus, so all should stay. Under HBVM they do. Under Gauss "
-            "there is no edge but a "
-            "layer in which starts that stay and starts that depart alternate on every scale: the bisection "
-            "ends at one of "
-            "many boundaries, and which one depends on the last bit. That is why the error is reproduced "
-            "within a "
-            "factor and the digits are not.",
+            "there is no edge but a layer in which starts that stay and starts that depart alternate on "
+            "every scale: the bisection ends at one of many boundaries, and which one depends on the last "
+            "bit. That is why the error is reproduced within a factor and the digits are not.",
             "; ".join(
                 f"{name}: {sum(time is not None for _, time in rows)} of {len(rows)} depart"
                 for name, rows in series.items()

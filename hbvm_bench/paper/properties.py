@@ -84,7 +84,7 @@ def stability(pairs: Sequence[tuple[int, int]]) -> tuple[float, float]:
 
 
 def collocation_gap(degrees: Sequence[int] = range(1, 9)) -> float:
-    """Return the largest difference of the HBVM(s, s) tableau from a_ij = int_0^{c_i} l_j, the paper's (2)."""
+    """Return the largest difference of the HBVM(s, s) tableau from the paper's a_ij = int_0^{c_i} l_j."""
     worst = 0.0
     for s in degrees:
         made = tableau(s, s)

@@ -52,8 +52,7 @@ def order(rows: Sequence[Order]) -> Picture:
             "properties-order",
             "The order is 2s for every k",
             "HBVM(k,s) on Hénon–Heiles for k = s (filled), s + 1, 2s and 3s (open), which lie on one "
-            "another: the silent stages "
-            "do not change the order. The numbers are the fitted slopes.",
+            "another: the silent stages do not change the order. The numbers are the fitted slopes.",
             "; ".join(f"HBVM({row.k},{row.s}): {row.slope:.2f}" for row in rows),
         )
 
@@ -74,9 +73,9 @@ def threshold(cubic: Sequence[Row], quintic: Sequence[Row]) -> Picture:
             figure,
             "properties-threshold",
             "Conservation from k ≥ νs/2",
-            "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper promises "
-            "exact conservation. "
-            "The dips to round-off just below it, at high s, are errors too small to see, not conservation.",
+            "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
+            "promises exact conservation. The dips to round-off just below it, at high s, are errors too "
+            "small to see, not conservation.",
             "; ".join(f"HBVM({k},{s}): {error:.0e}" for s, k, error in quintic),
         )
 

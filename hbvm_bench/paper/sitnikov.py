@@ -28,6 +28,7 @@ TRUTH = HBVM(k=16, s=8, h=H / 4)
 STEPS = (1 / 32, 1 / 16, 1 / 12, 0.1, 1 / 8, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8)
 STEPS_SHORT = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2)
 NEIGHBOURS = 32
+REVOLUTIONS = (1, 16, 31)  # drawn as lines, to see the ellipses turn
 TRIALS = (
     ("Gauss, s = 2, h = 1/8", Gauss(s=2, h=1 / 8)),
     ("HBVM(18,2), h = 1/2", HBVM_18),
@@ -100,8 +101,10 @@ class StepRow:
     turn, unsteady : float
         Rate at which the primaries' orbits turn, degrees per revolution, less the
         true one; rms of what a constant rate leaves, degrees.
+    period : float
+        Mean time between two apocentres of the primaries.
     slow : float
-        Relative error of the primaries' radial period.
+        Its relative error.
     reason : str
         Why it ended early; empty otherwise.
     """
@@ -115,8 +118,14 @@ class StepRow:
     z_error: float
     turn: float
     unsteady: float
+    period: float
     slow: float
     reason: str
+
+
+def usable(row: StepRow) -> bool:
+    """Whether the rates of a row describe the whole span of a bound planetoid."""
+    return row.lost is None and not row.reason
 
 
 def both_laws() -> MethodBase | None:
@@ -153,6 +162,17 @@ def orbits() -> dict[str, Orbit]:
     if method is not None:
         made["both"] = orbit(method)
     return made
+
+
+def ellipses() -> list[Array]:
+    """Return the paths (2, n) of the second primary under HBVM(18, 2) in the `REVOLUTIONS`."""
+    problem = problems.load("sitnikov", e=E, d=D, t_end=T_END)
+    stepper = HBVM_18.compile(problem.system).start(problem.y0, problem.par, 0.0)
+    paths = []
+    for number in REVOLUTIONS:
+        times = PERIOD * (number - 1 + np.linspace(0.0, 1.0, 401))
+        paths.append(stepper.advance(times).y[:, 3:5].T)
+    return paths
 
 
 def neighbours() -> list[float | None]:
@@ -232,6 +252,7 @@ def _row(solution: Solution, family: str, true_rate: float, truth: Solution) -> 
     rate, unsteady = turning(solution)
     lost = np.flatnonzero(np.abs(solution.y[:, 8]) > LOST)
     finished = not solution.status.failed
+    period = radial_period(solution)
     return StepRow(
         method=repr(method),
         family=family,
@@ -242,7 +263,8 @@ def _row(solution: Solution, family: str, true_rate: float, truth: Solution) -> 
         z_error=float(abs(solution.y[-1, 8] - truth.y[-1, 8])) if finished else float("nan"),
         turn=rate - (0.0 if family == "truth" else true_rate),
         unsteady=unsteady,
-        slow=radial_period(solution) / radial_period(truth) - 1.0,
+        period=period,
+        slow=period / radial_period(truth) - 1.0,
         reason=solution.reason,
     )
 
