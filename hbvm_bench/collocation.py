@@ -54,11 +54,11 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
     """
     advance = _program(problem.system)
     nodes, weights, matrix, legendre = _tables(STAGES)
-    y = np.stack([problem.y0, np.zeros_like(problem.y0)], axis=1)
+    y, par = (np.stack([x, np.zeros_like(x)], axis=1) for x in (problem.y0, problem.par))
     out = np.empty((len(at), *y.shape))
     t, h = float(problem.t0), 0.0
     for i, end in enumerate(np.asarray(at, dtype=np.float64).tolist()):
-        code, h = advance(t, end, h, y, problem.par, nodes, weights, matrix, legendre, decay)
+        code, h = advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay)
         if code:
             raise InputError(f"{problem!r} could not be integrated beyond t = {t!r} in double-double.")
         t = end
@@ -133,7 +133,7 @@ def _program(system: System) -> Callable[..., Any]:
 def _compiled(field: Any) -> Any:
     @njit
     def evaluate(t, y, par, out):
-        field(t, row(y), par, row(out))
+        field(t, row(y), row(par), row(out))
 
     @njit
     def advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay):

@@ -5,6 +5,7 @@ heyoka's Taylor method in 128-bit floating point from the same traced vector
 field, and its accuracy is what a second run with another tolerance leaves of it.
 """
 
+import ast
 import platform
 from dataclasses import dataclass
 from decimal import Context, Decimal
@@ -12,13 +13,16 @@ from functools import lru_cache
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from problems import emit
 from problems.errors import InputError, MissingLibraryError
 from problems.problem import Problem
+from problems.system import System
 
 Array = NDArray[np.float64]
 
@@ -238,11 +242,9 @@ def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "rea
         raise MissingLibraryError(
             "a reference needs heyoka; install it with: pip install 'hbvm-bench[peers]'."
         ) from None
-    from problems import emit
-
     real = hy.real128 if precision == "real128" else np.longdouble
     integrator = hy.taylor_adaptive(
-        emit.heyoka(problem.system),
+        _expressions(problem.system, hy, real),
         np.array([real(value) for value in problem.y0.tolist()]),
         time=real(float(problem.t0)),
         pars=np.array([real(value) for value in problem.par.tolist()]),
@@ -256,3 +258,28 @@ def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "rea
     if len(states) != len(times):
         raise InputError(f"the reference of {problem!r} stopped before its end time: {outcome[0]}.")
     return [[Decimal(str(value)) for value in row] for row in states]
+
+
+class _Numbers(ast.NodeTransformer):
+    """Turns literals into numbers of the arithmetic in use."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        if not isinstance(node.value, float):
+            return node
+        return ast.Call(ast.Name("number", ast.Load()), [node], [])
+
+
+def _expressions(system: System, hy: Any, real: Any) -> list[Any]:
+    """Return heyoka's expressions with literals in full precision.
+
+    With double literals heyoka would turn a division by 3 into a multiplication
+    by the double next to 1/3, whatever the precision of the integration.
+    """
+    made = emit.source(system, "field", "heyoka")
+    tree = ast.fix_missing_locations(_Numbers().visit(ast.parse(made.text)))
+    namespace: dict[str, Any] = {"number": lambda value: hy.expression(real(value))}
+    exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
+    variables = [variable for variable, _ in emit.heyoka(system)]
+    found = namespace[made.name](hy.time, variables, hy.par, hy)
+    found = [e if isinstance(e, hy.expression) else hy.expression(real(e)) for e in found]
+    return list(zip(variables, found, strict=True))
