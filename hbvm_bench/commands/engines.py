@@ -1,0 +1,39 @@
+"""The command ``hbvm-bench engines``."""
+
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+import problems
+from hbvm_bench import engines as engines_
+from hbvm_bench import terminal
+from problems.errors import unknown
+
+
+def engines(
+    names: Annotated[list[str] | None, typer.Argument(help="Problems by name; all by default.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="As a Markdown table.")] = False,
+) -> None:
+    """Say which engine and which method accepts which problem, and why not."""
+    for name in names or []:
+        if name not in problems.names():
+            raise unknown("problem", name, problems.names())
+    if markdown:
+        print(engines_.markdown(names or []), end="")
+        return
+    columns, rows = engines_.matrix(names or [])
+    listed = engines_.notes(rows)
+    table = Table("problem", *columns, box=box.SIMPLE_HEAD, pad_edge=False)
+    for name, row in rows.items():
+        cells = ["yes" if row[c] is None else str(listed.index(row[c] or "") + 1) for c in columns]
+        table.add_row(Text(name), *cells)
+    console = terminal.console()
+    console.print(table)
+    for i, reason in enumerate(listed, start=1):
+        console.print(f"{i}. {reason}", highlight=False)
+
+
+__all__ = ["engines"]

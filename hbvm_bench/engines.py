@@ -1,0 +1,114 @@
+"""Which engine accepts which problem, and why not."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import integrators.registry
+import problems
+from integrators.protocol import MethodBase
+from problems import emit
+from problems.errors import InputError, MissingLibraryError
+from problems.problem import Problem
+
+LIBRARIES = ("numpy", "numba", "jax", "heyoka")
+BODIES, FORCES = "REBOUND's bodies", "REBOUND's forces"
+# Values for what a method must be given: whether it accepts a problem does not depend on them.
+_REQUIRED = {"h": 1e-3, "k": 2, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
+
+
+def reasons(problem: Problem) -> dict[str, str | None]:
+    """Return for each engine ``None`` if it accepts the problem, otherwise the reason.
+
+    Parameters
+    ----------
+    problem : Problem
+        The system and its parameters decide.
+
+    Returns
+    -------
+    dict
+        First what the vector field is emitted to, then how REBOUND takes it,
+        then the methods by name.
+    """
+    found: dict[str, str | None] = {name: _emitted(problem, name) for name in LIBRARIES}
+    found[BODIES] = _bodies(problem)
+    found[FORCES] = _forces(problem)
+    for name in integrators.registry.names():
+        found[name] = method_reason(name, problem)
+    return found
+
+
+def method_reason(name: str, problem: Problem) -> str | None:
+    """Return why a method does not accept a problem, or ``None``."""
+    try:
+        return _instance(integrators.registry.get(name)).accepts(problem)
+    except MissingLibraryError as error:
+        return str(error)
+
+
+def _instance(cls: type[MethodBase]) -> MethodBase:
+    given = {
+        field.name: _REQUIRED[field.name]
+        for field in dataclasses.fields(cls)
+        if field.default is dataclasses.MISSING and field.name in _REQUIRED
+    }
+    try:
+        return cls(**given)
+    except InputError:  # one of two, such as a step or a tolerance, is left to the user
+        return cls(h=1e-3, **given)  # type: ignore[call-arg]
+
+
+def _emitted(problem: Problem, library: str) -> str | None:
+    try:
+        emit.source(problem.system, "field", library)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def _bodies(problem: Problem) -> str | None:
+    if problem.system.bodies is not None:
+        return None
+    return "it is not a system of bodies with Newton's attraction."
+
+
+def _forces(problem: Problem) -> str | None:
+    system = problem.system
+    if system.kind != "hamiltonian":
+        return "it has no positions and momenta."
+    if not system.separable:
+        return "it is not separable: q'' is not a function of q alone."
+    return None
+
+
+def matrix(names: Sequence[str] = ()) -> tuple[list[str], dict[str, dict[str, str | None]]]:
+    """Return the engines, and for each problem the reasons.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Problems by name, at their defaults; all of them when empty.
+    """
+    rows = {name: reasons(problems.load(name)) for name in (names or problems.names())}
+    engines = list(next(iter(rows.values()))) if rows else []
+    return engines, rows
+
+
+def notes(rows: dict[str, dict[str, str | None]]) -> list[str]:
+    """Return the different reasons of a matrix, in the order in which they first appear."""
+    return list(dict.fromkeys(reason for row in rows.values() for reason in row.values() if reason))
+
+
+def markdown(names: Sequence[str] = ()) -> str:
+    """Return the matrix as a Markdown table with numbered reasons below it."""
+    engines, rows = matrix(names)
+    listed = notes(rows)
+    lines = ["| problem | " + " | ".join(engines) + " |", "|---" * (len(engines) + 1) + "|"]
+    for name, row in rows.items():
+        cells = [
+            "✓" if row[engine] is None else f"{listed.index(row[engine] or '') + 1}" for engine in engines
+        ]
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    lines.append("")
+    lines += [f"{i}. {reason}" for i, reason in enumerate(listed, start=1)]
+    return "\n".join(lines) + "\n"
