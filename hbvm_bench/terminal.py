@@ -167,14 +167,16 @@ def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metr
     kept = list(shown)
 
     def needed() -> int:
-        texts = [
+        lengths = [
             max(
-                len(metric.short),
-                *(len(row.cells[metric.key].text) + 2 for row in lines if metric.key in row.cells),
+                [
+                    len(metric.short),
+                    *(len(row.cells[metric.key].text) + 2 for row in lines if metric.key in row.cells),
+                ]
             )
             for metric in kept
         ]
-        return 5 + NARROWEST + sum(length + 3 for length in texts)
+        return 5 + NARROWEST + sum(length + 3 for length in lengths)
 
     for key in GIVEN_UP:
         if needed() <= width:

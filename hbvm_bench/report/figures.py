@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.labels import number_points
 from hbvm_bench.report.style import INK, MUTED, Look, method_name, options, panels
 from hbvm_bench.table import group_of
 
@@ -164,12 +165,14 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         top = min(max(values), 1e3)
         log_axis(axes, "x", math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
         log_axis(axes, "y", round(math.log10(floor)), math.ceil(math.log10(top * 3)), most=9)
-        placed: list[tuple[float, float]] = []
-        for case, seconds, value in zip(shown, times, values, strict=True):
-            y = min(max(value, floor), top * 2)
+        axes.set_ylim(bottom=floor / 5)  # room for the numbers of the best
+        spots = [
+            (seconds, min(max(value, floor), top * 2)) for seconds, value in zip(times, values, strict=True)
+        ]
+        for case, spot, value in zip(shown, spots, values, strict=True):
             marker = case.look.marker if value <= top else "^"
-            axes.plot(seconds, y, marker, color=case.look.light, markersize=6.5, clip_on=False)
-            _tag(axes, case, seconds, y, placed)
+            axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
+        number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
         axes.set_xlabel("seconds for the whole span (median)")
         axes.set_title(METRICS[key].label, color=INK)
     side.set_axis_off()
@@ -240,24 +243,6 @@ def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
         worst = f"{values.max():.1e}" if values.size else "none finite"
         parts.append(f"{case.record.case.method}: {worst}")
     return f"{what.title}, largest values. " + "; ".join(parts) + "."
-
-
-def _tag(axes: Axes, case: Drawn, x: float, y: float, placed: list[tuple[float, float]]) -> None:
-    # numbers of close points go to different sides
-    spot = (math.log10(x), math.log10(y))
-    crowd = sum(abs(spot[0] - a) < 0.12 and abs(spot[1] - b) < 0.5 for a, b in placed)
-    placed.append(spot)
-    offset, align = [((6, 4), "left"), ((-6, -9), "right"), ((6, -9), "left"), ((-6, 4), "right")][crowd % 4]
-    axes.annotate(
-        str(case.look.number),
-        (x, y),
-        xytext=offset,
-        textcoords="offset points",
-        ha=align,
-        fontsize=7.5,
-        color=INK,
-        annotation_clip=False,
-    )
 
 
 def _full(case: Drawn) -> str:

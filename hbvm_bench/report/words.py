@@ -86,7 +86,7 @@ def summary(records: Sequence[Record]) -> list[str]:
             sentences.append(f"No case that was timed keeps {level}.")
     elif groups["on"]:
         sentences.append(
-            "There is no stored reference for this problem: positions are not measured, and nothing is ranked."
+            "This problem has no stored reference: positions are not measured, and nothing is ranked."
         )
     for record in groups["ended"]:
         if record.result.outcome == "stalled":
