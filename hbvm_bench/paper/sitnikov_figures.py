@@ -209,6 +209,6 @@ def _configuration(axes: Axes, truth: Orbit) -> None:
     axes.plot(*place(0, 0, top), "o", color=HBVM, markersize=5)
     say("planetoid, m = 10⁻⁵", 0, 0, top, (9, -3))
     say("z", 0, 0, 2.2, (6, -5), style="italic")
-    left, right = place(-D / 2, -1.5, 0), place(D / 2, -1.5, 0)
+    left, right = place(-D / 2, 0, -1.2), place(D / 2, 0, -1.2)
     axes.plot([left[0], right[0]], [left[1], right[1]], color=MUTED, linewidth=0.8, marker="|", markersize=7)
-    say("d = 5 at apocentre", 0, -1.5, 0, (0, -12), ha="center", color=MUTED)
+    say("d = 5 at apocentre", 0.9, 0, -1.2, (0, -13), ha="center", color=MUTED)
