@@ -42,6 +42,7 @@ MethodOption = Annotated[
 SEPARATE = {
     "race": "hbvm_bench.race.command",
     "endure": "hbvm_bench.endure.command",
+    "paper": "hbvm_bench.paper.command",
     "engines": "hbvm_bench.commands.engines",
     "inspect": "hbvm_bench.commands.inspect",
 }

@@ -91,7 +91,7 @@ def html_prose(text: str) -> Markup:
 
 def html_cell(text: str) -> Markup:
     """Escape a text and set ``3.4e-15`` as a power of ten."""
-    return Markup(POWER.sub(_power, str(escape(text))))
+    return Markup(MINUS.sub("−", POWER.sub(_power, str(escape(text)))))
 
 
 def markdown_cell(text: str) -> str:
@@ -101,6 +101,9 @@ def markdown_cell(text: str) -> str:
 
 CALL = re.compile(r"\w+\(.*\)")
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?![\w.]*\w)")
+
+
+MINUS = re.compile(r"(?<![\w.=(])-(?=\d)")
 
 
 def _power(match: re.Match[str]) -> str:

@@ -62,7 +62,8 @@ def closeup(gauss: Path, hbvm: Path, names: tuple[str, str]) -> Picture:
         left.set_xlabel("time")
         left.set_ylabel("H(qₙ, pₙ) − H(q₀, p₀)")
         left.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
-        left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.02), ncols=2)
+        for line in left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.02), ncols=2).get_lines():
+            line.set_linewidth(1.6)
         q, p, values = _levels((P1[0] - 0.05, P1[0] + 0.16), (P1[1] - 0.06, P1[1] + 0.13), 161)
         right.contour(q, p, values, levels=[H_STAR], colors=INK, linewidths=1.0)
         for (_, y), colour, size in ((gauss, GAUSS, 2.6), (hbvm, HBVM, 2.6)):

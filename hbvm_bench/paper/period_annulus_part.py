@@ -36,6 +36,7 @@ def tasks() -> list[Task]:
             Task(f"period-annulus/fates {method}", partial(experiment.fates, method, FATE_GAPS), 5)
             for method in FATE_METHODS
         ),
+        Task("period-annulus/drawn", drawn, 3),
         Task("period-annulus/periods", partial(experiment.periods, PERIOD_GAPS), 2),
         *(
             Task(f"period-annulus/other {text}", partial(others.on_period_annulus, text), 8)
@@ -44,12 +45,20 @@ def tasks() -> list[Task]:
     ]
 
 
+def drawn() -> dict[str, figures.Path]:
+    """Return the orbits of Figure 2: each method from the last point it finds periodic."""
+    return {
+        family: experiment.orbit(method, experiment.edge(method, experiment.SPAN).low)
+        for family, method in DRAWN.items()
+    }
+
+
 def part(results: Results) -> Part:
     """Return this part of the report."""
     cells: Cells = {(h, s): results[f"period-annulus/cell {h} {s}"] for h in STEPS for s in DEGREES}
     periods = results["period-annulus/periods"]
     rate = experiment.saddle_rate()
-    orbits = {family: experiment.orbit(method, cells[1.0, 2][family].low) for family, method in DRAWN.items()}
+    orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
     return Part(
         key="period-annulus",
         title="The edge of a period annulus",

@@ -170,8 +170,8 @@ def _dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]
             "The large step causes a sham, uniform rotation that does not destroy the symmetry",
             "Figure 3 left",
             f"{coarse.turn:.2f} degrees per revolution, uniform to {coarse.unsteady:.1f} degrees. It falls "
-            f"as h^{order:.2f} and comes with the order, not with the energy: with h = 1/8 {finer.turn:.5f} "
-            f"degrees, and {row(steps, 'gauss', 1 / 8).turn:.5f} under Gauss",
+            f"with h to the power {order:.2f} and comes with the order, not with the energy: with h = 1/8 "
+            f"{finer.turn:.5f} degrees, and {row(steps, 'gauss', 1 / 8).turn:.5f} under Gauss",
             "holds",
         ),
         Claim(
