@@ -1,5 +1,6 @@
 """Run cases: each in a process of its own, under hard limits, by any executor."""
 
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -84,7 +85,7 @@ def run_case(case: Case, directory: str, limits: Limits) -> Record:
     resolved = resolve(case)
     store = Store(Path(directory))
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        request = Request(case=resolved.case, id=resolved.id)
+        request = Request(case=resolved.case, id=resolved.id, runner=os.getpid())
         ended = _start(Path(scratch), request, limits)
         result = _result(Path(scratch), ended, limits)
         if result.reason == STALE:
@@ -198,7 +199,9 @@ def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timin
 def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits) -> Timing:
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         core = max(machine.cores(), default=None)
-        request = Request(case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core)
+        request = Request(
+            case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core, runner=os.getpid()
+        )
         ended = _start(Path(scratch), request, limits)
         reply = _decoded(Path(scratch) / "timing.json", TimingReply)
     if ended.cause == "stopped":

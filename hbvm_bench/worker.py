@@ -57,6 +57,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         For the timing pass.
     core : int or None
         The core to stay on.
+    runner : int
+        The process that asks: without it there is nobody to answer.
     """
 
     case: Case
@@ -64,6 +66,7 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     mode: Literal["measure", "time"] = "measure"
     plan: TimingPlan = TimingPlan()
     core: int | None = None
+    runner: int
 
 
 class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
@@ -75,8 +78,8 @@ class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
 
 def main(path: Path) -> None:
     """Do what the request at ``path`` asks."""
-    _live_and_die_with_parent()
     request = msgspec.json.decode(path.read_bytes(), type=Request)
+    _limit_and_die_with(request.runner)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     work = _time if request.mode == "time" else _measure
@@ -86,12 +89,14 @@ def main(path: Path) -> None:
         temporary.write_bytes(msgspec.json.encode(reply))
 
 
-def _live_and_die_with_parent() -> None:
+def _limit_and_die_with(runner: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
         pr_set_pdeathsig = 1
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+        if os.getppid() != runner:  # it died while this process was starting
+            sys.exit(1)
 
 
 def _measure(request: Request, directory: Path) -> Result:
