@@ -1,0 +1,1 @@
+"""A problem and a method for hbvm-bench, from outside."""
