@@ -260,7 +260,7 @@ def _truth(problem: Problem, known: Reference | None) -> list[tuple[str, str]]:
         )
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
         z = known.high[-1, PLANETOID_Z]
-        values.insert(0, (f"Reference value of z at t = {problem.t_end:g}", f"{z:.15g}"))
+        values.insert(0, (f"Reference value of z at t = {problem.t_end:g}", f"{z:.16g}"))
     return values
 
 

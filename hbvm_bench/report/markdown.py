@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hbvm_bench.table import Row
+from hbvm_bench.table import Row, seconds
 
 if TYPE_CHECKING:  # so that the escapes below cost no plotting library
     from hbvm_bench.report.content import Content, Section
@@ -46,6 +46,13 @@ def code(text: object) -> str:
 
 
 def row_cells(section: "Section", row: Row) -> list[str]:
-    """Return the cells of a row, void ones in brackets."""
-    cells = [row.cells.get(metric.key) for metric in section.columns]
-    return ["–" if cell is None else f"({cell.text})" if cell.void else cell.text for cell in cells]
+    """Return the cells of a row: void ones in brackets, times with their quartiles."""
+    made = []
+    for metric in section.columns:
+        cell = row.cells.get(metric.key)
+        text = "–" if cell is None else f"({cell.text})" if cell.void else cell.text
+        if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:
+            summary = row.record.timing.summary
+            text += f" [{seconds(summary['q1'])}, {seconds(summary['q3'])}]"
+        made.append(text)
+    return made
