@@ -160,7 +160,9 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         else:
             start = np.array([(-1.0) ** j * np.sqrt(2.0 * j + 1.0) for j in range(self.s + 1)])
             field = terms.vf_prod(t0, y0, args, control)
-            beyond = jax.tree.map(lambda f, g: (f - _apply(start[None, :-1], g)[0]) / float(start[-1]), field, G)
+            beyond = jax.tree.map(
+                lambda f, g: (f - _apply(start[None, :-1], g)[0]) / float(start[-1]), field, G
+            )
 
         def estimate(y: Any, g: Any, b: Any) -> Any:
             if b.size == 0:
