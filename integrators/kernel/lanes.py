@@ -145,9 +145,11 @@ def register(function: Any, arity: int, result: Any, emit: Any) -> None:
 
 
 def llvm_call(builder: Any, name: str, *values: Any) -> Any:
-    """Call LLVM's intrinsic of that name on doubles or vectors of doubles."""
+    """Call LLVM's intrinsic of that name on numbers of 64 bits or vectors of them."""
     kind = values[0].type
-    full = f"llvm.{name}.v{kind.count}f64" if isinstance(kind, ir.VectorType) else f"llvm.{name}.f64"
+    count = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
+    item = kind.element if count else kind
+    full = f"llvm.{name}.{count}{'f' if item == DOUBLE else 'i'}64"
     function = builder.module.globals.get(full)
     if function is None:
         function = ir.Function(builder.module, ir.FunctionType(kind, [kind] * len(values)), full)

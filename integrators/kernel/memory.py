@@ -223,9 +223,8 @@ def upper(typing, x):
 def _larger(builder: Any, x: Any, y: Any) -> Any:
     """Return the larger of non-negative numbers by their bits: a NaN is larger than all and so is kept."""
     kind = ir.VectorType(INTEGER, WIDTH)
-    return builder.select(
-        builder.icmp_unsigned(">", builder.bitcast(x, kind), builder.bitcast(y, kind)), x, y
-    )
+    bits = [builder.bitcast(value, kind) for value in (x, y)]
+    return builder.bitcast(llvm_call(builder, "umax", *bits), x.type)
 
 
 @intrinsic

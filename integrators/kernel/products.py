@@ -45,11 +45,17 @@ def evaluate(ctx):
 
 
 @compiled
+def place(chunk, block, lanes):
+    """Index of a group of eight lanes where blocks of ``block`` doubles have rows of 8 or 16 lanes."""
+    shift = lanes >> 4
+    return (chunk >> shift) * block + 8 * (chunk & shift)
+
+
+@compiled
 def offset(ctx, chunk):
     """Index in stage memory of the first row of a group of eight stages."""
     lanes = get_int(ctx, at.LANES)
-    width = lanes // 8
-    return (chunk // width) * get_int(ctx, at.PADDED) * lanes + 8 * (chunk % width)
+    return place(chunk, get_int(ctx, at.PADDED) * lanes, lanes)
 
 
 @compiled
@@ -97,14 +103,10 @@ def product16(ctx, table):
 @compiled
 def multiply(table, chunks, groups, source, source_lanes, target, target_lanes, rows, padded):
     """Target = table source, both in the layout of stage memory, in pieces of 8 x 8."""
-    source_width = source_lanes // 8
-    target_width = target_lanes // 8
     for chunk in range(chunks):
-        into = target + 8 * ((chunk // target_width) * padded * target_lanes + 8 * (chunk % target_width))
+        into = target + 8 * place(chunk, padded * target_lanes, target_lanes)
         for group in range(groups):
-            outof = source + 8 * (
-                (group // source_width) * padded * source_lanes + 8 * (group % source_width)
-            )
+            outof = source + 8 * place(group, padded * source_lanes, source_lanes)
             matrix = columns(table, 64 * (chunk * groups + group), 8)
             if group == 0:
                 for d in range(rows):

@@ -197,9 +197,9 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         extrapolation = high @ a["beyond"] @ a["into_modes"]
     columns = constants.route if constants.route > 1 else None
     return {
-        "MATRIX": _matrix(matrix, columns=columns, repeat=True),
-        "EXTRAPOLATION": _matrix(extrapolation, columns=columns, repeat=True),
-        "PROJECTION": _matrix(projection),
+        "MATRIX": packed(matrix, columns=columns, repeat=True),
+        "EXTRAPOLATION": packed(extrapolation, columns=columns, repeat=True),
+        "PROJECTION": packed(projection),
     }
 
 
@@ -211,8 +211,8 @@ def fixed(constants: Constants) -> dict[str, Array]:
     if constants.route == at.THROUGH:
         raw = np.hstack([np.zeros((constants.k, constants.first)), raw])
     return {
-        "RAW_MATRIX": _matrix(raw, columns=columns, repeat=True),
-        "MODE_PROJECTION": _matrix(a["into_modes"]),
+        "RAW_MATRIX": packed(raw, columns=columns, repeat=True),
+        "MODE_PROJECTION": packed(a["into_modes"]),
         "NODES": _vector(a["nodes"], repeat=True),
         "NODES_LOW": _vector(a["nodes_low"], repeat=True),
         "WEIGHTS": _vector(a["weights"]),
@@ -256,7 +256,7 @@ def _vector(values: Array, *, repeat: bool = False) -> Array:
     return out
 
 
-def _matrix(matrix: Array, *, columns: int | None = None, repeat: bool = False) -> Array:
+def packed(matrix: Array, *, columns: int | None = None, repeat: bool = False) -> Array:
     """Pad to multiples of eight and lay out as groups of eight rows, each column by column."""
     n, m = matrix.shape
     padded = np.zeros((_up(n), _up(m) if columns is None else columns))
