@@ -44,6 +44,7 @@ SEPARATE = {
     "endure": "hbvm_bench.endure.command",
     "paper": "hbvm_bench.paper.command",
     "engines": "hbvm_bench.commands.engines",
+    "gallery": "hbvm_bench.commands.gallery",
     "inspect": "hbvm_bench.commands.inspect",
 }
 

@@ -2,18 +2,20 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import integrators.registry
 import problems
 from integrators.protocol import MethodBase
 from problems import emit
-from problems.errors import InputError, MissingLibraryError
+from problems.errors import InputError
 from problems.problem import Problem
 
 LIBRARIES = ("numpy", "numba", "jax", "heyoka")
 BODIES, FORCES = "REBOUND's bodies", "REBOUND's forces"
 # Values for what a method must be given: whether it accepts a problem does not depend on them.
-_REQUIRED = {"h": 1e-3, "k": 2, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
+_NUMBERS = {"h": 1e-3, "k": 2, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
+_REQUIRED: dict[str, Any] = {**_NUMBERS, "invariants": ("energy",)}
 
 
 def reasons(problem: Problem) -> dict[str, str | None]:
@@ -42,16 +44,16 @@ def method_reason(name: str, problem: Problem) -> str | None:
     """Return why a method does not accept a problem, or ``None``."""
     try:
         return _instance(integrators.registry.get(name)).accepts(problem)
-    except MissingLibraryError as error:
+    except InputError as error:  # a library that is missing among them
         return str(error)
 
 
 def _instance(cls: type[MethodBase]) -> MethodBase:
-    given = {
-        field.name: _REQUIRED[field.name]
-        for field in dataclasses.fields(cls)
-        if field.default is dataclasses.MISSING and field.name in _REQUIRED
-    }
+    required = [field.name for field in dataclasses.fields(cls) if field.default is dataclasses.MISSING]
+    for option in required:
+        if option not in _REQUIRED:
+            raise InputError(f"it has to be told its option {option!r} first.")
+    given = {option: _REQUIRED[option] for option in required}
     try:
         return cls(**given)
     except InputError:  # one of two, such as a step or a tolerance, is left to the user

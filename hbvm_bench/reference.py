@@ -98,13 +98,13 @@ def find(problem: Problem, where: Path | None = None) -> Reference | None:
 def find_file(problem: Problem, where: Path | None = None) -> ReferenceFile | None:
     """Return the stored reference of a problem with all its digits, or ``None``; see `find`."""
     path = _path(problem, where)
-    return None if path is None else _read(path)
+    return None if path is None else read(path)
 
 
 def _path(problem: Problem, where: Path | None) -> Path | None:
     wanted = start(problem), hexadecimal(problem.par)
     for path in sorted((where or folder()).glob(f"{problem.name}*.json")):
-        stored = _read(path)
+        stored = read(path)
         if (stored.start, stored.parameters) == wanted:
             return path
     return None
@@ -197,14 +197,15 @@ def start(problem: Problem) -> list[str]:
     return [float(problem.t0).hex(), *hexadecimal(problem.y0)]
 
 
-@lru_cache(maxsize=32)
-def _read(path: Path) -> ReferenceFile:
+@lru_cache(maxsize=64)
+def read(path: Path) -> ReferenceFile:
+    """Return a stored reference with all its digits."""
     return msgspec.json.decode(path.read_bytes(), type=ReferenceFile)
 
 
 @lru_cache(maxsize=8)
 def _parsed(path: Path) -> Reference:
-    return parse(_read(path))
+    return parse(read(path))
 
 
 def parse(stored: ReferenceFile) -> Reference:
