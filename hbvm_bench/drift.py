@@ -221,7 +221,7 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
 
 
 def _rate_of_growth(t: Array, rows: Array, floor: float) -> float:
-    """Return the rate of an exponential from the samples well above the floor: a window is too wide for it."""
+    """Return the rate of an exponential from the samples well above the floor; windows are too wide."""
     values = rms(rows)
     clear = values > 10.0 * floor
     if clear.sum() < 2:
