@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from integrators.grid import Counts
 from integrators.kernel import engine, layout, tables
 from integrators.kernel import field as fields
+from integrators.kernel.batch import Batch, run_batch
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.workspace import Context, Shape
 from integrators.protocol import Array, check_state
@@ -53,6 +54,7 @@ class HBVMProgram:
             rows = system.dof
             block = block[:rows]
             group = group[: block[-1] + 1]
+        self._known_velocity: tuple[bytes, Array] = (b"?", np.empty(0))
         unit = tables.unit(self.constants, self._velocity(np.full(system.n_par, np.nan)))
         self.shape = Shape(
             rows, self.second, unit, self.field.address, system.n_par, block, group, self.constants
@@ -76,6 +78,42 @@ class HBVMProgram:
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         return HBVMStepper(self, check_state(y0, self.system.dim), self.parameters(par), float(t0))
+
+    def batch(
+        self,
+        Y0: ArrayLike,
+        par: ArrayLike | None = None,
+        *,
+        times: ArrayLike,
+        t0: float = 0.0,
+        sample: str | None = None,
+        threads: int = 1,
+    ) -> Batch:
+        """Integrate many starts to the same times, several of them at once.
+
+        Each trajectory is bit for bit the one that ``start`` and ``advance`` give.
+
+        Parameters
+        ----------
+        Y0 : array_like, shape (n, dim)
+            Starts.
+        par : array_like, shape (n_par,) or (n, n_par), optional
+            Parameters, for all or for each; the system's own by default.
+        times : array_like, shape (m,)
+            Times asked for, strictly monotone from ``t0``.
+        t0 : float
+            Time of the starts.
+        sample : {"side", "land", "dense"}, optional
+            How states between steps are made; see `HBVMStepper`.
+        threads : int
+            Threads to share the trajectories among.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For starts, parameters or times that cannot be used.
+        """
+        return run_batch(self, Y0, par, times, float(t0), sample, threads)
 
     def parameters(self, par: ArrayLike | None) -> Array:
         """Return a parameter vector as a fresh array; the system's own by default.
@@ -109,15 +147,19 @@ class HBVMProgram:
 
     def load(self, context: Context, par: Array) -> None:
         """Put parameters, and the velocities that follow from them, into a context."""
-        context["PAR"][: par.size] = par
+        context["PAR"][:] = par
         if self.second:
             context["VELOCITY"][: self.shape.rows] = self._velocity(par)
 
     def _velocity(self, par: Array) -> Array:
-        """Q' = velocity * p, of unit momenta; shape (dof,)."""
+        """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
         if not self.second:
             return np.ones(0)
-        return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+        key = par.tobytes()
+        if self._known_velocity[0] != key:
+            found = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+            self._known_velocity = (key, found)
+        return self._known_velocity[1]
 
 
 def blocks(system: System) -> tuple[Counts, Counts]:

@@ -22,7 +22,7 @@ from problems.dd import DD
 
 Array = NDArray[np.float64]
 
-MODES = 14  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
+MODES = 13  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 MOMENTS = 3
 
 NAMES = (

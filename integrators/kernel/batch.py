@@ -1,0 +1,185 @@
+"""Many trajectories of one system: starts and parameters differ, times do not.
+
+A trajectory of a small system spends its time waiting for its own square roots
+and divisions. A few trajectories taken through their steps together fill that
+time; each sees exactly the operations that it would see alone.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.grid import Counts, plan
+from integrators.kernel import engine, layout
+from integrators.kernel.stepper import failure
+from integrators.kernel.workspace import Context
+from integrators.protocol import Array, Status, check_state, check_times
+from problems.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from integrators.kernel.program import HBVMProgram
+
+CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Trajectories of one system.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Times.
+    y : ndarray, shape (n, m, dim)
+        States; NaN where a trajectory did not arrive.
+    status, reason : list, length n
+        How each trajectory ended, and one sentence where it failed.
+    t_stop : ndarray, shape (n,)
+        The last time, or that of the last own step before a failure.
+    steps, iterations, evaluations : ndarray of int, shape (n,)
+        Work done per trajectory.
+    """
+
+    t: Array
+    y: Array
+    status: list[Status]
+    reason: list[str]
+    t_stop: Array
+    steps: Counts
+    iterations: Counts
+    evaluations: Counts
+
+
+def members_for(rows: int, route: int) -> int:
+    """Return how many trajectories to take through their steps together.
+
+    Two, where a sweep over eight stages of a few components waits more than it
+    works (Kepler: 25 ns alone, 15 ns in pairs); larger systems and sixteen
+    stages keep the processor busy by themselves.
+    """
+    return 2 if route == 8 and rows <= 6 else 1
+
+
+def run_batch(
+    program: "HBVMProgram",
+    Y0: ArrayLike,
+    par: ArrayLike | None,
+    times: ArrayLike,
+    t0: float,
+    sample: str | None,
+    threads: int,
+) -> Batch:
+    """Integrate every start to all times; see `HBVMProgram.batch`."""
+    if sample is not None and sample not in SAMPLINGS:
+        raise unknown("sampling of a batch", str(sample), SAMPLINGS)
+    starts, parameters = _starts(program, Y0, par)
+    grid = check_times(times, t0)
+    h = -program.h if grid[-1] < t0 else program.h
+    bases = np.full(grid.size, t0)
+    if sample == "land":
+        bases[1:] = grid[:-1]
+    n, dim = starts.shape
+    counts = [np.zeros(n, dtype=np.int64) for _ in range(3)]
+    result = Batch(
+        grid, np.full((n, grid.size, dim), np.nan),
+        [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
+    )  # fmt: skip
+    work = _Work(
+        program, result, starts, parameters, t0, h, SAMPLINGS[sample or "side"], *plan(grid, bases, h)
+    )
+    size = min(n, members_for(program.shape.rows, program.constants.route))
+    groups = [range(first, min(first + size, n)) for first in range(0, n, size)]
+    if threads == 1:
+        work.run(groups)
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            for done in [pool.submit(work.run, groups[i::threads]) for i in range(threads)]:
+                done.result()
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """A batch under way; groups of its trajectories may run on several threads."""
+
+    program: "HBVMProgram"
+    result: Batch
+    starts: Array
+    parameters: Array
+    t0: float
+    h: float
+    between: int
+    targets: Counts
+    parts: Array
+
+    def run(self, groups: list[range]) -> None:
+        """Integrate groups of trajectories one after another, in memory of their own."""
+        if not groups:
+            return
+        program, size = self.program, len(groups[0])
+        contexts = [program.context(side=side) for side in (False, True) for _ in range(size)]
+        for context in contexts[:size]:
+            context.point(program.scaled(self.h))
+        addresses = np.array([context.address for context in contexts])
+        y, times = self.result.y, self.result.t
+        stops = self._stops(size)
+        for group in groups:
+            here = np.concatenate([addresses[: len(group)], addresses[size : size + len(group)]])
+            for member, i in enumerate(group):
+                for context in (contexts[member], contexts[size + member]):
+                    program.load(context, self.parameters[i])
+                self._reset(contexts[member], self.starts[i])
+            first = 0
+            for last in stops:
+                engine.call(
+                    engine.ADVANCE_BATCH, here.ctypes.data, len(group), self.between, times.size,
+                    times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
+                    first, last, y[group[0] :].ctypes.data,
+                )  # fmt: skip
+                first = last
+            for member, i in enumerate(group):
+                self._report(i, contexts[member])
+
+    def _stops(self, size: int) -> list[int]:
+        """Cut the samples into runs of about `CHUNK` steps, between which Ctrl-C is heard."""
+        done = np.cumsum(self.targets) if self.between == layout.LAND else self.targets
+        cuts = np.flatnonzero(np.diff((done + 1) * size // CHUNK, prepend=0)) + 1
+        return np.unique(np.append(cuts, self.targets.size)).tolist()
+
+    def _reset(self, context: Context, start: Array) -> None:
+        for slot in (layout.STEPS, layout.ITERATIONS, layout.EVALUATIONS, layout.RESTARTS, layout.PARTIAL):
+            context.words[slot] = 0
+        context.reals[layout.T0], context.reals[layout.H] = self.t0, self.h
+        engine.call(engine.RESET, context.address, start.ctypes.data)
+
+    def _report(self, i: int, context: Context) -> None:
+        words, reals, result = context.words, context.reals, self.result
+        result.steps[i] = words[layout.STEPS]
+        result.iterations[i] = words[layout.ITERATIONS]
+        result.evaluations[i] = words[layout.EVALUATIONS]
+        if words[layout.OUTCOME] != layout.DONE:
+            t = float(reals[layout.T0]) + int(words[layout.N]) * float(reals[layout.H])
+            result.y[i, words[layout.MADE] :] = np.nan
+            result.t_stop[i] = t
+            result.status[i], result.reason[i] = failure(int(words[layout.OUTCOME]), t, reals)
+
+
+def _starts(program: "HBVMProgram", Y0: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
+    """Check starts and parameters; return them as arrays (n, dim) and (n, parameters)."""
+    rows = np.atleast_2d(np.asarray(Y0, dtype=np.float64))
+    if rows.ndim != 2 or rows.shape[0] == 0:
+        raise InputError(f"Y0 must have shape (n, {program.system.dim}) with n >= 1, not {rows.shape}.")
+    starts = np.array([check_state(row, program.system.dim) for row in rows])
+    if par is None or np.ndim(par) == 1:
+        return starts, np.tile(program.parameters(par), (starts.shape[0], 1))
+    given = np.asarray(par, dtype=np.float64)
+    if given.shape != (starts.shape[0], program.system.n_par):
+        raise InputError(
+            f"par must have shape ({program.system.n_par},) or ({starts.shape[0]}, {program.system.n_par}), "
+            f"not {given.shape}."
+        )
+    return starts, np.ascontiguousarray(given)
