@@ -1,6 +1,7 @@
 """What all systems have in common: a traced graph, parameters, invariants, guards."""
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +14,12 @@ from numpy.typing import NDArray
 from problems import arguments, functions
 from problems.errors import InputError, unknown
 from problems.functions import Function
+from problems.gradients import energy_gradient, gradients, stacked
 from problems.tracing import Graph, Node
 
 Value = float | Sequence[float]
+
+_COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class System:
     ----------
     kind : {"hamiltonian", "vector_field", "poisson"}
         What the system is.
+    traced : bool
+        Whether the vector field is a graph that can be emitted; see `problems.foreign`.
     dim : int
         Length of the state.
     dof : int or None
@@ -57,6 +63,7 @@ class System:
     """
 
     kind: ClassVar[str]
+    traced: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -85,6 +92,7 @@ class System:
         self.n_par = offset
         self._graph = Graph(dof)
         self._functions: dict[str, Function | None] = {}
+        self._derived: dict[str, Function] = {}
         self._vector_valued: dict[str, bool] = {}
         self.invariant_names: tuple[str, ...] = tuple(invariants)
         self.guard_names: tuple[str, ...] = tuple(guards)
@@ -125,19 +133,54 @@ class System:
         ----------
         what : str
             ``"field"``, ``"force"``, ``"velocity_scale"``, ``"hamiltonian"``,
-            ``"invariant:<name>"``, ``"guard:<name>"``.
+            ``"invariant:<name>"``, ``"guard:<name>"``; ``"gradient:<invariant>"`` (dim
+            outputs for each component of the invariant); ``"invariant:<name>[i]"`` and
+            ``"gradient:<name>[i]"`` for one component; for Poisson systems ``"gradient"``
+            (of H) and ``"structure"`` (B row by row); ``"jacobian"`` and
+            ``"jacobian:force"`` (the entries that `problems.jacobian` lists). Several,
+            separated by ``", "``, are one function with all their outputs.
 
         Raises
         ------
         problems.errors.InputError
             If the system has no such function.
         """
-        if what not in self._functions:
-            self._functions[what] = self._build(what)
-        found = self._functions[what]
+        found = self._derived.get(what)
+        if found is None:
+            found = self._derive(what)
+            if found is not None:
+                self._derived[what] = found
+        if found is None and self._known(what):
+            found = self._functions[what]
         if found is None:
             raise unknown(f"function of {self.name}", what, self.offered())
         return found
+
+    def _derive(self, what: str) -> Function | None:
+        """Return functions made of others: several as one, gradients, single components."""
+        if ", " in what:
+            return stacked([self.function(part) for part in what.split(", ")])
+        if what in ("jacobian", "jacobian:force"):
+            from problems.jacobian import jacobian  # it knows systems
+
+            made = jacobian(self, what)
+            return None if made is None else made.function
+        if (part := _COMPONENT.fullmatch(what)) is not None:
+            kind, name, place = part["kind"], part["name"], int(part["place"])
+            whole = self._functions.get(f"invariant:{name}")
+            if whole is None or place >= len(whole.outputs):
+                return None
+            if kind == "invariant":
+                return Function(whole.graph, (whole.outputs[place],))
+            return gradients(self._graph, [whole.outputs[place][0].node], self.dim)
+        if not what.startswith("gradient:"):
+            return None
+        if what == "gradient:energy" and self.dof is not None:
+            return energy_gradient(self.function("field"), self.dof)
+        whole = self._functions.get(f"invariant:{what.removeprefix('gradient:')}")
+        if whole is None:
+            return None
+        return gradients(self._graph, [terms[0].node for terms in whole.outputs], self.dim)
 
     def offered(self) -> list[str]:
         """Return the names that `function` knows."""
