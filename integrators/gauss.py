@@ -23,7 +23,8 @@ class Gauss(MethodBase):
     """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
 
     The very same code as ``HBVM(k=s, s=s, h)``, bit for bit: with k = s the
-    polynomial's derivative equals f at the nodes (equations: see `HBVM`).
+    polynomial's derivative equals f at the nodes (equations: see `HBVM`). Except on
+    Poisson systems, where HBVM has equations of its own and this is collocation still.
 
     Properties, each asserted in ``tests/integrators``: order 2s (`test_order`);
     symmetric and perfectly A-stable (`test_tableau`, `test_hbvm`); keeps every
@@ -75,5 +76,7 @@ class Gauss(MethodBase):
         return None
 
     def compile(self, system: System) -> Program:
-        """Compile as `HBVM.compile` does."""
-        return self.as_hbvm().compile(system)
+        """Compile as `HBVM.compile` does, Poisson systems like any other."""
+        from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
+
+        return HBVMProgram(system, k=self.s, s=self.s, h=self.h)

@@ -65,6 +65,9 @@ class HBVM(MethodBase):
     ----------
     L. Brugnano, F. Iavernaro, D. Trigiante, *Hamiltonian Boundary Value Methods
     (energy preserving discrete line integral methods)*, JNAIAM 5 (2010) 17-37.
+
+    L. Brugnano, M. Calvo, J. I. Montijano, L. Randez, *Energy-preserving methods for
+    Poisson systems*, J. Comput. Appl. Math. 236 (2012) 3890-3904.
     """
 
     k: int
@@ -93,6 +96,10 @@ class HBVM(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
+        if system.kind == "poisson":
+            from integrators.kernel.line.program import LineProgram
+
+            return LineProgram(system, k=self.k, s=self.s, h=self.h)
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         return HBVMProgram(system, k=self.k, s=self.s, h=self.h)

@@ -50,6 +50,7 @@ class Status(StrEnum):
     STEP_UNDERFLOW = "step_underflow"
     NOT_FINITE = "not_finite"
     STALLED = "stalled"
+    NOT_INVARIANT = "not_invariant"
     MAX_STEPS = "max_steps"
 
     @property

@@ -1,0 +1,1 @@
+"""Line integral methods beyond HBVM: several invariants at once, and Poisson systems."""

@@ -1,0 +1,79 @@
+"""Which of several invariants are independent of each other along a trajectory."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.protocol import Array
+from problems import emit
+from problems.problem import System
+
+SHIFT = 3e-3  # of the time in which the state changes by its own size: how far the neighbours are
+DEPENDENT = 1e-9  # what is left of a gradient, relative to it, when it depends on others
+NEARLY = 0.1  # the first of the invariants is taken whose rest is no smaller than this part of the largest
+
+
+def independent(
+    system: System, what: str, metric: Array, y: Array, par: Array, t: float
+) -> NDArray[np.bool_]:
+    """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
+
+    Of Kepler's energy, angular momentum and Lenz vector (e_1, e_2) one component of
+    the last follows from the others: the second if e_2 is not 0, and the first if
+    it is. A method that enforces a dependent one loses its order, since off the
+    solution its gradient is not quite a combination of the others. So the gradients
+    are compared at the start and at two neighbours on the solution.
+
+    Parameters
+    ----------
+    system : System
+        Whose invariants they are.
+    what : str
+        The field and the gradients of n scalar invariants, for the emitters.
+    metric : ndarray, shape (dim,)
+        Diagonal of the metric in which gradients are compared.
+    y, par, t
+        State, parameters and time.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        All true where anything is not finite.
+    """
+    function = emit.numpy(system, what)
+    dim = y.size
+    with np.errstate(all="ignore"):
+        slope = function(t, y, par)[:dim]
+        rate = float(np.linalg.norm(slope) / np.linalg.norm(y))
+        shift = SHIFT / rate if 0.0 < rate < np.inf else 0.0
+        points = [y, *(_moved(lambda s, x: function(s, x, par)[:dim], t, y, h) for h in (shift, -shift))]
+        rests = np.stack([function(t, point, par)[dim:].reshape(-1, dim) for point in points])
+        rests = rests * np.sqrt(metric)
+    chosen = np.zeros(rests.shape[1], dtype=bool)
+    if not np.isfinite(rests).all():
+        return ~chosen
+    sizes = np.linalg.norm(rests, axis=2)
+    sizes[sizes == 0.0] = 1.0
+    for _ in range(chosen.size):
+        left = np.where(chosen, 0.0, (np.linalg.norm(rests, axis=2) / sizes).max(axis=0))
+        if left.max() <= DEPENDENT:
+            break
+        pick = int(np.flatnonzero(left >= NEARLY * left.max())[0])
+        chosen[pick] = True
+        for point in rests:
+            length = np.linalg.norm(point[pick])
+            if length > 0.0:
+                unit = point[pick] / length
+                for _ in range(2):  # twice is enough
+                    point -= np.outer(point @ unit, unit)
+    return chosen
+
+
+def _moved(slope: Callable[[float, Array], Array], t: float, y: Array, h: float) -> Array:
+    """Return the state h later, by one step of the classical Runge-Kutta method."""
+    a = slope(t, y)
+    b = slope(t + h / 2, y + h / 2 * a)
+    c = slope(t + h / 2, y + h / 2 * b)
+    d = slope(t + h, y + h * c)
+    return y + h / 6 * (a + 2 * b + 2 * c + d)

@@ -1,0 +1,183 @@
+"""A line integral method compiled for one system: a `Program` over the compiled steps."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from integrators.kernel import field as fields
+from integrators.kernel.line import engine
+from integrators.kernel.line import layout as at
+from integrators.kernel.line.dependence import independent
+from integrators.kernel.line.stepper import LineStepper
+from integrators.kernel.program import blocks
+from integrators.legendre import tables
+from integrators.protocol import Array, check_state
+from problems import emit
+from problems.errors import InputError
+from problems.problem import System
+from problems.tracing import T
+
+
+class LineProgram:
+    """A line integral method with k stages and degree s, compiled for one system.
+
+    Parameters
+    ----------
+    system : System
+        What to integrate.
+    k, s : int
+        Stages and degree, k >= s >= 1.
+    h : float or None
+        Length of a step, > 0; the first one's, if there is a ``tol``.
+    tol : float, optional
+        Local error per step, relative to the size of each block of the state.
+    invariants : sequence of str
+        What is kept, by name; ``name[i]`` for one component of a vector. None for
+        a Poisson system's own energy, by coefficients of its own.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an invariant that the system does not have, or that depends on time.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        k: int,
+        s: int,
+        h: float | None = None,
+        tol: float | None = None,
+        invariants: Sequence[str] = (),
+    ):
+        started = perf_counter()
+        self.system = system
+        self.k, self.s, self.h, self.tol = k, s, h, tol
+        self.mode = at.INVARIANTS if invariants else at.POISSON
+        self.components = [part for name in invariants for part in components(system, name)]
+        if self.mode == at.POISSON:
+            parts = [fields.compile_field(system, "gradient, structure", 1)]
+            self.values = 0
+        else:
+            what = ", ".join(["field", *(f"gradient:{name}" for name in self.components)])
+            parts = [
+                fields.compile_field(system, what, 1),
+                fields.compile_field(system, ", ".join(f"invariant:{name}" for name in self.components), 1),
+            ]
+            self.values = parts[1].address
+            self.slopes = what
+        self.field = parts[0].address
+        parts.append(engine.kernel())
+        self.block, self.group = blocks(system)
+        self.order, self.ends = order_of_sums(system)
+        self.tables = _shared(k, s)
+        self.from_cache = all(part.from_cache for part in parts)
+        self.compile_seconds = perf_counter() - started
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> LineStepper:
+        """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
+        """
+        values = self.system.pack()
+        if par is not None:
+            if np.shape(par) != values.shape:
+                raise InputError(f"par must have shape {values.shape}, not {np.shape(par)}; see system.pack.")
+            values[:] = par
+        return LineStepper(self, check_state(y0, self.system.dim), values, float(t0))
+
+    def memory(self, y: Array, par: Array, t0: float) -> tuple[list[int], dict[str, Any]]:
+        """Return a trajectory's sizes and arrays, as in `layout`."""
+        dim, n = y.size, len(self.components)
+        sizes = {
+            "mode": self.mode, "field": self.field, "values": self.values,
+            "k": self.k, "s": self.s, "dim": dim, "n": n,
+            "row": dim * (1 + (n if self.mode == at.INVARIANTS else dim)), "width": dim * (1 + n),
+            "after": self.s + 1, "rows": max(2, n), "parameters": par.size, "blocks": self.group.size,
+            "reals": at.REALS, "counts": at.COUNTS, "one": 1,
+        }  # fmt: skip
+        metric = metric_of(self.system, par)
+        given: dict[str, Any] = {
+            "par": par, **self.tables, "metric": metric, "y": y,
+            "order": self.order, "ends": self.ends, "block": self.block, "group": self.group,
+        }  # fmt: skip
+        if n:
+            given["active"] = independent(self.system, self.slopes, metric, y, par, t0).astype(np.int64)
+        arrays = {}
+        for name, shape in at.ARRAYS.items():
+            kind = np.int64 if name in at.INTEGERS else np.float64
+            made = given[name] if name in given else np.zeros([sizes[size] for size in shape])
+            arrays[name] = np.ascontiguousarray(made, dtype=kind)
+        return [sizes[name] for name in at.SIZES], arrays
+
+
+def components(system: System, name: str) -> list[str]:
+    """Return the scalars that an invariant consists of, as ``name`` or ``name[0]``, ``name[1]``, ...
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none of this name, or it depends on time.
+    """
+    function = system.function(f"invariant:{name}")
+    if any(term.node.flags & T for terms in function.outputs for term in terms):
+        raise InputError(f"the invariant {name!r} of {system.name} depends on time; leave it out.")
+    if len(function.outputs) == 1:
+        return [name]
+    return [f"{name}[{i}]" for i in range(len(function.outputs))]
+
+
+def metric_of(system: System, par: Array) -> Array:
+    """Return the diagonal of W: for H = sum c p^2/2 + V, c with q and 1/c with p; otherwise 1.
+
+    With masses m, c = 1/m: corrections are then accelerations of one size for light
+    and heavy bodies alike. W does not depend on the state, so the method is symmetric.
+    """
+    if system.separable and system.dof is not None:
+        c = emit.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
+        if np.isfinite(c).all() and (c > 0.0).all():
+            return np.concatenate([c, 1.0 / c])
+    return np.ones(system.dim)
+
+
+def order_of_sums(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the order in which components are summed up, and where its partial sums end.
+
+    The same coordinate of all bodies, body by body, makes a partial sum: in an
+    odd sum over two bodies that mirror each other it is exactly 0. Without bodies,
+    positions and momenta make one each.
+    """
+    places = np.arange(system.dim)
+    if system.bodies is not None and system.dof is not None:
+        groups = list(
+            places.reshape(2, -1, system.bodies.dimension)
+            .transpose(0, 2, 1)
+            .reshape(2 * system.bodies.dimension, -1)
+        )
+    else:
+        groups = np.array_split(places, 1 if system.dof is None else 2)
+    ends = [np.arange(group.size) == group.size - 1 for group in groups]
+    return np.concatenate(groups).astype(np.int64), np.concatenate(ends).astype(np.int64)
+
+
+@lru_cache(maxsize=64)
+def _shared(k: int, s: int) -> dict[str, Array]:
+    """Return the tables of HBVM(k, s) by their names in `layout.Memory`."""
+    table = tables(k, s)
+    projection = np.zeros((s + 1, k))
+    projection[:s] = table.projection.hi
+    if k > s:
+        projection[s] = tables(k, s + 1).projection.hi[s]
+    return {
+        "nodes": table.nodes.hi, "nodes_low": table.nodes.lo,
+        "weights": table.weights.hi, "weights_low": table.weights.lo,
+        "integrals": table.integrals.hi, "basis": table.basis.hi, "projection": projection,
+    }  # fmt: skip

@@ -1,0 +1,179 @@
+"""Line integral methods that keep several invariants at once."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from integrators.hbvm import CITATION as BOOK
+from integrators.hbvm import _length, _whole
+from integrators.protocol import MethodBase, Program
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+CITATION = (
+    """\
+@article{BrugnanoIavernaro2012,
+  author = {Brugnano, Luigi and Iavernaro, Felice},
+  title = {Line integral methods which preserve all invariants of conservative problems},
+  journal = {Journal of Computational and Applied Mathematics},
+  volume = {236},
+  pages = {3905--3919},
+  year = {2012}
+}
+"""
+    + BOOK
+)
+
+SMALLEST = 2.0**-52
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LineIntegral(MethodBase):
+    r"""The polynomial of degree s along which the line integrals of several gradients vanish.
+
+    With the basis ``P_j`` and the k-point Gauss rule of `HBVM`, the Legendre
+    coefficients ``gamma_j`` of the field f and ``phi_ij`` of the gradients of the
+    invariants at the k stages, and a fixed diagonal metric W, one step is
+
+        sigma' = sum_{j<s} P_j (gamma_j - W sum_i phi_ij alpha_i),    y_1 = sigma(t_0 + h),
+        sum_m (sum_j phi_ij' W phi_mj) alpha_m = sum_j phi_ij' gamma_j.
+
+    Each invariant L_i changes by ``h sum_j phi_ij' sigma'_j``, which the second line
+    makes 0 up to the error of the quadrature. As ``alpha = O(h^{2s})``, the order
+    of HBVM(k, s) is kept.
+
+    Properties, each asserted in ``tests/integrators/line``:
+
+    * order 2s (`test_order`); symmetric (`test_symmetry`);
+    * all named invariants are conserved in practice, once k is so large that the
+      quadrature error is below round-off (`test_sitnikov`, `test_kepler`,
+      `test_poisson`), also with steps of varying length (`test_varying`);
+    * bodies that mirror each other keep doing so to the last bit (`test_sitnikov`).
+
+    Rounding is taken back: before each step the invariants are evaluated at the
+    present state, and what they have lost since the start enters the equations for
+    alpha, provided that it is no more than rounding accounts for. So their errors
+    do not grow with the number of steps. What the quadrature loses (k too small) is
+    not hidden by this: it stays lost, and ``stats.extra["lost"]`` counts it.
+
+    Limits: keeping invariants is not accuracy. Invariants that are not named are
+    kept only as far as the order does; momentum, say, which plain HBVM keeps. An
+    invariant that follows from others is left out (``stats.extra["left_out"]``);
+    one that is none stops the integration (status ``not_invariant``). The
+    nonlinear equations are solved by fixed-point iteration: stiff problems need
+    short steps.
+
+    Parameters
+    ----------
+    k : int
+        Nodes of the quadrature, k > s: with k = s the correction is identically 0.
+    s : int
+        Degree of the polynomial, s >= 1; the order is 2s.
+    h : float, optional
+        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
+        the first step's.
+    tol : float, optional
+        Local error per step, relative to the size of each block of the state (the
+        positions or the momenta of one body, else each component), as estimated by
+        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary.
+    invariants : sequence of str
+        What to keep: names of the problem's invariants, such as ``"energy"``; of a
+        vector all components, or ``"lenz[1]"``, one.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values outside these ranges, or if neither ``h`` nor ``tol`` is given.
+
+    Notes
+    -----
+    W is 1/m for positions and m for momenta where H = sum p^2/(2m) + V(q), and 1
+    otherwise. It does not depend on the state.
+
+    References
+    ----------
+    L. Brugnano, F. Iavernaro, *Line integral methods which preserve all invariants of
+    conservative problems*, J. Comput. Appl. Math. 236 (2012) 3905-3919.
+    """
+
+    k: int
+    s: int
+    h: float | None = None
+    tol: float | None = None
+    invariants: Sequence[str]
+
+    library = "hbvm-bench"
+    citation = CITATION
+    family = "line integral"
+
+    def __post_init__(self) -> None:
+        for name in ("s", "k"):
+            object.__setattr__(self, name, _whole("LineIntegral", name, getattr(self, name)))
+        if self.k <= self.s:
+            raise InputError(
+                f"LineIntegral needs k > s, not k={self.k}, s={self.s}: {self.k} nodes see no more of the "
+                f"field than {self.s} coefficients hold, and the correction is identically 0; raise k."
+            )
+        if self.h is None and self.tol is None:
+            raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
+        if self.h is not None:
+            object.__setattr__(self, "h", _length("LineIntegral", self.h))
+        if self.tol is not None:
+            object.__setattr__(self, "tol", _tolerance(self.tol))
+        object.__setattr__(self, "invariants", _names(self.invariants))
+
+    @property
+    def order(self) -> int:
+        """Order of convergence, 2s."""
+        return 2 * self.s
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Accept every system that has the invariants."""
+        from integrators.kernel.line.program import components
+
+        try:
+            for name in self.invariants:
+                components(problem.system, name)
+        except InputError as error:
+            return str(error)
+        return None
+
+    def compile(self, system: System) -> Program:
+        """Compile the vector field and the gradients, and the kernel if this machine has not yet.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For an invariant that the system does not have, or that depends on time.
+        """
+        from integrators.kernel.line.program import LineProgram
+
+        return LineProgram(system, k=self.k, s=self.s, h=self.h, tol=self.tol, invariants=self.invariants)
+
+
+def _names(invariants: Any) -> tuple[str, ...]:
+    """Return the invariants as a tuple of different names, or refuse them."""
+    listed = tuple(invariants) if isinstance(invariants, list | tuple) else ()
+    if not listed or not all(isinstance(name, str) for name in listed):
+        raise InputError(
+            f"LineIntegral needs invariants as a list of names, not {invariants!r}; "
+            'such as invariants=["energy", "angular_momentum"].'
+        )
+    if len(set(listed)) < len(listed):
+        raise InputError(f"LineIntegral needs different invariants, not {list(listed)!r}.")
+    return listed
+
+
+def _tolerance(tol: Any) -> float:
+    """Return the tolerance as a float, or refuse it."""
+    try:
+        value = math.nan if isinstance(tol, (bool, str)) else float(tol)
+    except (TypeError, ValueError):
+        value = math.nan
+    if not SMALLEST <= value < 1.0:
+        raise InputError(
+            f"LineIntegral needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={tol!r}: "
+            "an error smaller than this cannot be told from rounding."
+        )
+    return value
