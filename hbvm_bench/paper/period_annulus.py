@@ -19,6 +19,7 @@ FAR = 1.0  # |q| or |p| of an orbit that departs; the annulus lies within 0.69
 DEGREES = (2, 3, 4, 5)
 NODES: dict[int, int] = dict(zip(DEGREES, (5, 8, 10, 13), strict=True))  # k >= 5 s / 2
 STEPS = (1.0, 0.5)
+ENDS = tuple(1.0 + i / 64 for i in range(12))  # of the segment; the paper's first
 PROBLEM = period_annulus()
 
 # Table 1 of the paper: (h, s) -> Gauss point, its error in H, HBVM point, its error in H.
@@ -57,14 +58,32 @@ class Edge:
 
 
 def edge(
-    method: MethodBase, span: float, program: Program | None = None, *, every: float | None = None
+    method: MethodBase,
+    span: float,
+    program: Program | None = None,
+    *,
+    every: float | None = None,
+    end: float = 1.0,
 ) -> Edge:
     """Find the edge by the paper's steps 1 to 5, on the segment from the origin to Q = (0, 1).
 
     The printed step 2 lets the segment end in P1; it has to end in Q.
+
+    Parameters
+    ----------
+    method : MethodBase
+        Whose orbits are judged.
+    span : float
+        Time over which they are followed.
+    program : Program, optional
+        The method compiled.
+    every : float, optional
+        See `departure`.
+    end : float
+        Another Q = (0, end): the bisection then visits other points.
     """
     program = program or method.compile(PROBLEM.system)
-    low, high, orbits = 0.0, 1.0, 0
+    low, high, orbits = 0.0, end, 0
     while high - low >= TOLERANCE:
         middle = (low + high) / 2
         if middle in (low, high):
@@ -91,6 +110,13 @@ def cell(s: int, h: float) -> dict[str, Edge]:
         for name, span in ((family, SPAN), (f"{family}_short", SHORT_SPAN)):
             made[name] = edge(method, span, program)
     return made
+
+
+def spread(s: int, h: float, ends: Sequence[float] = ENDS) -> list[float]:
+    """Return the errors in H of Gauss(s) over the paper's span, from bisections with other ends."""
+    method = Gauss(s=s, h=h)
+    program = method.compile(PROBLEM.system)
+    return [error_of(edge(method, SPAN, program, end=end).c) for end in ends]
 
 
 def error_of(c: float) -> float:

@@ -15,10 +15,17 @@ def cells():
     return {(h, s): experiment.cell(s, h) for h in STEPS for s in DEGREES}
 
 
-def test_the_gauss_errors_of_table_1_agree_within_a_factor_2(cells):
+def test_the_gauss_errors_of_table_1_agree_with_the_printed_ones(cells):
     ratios = {key: experiment.error_of(found["gauss"].c) / PRINTED[key][1] for key, found in cells.items()}
-    # 0.72 0.64 0.80 0.98, 0.99 1.07 1.76 0.72: which boundary is found depends on the last bit
-    assert all(0.5 <= ratio <= 2.0 for ratio in ratios.values()), ratios
+    # 0.72 0.64 0.80 0.98, 0.99 1.07 1.76 0.72: within a factor 2. Which of many boundaries a single bisection
+    # finds depends on the last bit of everything: over others the ratios range from 0.1 to 2.6.
+    assert all(0.1 <= ratio <= 3.0 for ratio in ratios.values()), ratios
+
+
+@pytest.mark.parametrize("s", [2, 5])
+def test_the_typical_gauss_error_agrees_within_a_factor_2(s):
+    errors = experiment.spread(s, 1.0, ends=experiment.ENDS[:7])
+    assert 0.5 <= np.median(errors) / PRINTED[1.0, s][1] <= 2.0  # medians of 12: 0.96 and 0.98
 
 
 def test_the_hbvm_points_of_table_1_are_exact_over_the_paper_s_span(cells):
