@@ -23,8 +23,8 @@ class Gauss(MethodBase):
     """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
 
     The very same code as ``HBVM(k=s, s=s, h)``, bit for bit: with k = s the
-    polynomial's derivative equals f at the nodes (equations: see `HBVM`). Except on
-    Poisson systems, where HBVM has equations of its own and this is collocation still.
+    polynomial's derivative equals f at the nodes (equations: see `HBVM`). On Poisson
+    systems, for which HBVM has code of its own, the same up to rounding.
 
     Properties, each asserted in ``tests/integrators``: order 2s (`test_order`);
     symmetric and perfectly A-stable (`test_tableau`, `test_hbvm`); keeps every

@@ -44,8 +44,17 @@ class HBVM(MethodBase):
 
     Limits: energy is not accuracy. At a step too large for the trajectory the
     energy is still conserved and the trajectory is wrong; other invariants, such
-    as the angular momentum, are kept only as far as the order does. Poisson
-    systems with a non-constant structure are not conserved.
+    as the angular momentum, are kept only as far as the order does (`LineIntegral`
+    keeps several).
+
+    These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
+    whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
+
+        gamma_j = sum_l b_l P_j(c_l) B(Y_l) sum_i P_i(c_l) G_i
+
+    takes the place of the first: the same for constant B and for k = s, of the same
+    order, and the energy is kept because B is skew-symmetric; the Casimirs of B are
+    not (``tests/integrators/line/test_poisson``).
 
     Parameters
     ----------
@@ -66,8 +75,8 @@ class HBVM(MethodBase):
     L. Brugnano, F. Iavernaro, D. Trigiante, *Hamiltonian Boundary Value Methods
     (energy preserving discrete line integral methods)*, JNAIAM 5 (2010) 17-37.
 
-    L. Brugnano, M. Calvo, J. I. Montijano, L. Randez, *Energy-preserving methods for
-    Poisson systems*, J. Comput. Appl. Math. 236 (2012) 3890-3904.
+    P. Amodio, L. Brugnano, F. Iavernaro, *Arbitrarily high-order energy-conserving
+    methods for Poisson problems*, Numer. Algorithms (2022), doi:10.1007/s11075-022-01285-z.
     """
 
     k: int
