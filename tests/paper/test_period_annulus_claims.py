@@ -22,10 +22,9 @@ def test_the_gauss_errors_of_table_1_agree_with_the_printed_ones(cells):
     assert all(0.1 <= ratio <= 3.0 for ratio in ratios.values()), ratios
 
 
-@pytest.mark.parametrize("s", [2, 5])
-def test_the_typical_gauss_error_agrees_within_a_factor_2(s):
-    errors = experiment.spread(s, 1.0, ends=experiment.ENDS[:7])
-    assert 0.5 <= np.median(errors) / PRINTED[1.0, s][1] <= 2.0  # medians of 12: 0.96 and 0.98
+def test_the_typical_gauss_error_agrees_within_a_factor_2():
+    errors = experiment.spread(2, 1.0, ends=experiment.ENDS[:5])
+    assert 0.5 <= np.median(errors) / PRINTED[1.0, 2][1] <= 2.0  # 0.96; medians of all cells 0.74 to 1.25
 
 
 def test_the_hbvm_points_of_table_1_are_exact_over_the_paper_s_span(cells):

@@ -58,6 +58,13 @@ def test_hbvm_has_a_bounded_oscillating_error_in_the_angular_momentum(runs, step
     assert error[index[2] : index[3]].max() > 3e-3
 
 
+def test_a_line_integral_method_keeps_both_laws(runs):
+    run = runs["both"]
+    assert run.energy.max() <= 5e-14  # 3.6e-15
+    assert run.momentum.max() <= 5e-14  # 4.3e-16
+    assert np.abs(run.z).max() < 1.70  # 1.6838
+
+
 def test_hbvm_preserves_the_apocentre_distance_and_gauss_does_not(runs):
     low, high = apocentres(runs["hbvm"])
     assert 4.99 < low < high < 5.001  # 4.9943, 5.0000
