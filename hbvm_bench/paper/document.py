@@ -115,7 +115,7 @@ def number(value: float | None, digits: int = 2) -> str:
     if 1e3 <= abs(value) < 1e6:
         return f"{value:,.0f}"
     if 1e-2 <= abs(value) < 1e3:
-        return f"{value:.{digits + 1}g}"
+        return f"{value:.{max(digits, 3)}g}"
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa}e{int(exponent)}"
 

@@ -77,7 +77,12 @@ def flat_heads(table: Table) -> list[str]:
 def prose(text: str) -> str:
     """Make a sentence harmless in markdown; what stands in backquotes stays code."""
     pieces = text.split("`")
-    return "".join(code(piece) if i % 2 else plain(piece) for i, piece in enumerate(pieces))
+    return "".join(code(piece) if i % 2 else _plain_piece(piece) for i, piece in enumerate(pieces)).strip()
+
+
+def _plain_piece(text: str) -> str:
+    # `plain` joins words and drops the spaces at the ends, where code may follow
+    return " " * text[:1].isspace() + plain(text) + " " * text[-1:].isspace()
 
 
 def html_prose(text: str) -> Markup:
