@@ -7,7 +7,18 @@ from typing import Any
 from integrators.kernel import native, store
 
 # The modules whose code is in the kernel: an edit of any of them makes another kernel.
-SOURCES = ("lanes", "memory", "layout", "products", "step", "solve", "update", "loops", "native")
+SOURCES = (
+    "lanes",
+    "memory",
+    "layout",
+    "products",
+    "step",
+    "solve",
+    "update",
+    "loops",
+    "native",
+    "implicit/external",
+)
 
 # What the entry can do; `loops` has the same numbers.
 ADVANCE, ADVANCE_BATCH, RESET = range(3)

@@ -79,7 +79,7 @@ H = 56  # double
 T0 = 57  # double
 N = 58  # steps since T0
 LENGTH = 59  # double: length of the step that F belongs to; 0: none
-SOLVED = 60  # 1: F solves the step ahead
+SOLVED = 60  # 1: F solves the step ahead; BY_INCREMENT: so do the increments at INCREMENT
 AGE = 61  # steps until sizes are taken anew
 FREE = 62  # iterations without a test
 TESTS = 63
@@ -93,6 +93,15 @@ OUTCOME = 70
 UNTESTED = 71  # iterations left before the first test, in a batch
 ALIVE = 72  # 1: takes part in a batch
 MADE = 73  # samples made
+STRATEGY = 79  # which nonlinear solver is used; see below
+SOLVER = 80  # address of the implicit solver, int64(context, memory, started); 0: not there yet
+SOLVER_MEMORY = 81
+IMPLICIT = 82  # 1: the implicit solver is at work
+SLOW = 83  # steps in a row at which the fixed-point iteration was slow
+HELD = 84  # steps for which the implicit solver stays at work when it takes over
+LEFT = 85  # steps of these that are left
+WANTED = 86  # 1: the implicit solver should be at work, and is not there
+INCREMENT = 89  # what the implicit solver has found that the step adds to q, p or to y
 
 # Counters.
 STEPS = 74
@@ -100,11 +109,18 @@ ITERATIONS = 75
 EVALUATIONS = 76
 RESTARTS = 77
 PARTIAL = 78
+IMPLICIT_STEPS = 87
+SWITCHES = 88
 
 CONTEXT = 96
 
 # Routes of a product that are not a number of columns.
 WIDE, THROUGH = 0, 1
+
+BY_INCREMENT = 2
+
+# Strategies. AUTO: fixed point, and the implicit solver where that does not contract.
+FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 
 # How a step, or an advance, ended.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET = range(5)

@@ -6,7 +6,7 @@ from integrators.kernel import layout as at
 from integrators.kernel import native
 from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8
 from integrators.kernel.products import compiled
-from integrators.kernel.solve import begin, close, rewind, settle, solve, sweep, sweep_tested
+from integrators.kernel.solve import begin, close, rewind, settle_part, solve, sweep, sweep_tested
 from integrators.kernel.step import (
     FARTHEST,
     prepare,
@@ -74,7 +74,7 @@ def part_step(ctx, side, part):
     else:
         start_plain(side)
     take_sizes(side)
-    outcome = settle(side)
+    outcome = settle_part(ctx, side)
     return update(side) if outcome == at.DONE else outcome
 
 
@@ -117,8 +117,9 @@ def sample(ctx, side, between, t, part, out):
         if outcome == at.DONE:
             interpolate(ctx, part / get_float(ctx, at.H), out)
         return outcome
-    if between == at.SIDE:
-        solve(ctx)  # ahead of its time: the part starts from it. Should it fail, the part may not.
+    # Ahead of its time: the part starts from it. Should it fail, the part may not.
+    if between == at.SIDE and solve(ctx) == at.BUDGET:
+        return at.BUDGET
     outcome = part_step(ctx, side, part)
     add_counters(ctx, side)
     if outcome == at.DONE:

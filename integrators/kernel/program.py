@@ -9,6 +9,8 @@ from integrators.grid import Counts
 from integrators.kernel import engine, layout, tables
 from integrators.kernel import field as fields
 from integrators.kernel.batch import Batch, run_batch
+from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
+from integrators.kernel.implicit.workspace import solver as implicit_solver
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.workspace import Context, Shape
 from integrators.protocol import Array, check_state
@@ -33,14 +35,19 @@ class HBVMProgram:
     form : {"first", "second"}, optional
         Whether stages hold the whole state, or only positions (q'' = a(q), for
         separable systems: half the unknowns, half the iterations). By default the
-        second-order form wherever the system has one.
+        second-order form wherever the system has one, but for blended iteration.
+    solver : {"auto", "fixed_point", "newton", "blended"}, optional
+        How the stage equations are solved; see `integrators.hbvm.HBVM`.
     """
 
-    def __init__(self, system: System, *, k: int, s: int, h: float, form: str | None = None):
+    def __init__(
+        self, system: System, *, k: int, s: int, h: float, form: str | None = None, solver: str = "auto"
+    ):
         started = perf_counter()
         self.system = system
         self.h = h
-        self.second = system.separable if form is None else form == "second"
+        self.solver = SOLVERS[solver]
+        self.second = (system.separable and solver != "blended") if form is None else form == "second"
         if self.second and not system.separable:
             raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
         lanes = tables.lanes_for(k)
@@ -62,6 +69,9 @@ class HBVMProgram:
         self._fixed = tables.fixed(self.constants)
         self._scaled: dict[float, dict[str, Array]] = {}
         self.from_cache = self.field.from_cache and kernel.from_cache
+        self._linearization: Linearization | None = None
+        if self.solver.strategy == layout.ALWAYS_IMPLICIT:
+            self.implicit()
         self.compile_seconds = perf_counter() - started
 
     @property
@@ -114,6 +124,14 @@ class HBVMProgram:
             For starts, parameters or times that cannot be used.
         """
         return run_batch(self, Y0, par, times, float(t0), sample, threads)
+
+    def implicit(self) -> Workspace:
+        """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
+        if self._linearization is None:
+            made = implicit_solver()
+            self._linearization = linearization(self.system, second=self.second)
+            self.from_cache = self.from_cache and made.from_cache
+        return Workspace(self.shape, self.solver.kind, self._linearization)
 
     def parameters(self, par: ArrayLike | None) -> Array:
         """Return a parameter vector as a fresh array; the system's own by default.

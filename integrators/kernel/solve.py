@@ -1,6 +1,7 @@
-"""The nonlinear solver: fixed-point iteration with one stopping rule."""
+"""The nonlinear solver: fixed-point iteration with one stopping rule, and when to call another."""
 
 from integrators.kernel import layout as at
+from integrators.kernel.implicit.external import call_solver
 from integrators.kernel.memory import get_float, get_int, put_float, put_int
 from integrators.kernel.products import change, compiled, evaluate, product, product_tested
 from integrators.kernel.step import prepare, start, start_plain, take_sizes
@@ -10,6 +11,9 @@ STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
 ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
 PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION
 INFINITY = float("inf")
+MANY = 100  # iterations of a step at which the fixed-point iteration is slow
+SLOW_STEPS = 4  # slow steps in a row after which the implicit solver takes over
+SHORTEST, LONGEST = 16, 256  # steps for which it then stays, twice as many each time
 
 
 @compiled
@@ -131,6 +135,53 @@ def solve(ctx):
     """Solve the step from STATE, unless that is done; return the outcome."""
     if get_int(ctx, at.SOLVED):
         return at.DONE
+    if get_int(ctx, at.IMPLICIT):
+        return solve_implicitly(ctx, ctx, 0)
     for _ in range(begin(ctx)):
         sweep(ctx)
-    return settle(ctx)
+    outcome = settle(ctx)
+    if get_int(ctx, at.STRATEGY) != at.FIXED_POINT:
+        outcome = reconsider(ctx, outcome)
+    return outcome
+
+
+@compiled
+def solve_implicitly(ctx, side, started):
+    """Solve the step in ``side``, ``ctx`` itself or a partial step of it, by the implicit solver."""
+    outcome = call_solver(get_int(side, at.SOLVER), side, get_int(side, at.SOLVER_MEMORY), started)
+    put_int(ctx, at.IMPLICIT_STEPS, get_int(ctx, at.IMPLICIT_STEPS) + 1 - started)
+    return outcome
+
+
+@compiled
+def reconsider(ctx, outcome):
+    """Let the implicit solver take over from a fixed-point iteration that failed or was slow."""
+    slow = get_int(ctx, at.SLOW) + 1 if outcome != at.DONE or get_int(ctx, at.TRIED) >= MANY else 0
+    put_int(ctx, at.SLOW, slow)
+    if outcome == at.DONE and slow < SLOW_STEPS:
+        return outcome
+    if get_int(ctx, at.SOLVER) == 0:
+        put_int(ctx, at.WANTED, 1)
+        return at.BUDGET  # to be continued when it is there
+    held = min(max(2 * get_int(ctx, at.HELD), SHORTEST), LONGEST)
+    put_int(ctx, at.HELD, held)
+    put_int(ctx, at.LEFT, held)
+    put_int(ctx, at.SLOW, 0)
+    put_int(ctx, at.IMPLICIT, 1)
+    put_int(ctx, at.SWITCHES, get_int(ctx, at.SWITCHES) + 1)
+    return outcome if outcome == at.DONE else solve_implicitly(ctx, ctx, 0)
+
+
+@compiled
+def settle_part(ctx, side):
+    """Solve a partial step of ``ctx``, prepared in ``side``; return the outcome."""
+    if get_int(ctx, at.IMPLICIT):
+        return solve_implicitly(ctx, side, 1)
+    outcome = settle(side)
+    if outcome != at.DONE and get_int(ctx, at.STRATEGY) != at.FIXED_POINT:
+        if get_int(side, at.SOLVER) == 0:
+            put_int(ctx, at.WANTED, 1)
+            return at.BUDGET
+        put_int(side, at.PREDICTED, 0)
+        outcome = solve_implicitly(ctx, side, 1)
+    return outcome

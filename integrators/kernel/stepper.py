@@ -1,13 +1,14 @@
 """One trajectory of HBVM(k, s) under way: a `Stepper` over the compiled kernel."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
+from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from problems.errors import InputError, unknown
@@ -16,9 +17,13 @@ if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 # What a checkpoint holds besides STATE and ERROR; F matters to the next start.
-WORDS = (layout.H, layout.T0, layout.N, layout.LENGTH, layout.SOLVED, layout.AGE, layout.FREE)
+WORDS = (
+    layout.H, layout.T0, layout.N, layout.LENGTH, layout.SOLVED, layout.AGE, layout.FREE,
+    layout.IMPLICIT, layout.SLOW, layout.HELD, layout.LEFT,
+)  # fmt: skip
 ARRAYS = ("F", "STRICT", "FLOORED")
 
 
@@ -31,6 +36,7 @@ class Checkpoint:
     state: Array
     e: Array
     arrays: tuple[Array, ...]
+    implicit: tuple[Any, ...] | None
     status: Status
     reason: str
 
@@ -66,6 +72,10 @@ class HBVMStepper:
         self._context.reals[layout.H] = program.h
         self._context.reals[layout.T0] = t0
         engine.call(engine.RESET, self._context.address, y.ctypes.data)
+        self._implicit: tuple[Workspace, Workspace] | None = None
+        self._context.words[layout.STRATEGY] = program.solver.strategy
+        if program.solver.strategy == layout.ALWAYS_IMPLICIT:
+            self._take_implicit()
         self._status, self._reason = Status.RUNNING, ""
 
     @property
@@ -95,22 +105,60 @@ class HBVMStepper:
 
         ``extra`` holds: partial steps made; restarts from a bad extrapolation;
         ``"lanes"``, whether the field runs on all stages at once; ``"form"``, whether
-        stages hold the positions only ("second") or the whole state ("first").
+        stages hold the positions only ("second") or the whole state ("first"); and, once
+        there is an implicit solver, ``"implicit"``, a dict: own steps that it solved, times
+        that it took over, Jacobians (and whether they are "traced" or by "differences"),
+        factorizations, rescues of steps that a fixed Jacobian could not solve.
         """
         words = self._context.words
+        extra: dict[str, Any] = {
+            "partial_steps": int(words[layout.PARTIAL]),
+            "restarts": int(words[layout.RESTARTS]),
+            "lanes": self._program.lanes,
+            "form": "second" if self._program.second else "first",
+        }
+        if self._implicit is not None:
+            extra["implicit"] = {
+                "steps": int(words[layout.IMPLICIT_STEPS]),
+                "switches": int(words[layout.SWITCHES]),
+                **report(self._implicit),
+            }
         return Stats(
             steps=int(words[layout.STEPS]),
             rejections=0,
             evaluations=int(words[layout.EVALUATIONS]),
             iterations=int(words[layout.ITERATIONS]),
-            solver="fixed point",
-            extra={
-                "partial_steps": int(words[layout.PARTIAL]),
-                "restarts": int(words[layout.RESTARTS]),
-                "lanes": self._program.lanes,
-                "form": "second" if self._program.second else "first",
-            },
+            solver=self._solvers(),
+            extra=extra,
         )
+
+    def _solvers(self) -> str:
+        """Return the names of the solvers that have solved steps, the one that solved more first."""
+        words = self._context.words
+        implicit = int(words[layout.IMPLICIT_STEPS])
+        fixed = int(words[layout.STEPS] + words[layout.SOLVED]) - implicit
+        always = self._program.solver.strategy == layout.ALWAYS_IMPLICIT
+        parts = [(fixed, "fixed point"), (implicit, "" if self._implicit is None else self._implicit[0].name)]
+        used = [(count, name) for count, name in parts if count > 0] or [(0, parts[always][1])]
+        return ", ".join(name for _, name in sorted(used, key=lambda part: -part[0]))
+
+    def _make_implicit(self) -> tuple[Workspace, Workspace]:
+        """Return the implicit solver's memory for own and for partial steps; compile it if need be."""
+        if self._implicit is None:
+            self._implicit = (self._program.implicit(), self._program.implicit())
+            for context, workspace in zip((self._context, self._side), self._implicit, strict=True):
+                context.words[layout.SOLVER] = solver().address
+                context.words[layout.SOLVER_MEMORY] = workspace.address
+                context.words[layout.INCREMENT] = workspace.increment.ctypes.data
+        return self._implicit
+
+    def _take_implicit(self) -> None:
+        """Put the implicit solver to work."""
+        self._make_implicit()
+        words = self._context.words
+        words[layout.IMPLICIT], words[layout.WANTED], words[layout.SLOW] = 1, 0, 0
+        words[layout.HELD] = words[layout.LEFT] = FIRST_HELD
+        words[layout.SWITCHES] += int(self._program.solver.strategy == layout.AUTO)
 
     def step(self) -> Status:
         """Take one step of length h; after a failure, do nothing."""
@@ -164,6 +212,7 @@ class HBVMStepper:
             context.array(layout.STATE).copy(),
             context.array(layout.ERROR).copy(),
             tuple(context[name].copy() for name in ARRAYS),
+            None if self._implicit is None else self._implicit[0].save(),
             self._status,
             self._reason,
         )
@@ -185,6 +234,8 @@ class HBVMStepper:
         context.array(layout.ERROR)[:] = checkpoint.e
         for name, array in zip(ARRAYS, checkpoint.arrays, strict=True):
             context[name][:] = array
+        if checkpoint.implicit is not None:
+            self._make_implicit()[0].restore(checkpoint.implicit)
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
@@ -199,23 +250,30 @@ class HBVMStepper:
         arrays = [np.ascontiguousarray(array) for array in (times, targets, parts)]
         outcome, made = layout.BUDGET, 0
         while outcome == layout.BUDGET:
+            if context.words[layout.WANTED]:
+                self._take_implicit()
             outcome = engine.call(
                 engine.ADVANCE, context.address, self._side.address, between, times.size,
                 *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
             )  # fmt: skip
             made = int(context.words[layout.MADE])
+            for workspace in self._implicit or ():
+                workspace.raise_what_is_no_failure()
         status = Status.FINISHED
         if outcome != layout.DONE:
-            status, self._reason = failure(outcome, self.t, context.reals)
+            name = "fixed-point"
+            if self._implicit is not None and context.words[layout.IMPLICIT]:
+                name = self._implicit[0].name
+            status, self._reason = failure(outcome, self.t, context.reals, name)
             self._status = status
         return Samples(times[:made], out[:made], status, self._reason)
 
 
-def failure(outcome: int, t: float, reals: Array) -> tuple[Status, str]:
+def failure(outcome: int, t: float, reals: Array, solver: str = "fixed-point") -> tuple[Status, str]:
     """Return the status that an outcome of the kernel stands for, and the reason as a sentence."""
     if outcome == layout.NOT_FINITE:
         return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
     return Status.NONLINEAR_DIVERGENCE, (
-        f"the fixed-point iteration did not converge in the step from t = {t!r}, "
+        f"the {solver} iteration did not converge in the step from t = {t!r}, "
         f"h = {float(reals[layout.H])!r} (last relative change {reals[layout.LAST]:.1e}); take a smaller h."
     )

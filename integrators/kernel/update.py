@@ -129,8 +129,40 @@ def means(ctx, d):
 
 
 @compiled
+def add(state, error, next_state, next_error, i, increment):
+    """Add an increment to one component of the state, and keep what rounding takes from the sum."""
+    old = get_float(state, i)
+    small = increment + get_float(error, i)
+    new = old + small
+    part = new - old
+    put_float(next_state, i, new)
+    put_float(next_error, i, (old - (new - part)) + (small - part))
+    return new * 0.0
+
+
+@compiled
+def update_by_increment(ctx):
+    """As `update`, from increments: those of q are not found from the forces without cancellation."""
+    rows = get_int(ctx, at.ROWS)
+    state, error = get_int(ctx, at.STATE), get_int(ctx, at.ERROR)
+    next_state, next_error = get_int(ctx, at.NEXT_STATE), get_int(ctx, at.NEXT_ERROR)
+    increment = get_int(ctx, at.INCREMENT)
+    damage = 0.0
+    for d in range(rows):
+        if get_int(ctx, at.SECOND):
+            i = 8 * (d // 4) + d % 4
+            damage += add(state, error, next_state, next_error, i + 4, get_float(increment, d))
+            damage += add(state, error, next_state, next_error, i, get_float(increment, rows + d))
+        else:
+            damage += add(state, error, next_state, next_error, d, get_float(increment, d))
+    return at.DONE if damage == 0.0 else at.NOT_FINITE
+
+
+@compiled
 def update(ctx):
     """NEXT_STATE, NEXT_ERROR from STATE, ERROR and the solved F; return DONE or NOT_FINITE."""
+    if get_int(ctx, at.SOLVED) == at.BY_INCREMENT:
+        return update_by_increment(ctx)
     rows = get_int(ctx, at.ROWS)
     state = get_int(ctx, at.STATE)
     error = get_int(ctx, at.ERROR)

@@ -1,0 +1,1 @@
+"""Newton-type solvers for steps at which the fixed-point iteration does not contract."""

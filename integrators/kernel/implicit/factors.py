@@ -1,0 +1,114 @@
+"""Factors of large matrices, kept by SciPy and asked for by compiled code."""
+
+import ctypes
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel.implicit import layout as of
+
+Complex = NDArray[np.complex128]
+
+DENSE = 0.3  # part of the entries that are stored from which a matrix is treated as dense
+
+
+class Factors:
+    """Factors of I - z_i h J for all pairs of eigenvalues z_i, sparse or dense.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        The arrays of the solver's `Memory`, by name.
+    second : bool
+        Second-order form: the matrices are I - z_i^2 h^2 J diag(q'/p).
+
+    Attributes
+    ----------
+    address : int
+        Of the C function ``int64(what, pair)`` that works on `Memory`.
+    error : BaseException or None
+        What went wrong last in a call, which compiled code takes for a failure.
+    """
+
+    def __init__(self, arrays: Mapping[str, Any], *, second: bool):
+        self._arrays = arrays
+        self._power = 2 if second else 1
+        rows, columns = arrays["rows"], arrays["columns"]
+        n = arrays["factor"].size
+        self._size = n
+        self._solvers: list[Any] = []
+        self.error: BaseException | None = None
+        self._dense = rows.size > DENSE * n * n
+        if not self._dense:
+            self._pattern = _Pattern(rows, columns, n)
+        self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
+        self.address: int = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
+
+    def _called(self, what: int, pair: int) -> int:
+        try:
+            if what == of.FACTORIZE:
+                self._factorize()
+            else:
+                self._solve(pair)
+        except BaseException as error:  # nothing may be raised through compiled code
+            self.error = error
+            return 0
+        return 1
+
+    def _factorize(self) -> None:
+        a = self._arrays
+        slopes = a["entries"] * a["factor"][a["columns"]]
+        if not np.isfinite(slopes).all():
+            raise FloatingPointError("the Jacobian is not finite")
+        values = (a["eigen_re"] + 1j * a["eigen_im"]) ** self._power
+        self._solvers = []
+        for value in values:
+            real = value.imag == 0.0
+            factor = -value.real if real else -value
+            self._solvers.append(self._factors(factor * slopes))
+
+    def _factors(self, entries: Complex) -> Any:
+        if self._dense:
+            from scipy.linalg import lu_factor, lu_solve
+
+            matrix = np.eye(self._size, dtype=entries.dtype)
+            matrix[self._arrays["rows"], self._arrays["columns"]] += entries
+            factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
+            return lambda x: lu_solve(factors, x, check_finite=False)
+        from scipy.sparse.linalg import splu
+
+        return splu(self._pattern.matrix(entries)).solve
+
+    def _solve(self, pair: int) -> None:
+        x_re, x_im = self._arrays["b_re"], self._arrays["b_im"]
+        solve = self._solvers[pair]
+        if self._arrays["eigen_im"][pair] == 0.0:
+            x = solve(np.stack([x_re, x_im], axis=1))
+            x_re[:], x_im[:] = x[:, 0], x[:, 1]
+        else:
+            x = solve(x_re + 1j * x_im)
+            x_re[:], x_im[:] = x.real, x.imag
+
+
+class _Pattern:
+    """Where the entries of I + a J go in a matrix stored by columns."""
+
+    def __init__(self, rows: Any, columns: Any, n: int):
+        diagonal = np.arange(n)
+        flat = np.concatenate([columns * n + rows, diagonal * (n + 1)])
+        places, where = np.unique(flat, return_inverse=True)
+        self._entries, self._diagonal = where[: rows.size], where[rows.size :]
+        self._indices = (places % n).astype(np.int32)
+        self._starts = np.searchsorted(places, np.arange(n + 1) * n).astype(np.int32)
+        self._n = n
+
+    def matrix(self, entries: Any) -> Any:
+        """Return I plus the entries as a sparse matrix."""
+        from scipy.sparse import csc_matrix
+
+        data = np.zeros(self._indices.size, dtype=entries.dtype)
+        data[self._entries] = entries
+        data[self._diagonal] += 1.0
+        return csc_matrix((data, self._indices, self._starts), shape=(self._n, self._n))

@@ -1,0 +1,314 @@
+"""The stage equations by simplified Newton or blended iteration.
+
+F(gamma) = gamma - P'Omega f(state + h I gamma) = 0, with I the table of integrals.
+A simplified Newton correction solves (I - X_s (x) h J) delta = -F. With X_s =
+V diag(z) V^{-1} this is one complex system with I - h z J for each pair of
+conjugate eigenvalues. The blended iteration needs one real matrix whatever s
+is: with rho = min |z|, eta = F, eta_1 = rho X_s^{-1} eta, theta = (I - h rho J)^{-1},
+
+    delta = -theta [eta_1 + theta (eta - eta_1)].
+
+In the second-order form gamma holds the coefficients of q' and of p', and F the
+linear relation between them as well: it is only through corrections of both that
+the rounding errors of large h J are taken out again.
+
+References
+----------
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, Springer
+1996, section IV.8. L. Brugnano, C. Magherini, *Blended implementation of block
+implicit methods for ODEs*, Applied Numerical Mathematics 42 (2002) 29-45.
+"""
+
+from integrators.kernel import layout as at
+from integrators.kernel.implicit import layout as of
+from integrators.kernel.implicit.jacobian import contraction, factorize, linearize, resolve
+from integrators.kernel.implicit.stages import (
+    FLOORED,
+    STRICT,
+    changes,
+    project,
+    set_factor,
+    set_stages,
+    set_values,
+    set_velocities,
+    swap_stages,
+    take_sizes,
+)  # fmt: skip
+from integrators.kernel.line.views import compiled
+from integrators.kernel.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.products import evaluate, offset
+from integrators.kernel.step import FARTHEST, prepare, start_elsewhere
+
+MOST_CORRECTIONS = 40
+MOST_BLENDED = 250
+STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
+ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
+PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION ...
+FALLING = 0.5  # ... unless the changes of all but the smallest components still decrease so fast
+FORESEEN = 0.1  # a change that is going to be this part of the tolerance need not be seen
+FORGET = 0.7  # of the rate of contraction, from one step to the next
+SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
+HOPELESS = 4  # corrections that do not decrease, or grow, to give up
+OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
+GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
+CALM = 1e-3  # sizes are measured until changes are this small
+INFINITY = float("inf")
+
+
+@compiled
+def newton(ctx, m, factors):
+    """Set the correction from the residual: one complex system per pair of eigenvalues."""
+    s, components = m.residual.shape
+    for j in range(s):
+        for d in range(components):
+            m.correction[j, d] = 0.0
+    for i in range(m.eigen_re.size):
+        for d in range(components):
+            a, b = 0.0, 0.0
+            for j in range(s):
+                a += m.left_re[i, j] * m.residual[j, d]
+                b += m.left_im[i, j] * m.residual[j, d]
+            m.v_re[d], m.v_im[d] = a, b
+        resolve(ctx, m, factors, i)
+        for j in range(s):
+            a, b = m.right_re[j, i], m.right_im[j, i]
+            for d in range(components):
+                m.correction[j, d] += a * m.v_re[d] - b * m.v_im[d]
+
+
+@compiled
+def blended(ctx, m, factors):
+    """Set the correction from the residual: theta twice, on two rows at a time as real and imaginary part."""
+    s, components = m.residual.shape
+    rho = m.eigen_re[0]
+    for d in range(components):
+        for i in range(s):
+            total = 0.0
+            for j in range(s):
+                total += m.inverse[i, j] * m.residual[j, d]
+            m.correction[i, d] = rho * total
+    for i in range(0, s, 2):
+        j = min(i + 1, s - 1)
+        for d in range(components):
+            m.v_re[d] = m.residual[i, d] - m.correction[i, d]
+            m.v_im[d] = m.residual[j, d] - m.correction[j, d]
+        for twice in range(2):
+            resolve(ctx, m, factors, 0)
+            if twice == 0:
+                for d in range(components):
+                    m.v_re[d] += m.correction[i, d]
+                    m.v_im[d] += m.correction[j, d]
+        for d in range(components):
+            m.correction[j, d] = m.v_im[d]
+        for d in range(components):
+            m.correction[i, d] = m.v_re[d]
+
+
+@compiled
+def take_mean(ctx, m):
+    """Set `Memory.point` to the mean of the stages."""
+    lanes = get_int(ctx, at.LANES)
+    for d in range(m.point.size):
+        m.point[d] = 0.0
+    for chunk in range(get_int(ctx, at.CHUNKS)):
+        start = get_int(ctx, at.Q) + 8 * offset(ctx, chunk)
+        for d in range(m.point.size):
+            for l in range(8):
+                m.point[d] += m.weights[8 * chunk + l] * get_float(start, lanes * d + l)
+
+
+@compiled
+def correct(ctx, m, method, source, factors, follow):
+    """Evaluate the field, and correct gamma; return whether that is possible."""
+    s, components = m.gamma.shape
+    evaluate(ctx)
+    m.count[of.TRIED] += 1
+    project(ctx, m, m.residual, components - m.factor.size)
+    if get_int(ctx, at.SECOND):
+        for j in range(s):
+            for d in range(m.factor.size, components):
+                m.correction[j, d] = m.gamma[j, d]
+        set_velocities(ctx, m, m.correction)
+        for j in range(s):
+            for d in range(m.factor.size):
+                m.residual[j, d] = m.correction[j, d]
+    for j in range(s):
+        for d in range(components):
+            m.residual[j, d] -= m.gamma[j, d]
+    if follow:
+        take_mean(ctx, m)
+        t = get_float(ctx, at.T0) + (get_int(ctx, at.N) + 0.5) * get_float(ctx, at.H)
+        linearize(ctx, m, source, t)
+    if m.count[of.FACTORED] == 0 and not factorize(ctx, m, factors):
+        return False
+    if method == of.BLENDED:
+        blended(ctx, m, factors)
+    else:
+        newton(ctx, m, factors)
+    for j in range(s):
+        for d in range(components):
+            m.gamma[j, d] += m.correction[j, d]
+    swap_stages(ctx)
+    return True
+
+
+@compiled
+def iterate(ctx, m, method, source, factors, follow):
+    """Correct gamma until the stages do not change; return the outcome.
+
+    With ``follow`` the Jacobian is taken anew, at the mean of the stages, for
+    every correction. What ends the iteration is the change of the stages,
+    relative to their blocks, as in `integrators.kernel.solve`.
+    """
+    most = MOST_BLENDED if method == of.BLENDED else MOST_CORRECTIONS
+    tolerance = get_float(ctx, at.TOLERANCE)
+    best, rough, worst = INFINITY, INFINITY, 0.0
+    rate = m.real[of.RATE] if method == of.NEWTON and not follow else 1.0
+    stalled, hopeless = 0, 0
+    for tried in range(most + 1):
+        if tried and not correct(ctx, m, method, source, factors, follow):
+            return at.DIVERGED
+        set_stages(ctx, m)
+        if rough > CALM:
+            take_sizes(ctx, m)
+        if tried == 0:
+            continue
+        strict, before = changes(ctx, m, STRICT), rough
+        rough = changes(ctx, m, FLOORED)
+        m.real[of.CHANGE] = rough
+        if not strict < INFINITY:
+            return at.NOT_FINITE if tried == 1 else at.DIVERGED
+        if before < CALM and rough > STAGNATION:
+            worst = max(worst, rough / before)
+        if strict <= tolerance or strict * max(worst, rate) < FORESEEN * tolerance:
+            break
+        stalled = 0 if strict < best else stalled + 1
+        best = min(best, strict)
+        if stalled and rough < (ROUNDING if stalled < PATIENCE or rough < FALLING * before else STAGNATION):
+            break
+        hopeless = 0 if rough < before else hopeless + 1
+        if hopeless == PATIENCE and rough < STAGNATION:
+            break
+        if hopeless == HOPELESS:
+            return at.DIVERGED
+    else:
+        return at.DIVERGED
+    if worst > 0.0:
+        m.real[of.RATE] = worst if rate == 1.0 else max(worst, FORGET * rate)
+    if worst > SLOW and method == of.NEWTON:
+        m.count[of.STALE] = 1
+    return at.DONE
+
+
+@compiled
+def nearer(ctx, m):
+    """Whether the extrapolated coefficients were nearer to the solution than constant stages."""
+    far, still = 0.0, 0.0
+    scale = get_int(ctx, at.FLOORED)
+    for d in range(m.factor.size):
+        a, b = 0.0, 0.0
+        for j in range(m.gamma.shape[0]):
+            a = max(a, abs(m.gamma[j, d] - m.predicted[j, d]))
+            b = max(b, abs(m.gamma[j, d]))
+        far, still = max(far, a * get_float(scale, d)), max(still, b * get_float(scale, d))
+    return far < still
+
+
+@compiled
+def renew(ctx, m, source):
+    """Take the Jacobian at the state, and the contraction of the fixed-point iteration with it."""
+    for d in range(m.point.size):
+        m.point[d] = get_float(get_int(ctx, at.ROW_STATE), d)
+    linearize(ctx, m, source, get_float(ctx, at.T0) + get_int(ctx, at.N) * get_float(ctx, at.H))
+    m.real[of.CONTRACTION] = m.real[of.RADIUS] * contraction(m)
+    m.count[of.STALE] = 0
+    m.real[of.RATE] = 1.0
+
+
+@compiled
+def solve_step(ctx, m, method, source, factors, started):
+    """Solve the step of a context; return the outcome, DONE with F the field's polynomial part.
+
+    Parameters
+    ----------
+    ctx : address
+        The context, with SOLVED = 0.
+    m : Memory
+        This solver's.
+    method : {NEWTON, BLENDED}
+        How corrections are computed.
+    source : address
+        Of the Jacobian; 0 for differences.
+    factors : address
+        Of the function that keeps the factors; 0: they are in `Memory`.
+    started : int
+        1: the context is prepared and, if PREDICTED, F holds the extrapolated field, as for
+        partial steps, which leave nothing to later ones. 0: a step of the trajectory.
+    """
+    m.count[of.TRIED] = 0
+    jacobians = m.count[of.JACOBIANS]
+    h = get_float(ctx, at.H)
+    if started:
+        m.count[of.LINEARIZED] = 0
+    else:
+        prepare(ctx)
+        length = get_float(ctx, at.LENGTH)
+        put_int(ctx, at.PREDICTED, 0)
+        if length != 0.0 and abs(h / length) <= FARTHEST:
+            start_elsewhere(ctx, ctx, 1.0, h / length)
+    set_factor(ctx, m)
+    if m.count[of.RETURNED]:
+        since = m.count[of.SINCE]
+        linearize(ctx, m, source, m.real[of.POINT_T])
+        m.count[of.SINCE], m.count[of.RETURNED] = since, 0
+    extrapolated = get_int(ctx, at.PREDICTED)
+    if extrapolated:
+        project(ctx, m, m.predicted, m.gamma.shape[1] - m.factor.size)
+        if get_int(ctx, at.SECOND):
+            set_velocities(ctx, m, m.predicted)
+    fresh = m.count[of.LINEARIZED] == 0 or m.count[of.STALE] == 1 or m.count[of.SINCE] >= OLDEST
+    use = extrapolated and (started or m.count[of.PREDICT])
+    follow, trying = 0, 1
+    outcome = at.RUNNING
+    while trying:
+        if fresh:
+            renew(ctx, m, source)
+        if m.real[of.FACTORED_H] != h:
+            m.count[of.FACTORED] = 0
+        for j in range(m.gamma.shape[0]):
+            for d in range(m.gamma.shape[1]):
+                m.gamma[j, d] = m.predicted[j, d] if use else 0.0
+        outcome = iterate(ctx, m, method, source, factors, follow)
+        trying = 0
+        if outcome != at.DONE:
+            # First without what may have been bad: the extrapolation, an old Jacobian; then
+            # with a Jacobian for each correction.
+            if use:
+                put_int(ctx, at.RESTARTS, get_int(ctx, at.RESTARTS) + 1)
+            if use or m.count[of.SINCE]:
+                trying, use, fresh = 1, 0, True
+            elif outcome == at.DIVERGED and not follow:
+                m.count[of.RESCUES] += 1
+                trying, follow, fresh = 1, 1, False
+    m.count[of.SINCE] += 1
+    if follow:
+        m.count[of.STALE] = 1
+    if outcome == at.DONE:
+        if not started:
+            m.count[of.PREDICT] = 1 if extrapolated == 0 or nearer(ctx, m) else 0
+        set_values(ctx, m)
+        put_int(ctx, at.SOLVED, at.BY_INCREMENT)
+    if not started and get_int(ctx, at.STRATEGY) == at.AUTO:
+        left = get_int(ctx, at.LEFT) - 1
+        put_int(ctx, at.LEFT, left)
+        if left < 0 and m.real[of.CONTRACTION] < GENTLE:
+            put_int(ctx, at.IMPLICIT, 0)
+    tried = m.count[of.TRIED]
+    put_float(ctx, at.LAST, m.real[of.CHANGE])
+    m.count[of.CORRECTIONS] += tried
+    put_int(ctx, at.ITERATIONS, get_int(ctx, at.ITERATIONS) + tried)
+    evaluations = tried * get_int(ctx, at.STAGES)
+    if source == 0:
+        evaluations += (m.count[of.JACOBIANS] - jacobians) * (1 + get_int(ctx, at.ROWS))
+    put_int(ctx, at.EVALUATIONS, get_int(ctx, at.EVALUATIONS) + evaluations)
+    return outcome
