@@ -18,6 +18,7 @@ products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``
 import math
 import numbers
 from collections.abc import Callable, Hashable
+from fractions import Fraction
 from typing import Any
 
 from problems.blame import refuse
@@ -199,7 +200,8 @@ class Graph:
         if b.op == "const":
             if b.data == 0.0:
                 refuse("this divides by the constant 0", "divide by a number that is not zero")
-            if a.op == "const":
+            if a.op == "const" and Fraction(a.data) / Fraction(b.data) == Fraction(a.data / b.data):
+                # Folded only where exact: 1/3 stays a division, which double-double evaluates further.
                 return self.node(a.data / b.data)
             if is_power_of_two(b.data):
                 return self.mul(self.const(1.0 / b.data), a)
