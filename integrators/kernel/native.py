@@ -172,8 +172,10 @@ def _machine() -> Any:
 def _entry(inner: str, kinds: Sequence[str], returns: str) -> str:
     """Write the C function around numba's own calling convention, which returns through a pointer."""
     vectors = [kind.startswith("<") for kind in kinds]
+    # What a pointer points to is not reached by the other arguments: values may stay in registers.
     outer = ", ".join(
-        f"ptr %a{i}" if v else f"{kind} %a{i}" for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+        f"{'ptr noalias' if v or kind == 'ptr' else kind} %a{i}"
+        for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
     )
     loads = "\n".join(
         f"  %v{i} = load {kind}, ptr %a{i}, align 64"
