@@ -40,6 +40,8 @@ class Gauss(MethodBase):
         Number of stages, s >= 1; the order is 2s. s = 1 is the implicit midpoint rule.
     h : float
         Length of a step, > 0; integration backwards takes steps of -h.
+    solver : {"auto", "fixed_point", "newton", "blended"}
+        How the stage equations are solved; see `HBVM`.
 
     Raises
     ------
@@ -49,6 +51,7 @@ class Gauss(MethodBase):
 
     s: int
     h: float
+    solver: str = "auto"
 
     library = "hbvm-bench"
     citation = CITATION
@@ -69,7 +72,7 @@ class Gauss(MethodBase):
 
     def as_hbvm(self) -> HBVM:
         """Return the HBVM that this method is."""
-        return HBVM(k=self.s, s=self.s, h=self.h)
+        return HBVM(k=self.s, s=self.s, h=self.h, solver=self.solver)
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system of ordinary differential equations."""
@@ -79,4 +82,4 @@ class Gauss(MethodBase):
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
-        return HBVMProgram(system, k=self.s, s=self.s, h=self.h)
+        return HBVMProgram(system, k=self.s, s=self.s, h=self.h, solver=self.solver)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from integrators.protocol import MethodBase, Program
-from problems.errors import InputError
+from problems.errors import InputError, unknown
 from problems.problem import Problem, System
 
 CITATION = """\
@@ -17,6 +17,8 @@ CITATION = """\
   year = {2016}
 }
 """
+
+SOLVERS = ("auto", "fixed_point", "newton", "blended")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +67,16 @@ class HBVM(MethodBase):
     h : float
         Length of a step, > 0; integration backwards takes steps of -h.
 
+    solver : {"auto", "fixed_point", "newton", "blended"}
+        How the stage equations are solved. The fixed-point iteration contracts while h
+        times the largest frequency is below about s. ``"newton"``: simplified Newton
+        with the stage system block-diagonalized, one complex matrix of the size of the
+        system (of half its size for q'' = a(q)) per pair of stages, sparse where the
+        system is large. ``"blended"``: blended iteration, one real matrix. ``"auto"``:
+        fixed point, and Newton from where that fails or takes a hundred iterations a
+        step until it would contract well again. The Jacobian is traced; its factors are
+        kept while they serve. ``stats`` tells which solver did how much.
+
     Raises
     ------
     problems.errors.InputError
@@ -82,6 +94,7 @@ class HBVM(MethodBase):
     k: int
     s: int
     h: float
+    solver: str = "auto"
 
     library = "hbvm-bench"
     citation = CITATION
@@ -93,6 +106,8 @@ class HBVM(MethodBase):
         object.__setattr__(self, "h", _length(type(self).__name__, self.h))
         if self.k < self.s:
             raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")
+        if self.solver not in SOLVERS:
+            raise unknown("solver", str(self.solver), SOLVERS)
 
     @property
     def order(self) -> int:
@@ -100,18 +115,28 @@ class HBVM(MethodBase):
         return 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system of ordinary differential equations."""
-        return None
+        """Accept every system; Poisson systems with fixed-point iteration only."""
+        return self._refusal(problem.system)
+
+    def _refusal(self, system: System) -> str | None:
+        if system.kind != "poisson" or self.solver in ("auto", "fixed_point"):
+            return None
+        return (
+            "the equations that keep a Poisson system's energy are solved by fixed-point iteration only; "
+            f"leave out solver={self.solver!r}, or use Gauss."
+        )
 
     def compile(self, system: System) -> Program:
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
+        if (refusal := self._refusal(system)) is not None:
+            raise InputError(refusal)
         if system.kind == "poisson":
             from integrators.kernel.line.program import LineProgram
 
             return LineProgram(system, k=self.k, s=self.s, h=self.h)
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
-        return HBVMProgram(system, k=self.k, s=self.s, h=self.h)
+        return HBVMProgram(system, k=self.k, s=self.s, h=self.h, solver=self.solver)
 
 
 def _whole(method: str, name: str, value: Any) -> int:
