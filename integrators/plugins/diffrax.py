@@ -212,8 +212,8 @@ class HBVM(_LineIntegral):
 
     k: int = eqx.field(static=True, kw_only=True)
     s: int = eqx.field(static=True, kw_only=True)
-    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)
-    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)
+    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:
@@ -235,8 +235,8 @@ class Gauss(_LineIntegral):
     """
 
     s: int = eqx.field(static=True, kw_only=True)
-    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)
-    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)
+    root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:

@@ -220,8 +220,8 @@ class Newton:
         self.real = real
         if real:
             # One of each pair; a pair's two terms are conjugate, so it counts twice.
-            kept = eigenvalues.imag >= 0.0
-            weight = np.where(eigenvalues.imag[kept] > 0.0, 2.0, 1.0)
+            kept = np.imag(eigenvalues) >= 0.0
+            weight = np.where(np.imag(eigenvalues)[kept] > 0.0, 2.0, 1.0)
         else:
             kept, weight = np.full(s, True), np.ones(s)
         self.eigenvalues = eigenvalues[kept]
@@ -239,4 +239,4 @@ class Newton:
         parts = self.inverse @ residual
         parts = np.array([solve(part) for solve, part in zip(self._solvers, parts, strict=True)])
         change = self.vectors @ parts
-        return change.real if self.real else change
+        return np.real(change) if self.real else change
