@@ -62,11 +62,14 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
         Integrations in one sample.
     compile : Compile
         The compilation in this process.
+    share : float
+        Processor seconds per wall second while sampling: below 1 something else used the core.
     """
 
     samples: list[float]
     repeats: int
     compile: Compile
+    share: float = 1.0
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):
@@ -95,6 +98,11 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
             return {}
         q1, _, q3 = quantiles(samples, n=4, method="inclusive") if len(samples) > 1 else samples * 3
         return {"median": median(samples), "min": samples[0], "q1": q1, "q3": q3}
+
+    @property
+    def share(self) -> float:
+        """Return the least share of a core that a round had; 1 without rounds."""
+        return min((one.share for one in self.rounds), default=1.0)
 
     @property
     def compile(self) -> Compile | None:

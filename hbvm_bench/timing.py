@@ -96,6 +96,7 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
     program = method.compile(problem.system)
     run = Run(program, problem.y0, problem.par, problem.t0, problem.t_end)
     run.until(WARM_UP).seconds()
+    wall, busy = time.perf_counter(), time.process_time()
     first, reached = run.seconds()
     if reached.status is not Status.FINISHED:
         return f"not timed: the integration ended as {reached.status.value}"
@@ -106,7 +107,9 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
         mean, _ = run.seconds(repeats)
         samples.append(mean)
         spent += mean * repeats
+    wall, busy = time.perf_counter() - wall, time.process_time() - busy
     return TimingRound(
+        share=round(busy / wall, 3),
         samples=samples,
         repeats=repeats,
         compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),

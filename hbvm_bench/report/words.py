@@ -1,6 +1,7 @@
 """What the report says in sentences; every number in them is read from the records."""
 
 from collections.abc import Sequence
+from statistics import median
 
 from hbvm_bench.metrics import GUARD_TOLERANCE, METRICS
 from hbvm_bench.records import Record
@@ -10,6 +11,7 @@ from hbvm_bench.table import group_of, seconds, status_of
 # The levels of the summary's question "who is fastest among those that are right?"
 RIGHT_POSITION = 1e-8
 RIGHT_ENERGY = 1e-13
+UNDISTURBED = 0.9  # of a core, in the timing pass
 
 RULES_TEXT = f"""
 Every integrator starts from the same doubles and receives the same vector field, written down
@@ -87,6 +89,12 @@ def summary(records: Sequence[Record]) -> list[str]:
     elif groups["on"]:
         sentences.append(
             "This problem has no stored reference: positions are not measured, and nothing is ranked."
+        )
+    shares = [record.timing.share for record in records if record.timing and record.timing.rounds]
+    if shares and median(shares) < UNDISTURBED:
+        sentences.append(
+            f"The times are disturbed: the machine had other work and left half of the cases less than "
+            f"{median(shares):.0%} of a core. Compare them with care."
         )
     for record in groups["ended"]:
         if record.result.outcome == "stalled":

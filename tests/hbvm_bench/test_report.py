@@ -328,3 +328,17 @@ def test_without_a_reference_nothing_is_ranked(run):
     said = words.summary([bare, bare])
     assert any("no stored reference" in sentence for sentence in said)
     assert not any(sentence.startswith(("Smallest", "Fastest")) for sentence in said)
+
+
+def test_times_taken_on_a_busy_machine_say_so(run):
+    def with_share(record, share):
+        if record.timing is None:
+            return record
+        rounds = [msgspec.structs.replace(one, share=share) for one in record.timing.rounds]
+        return msgspec.structs.replace(record, timing=Timing(rounds=rounds))
+
+    def said(share):
+        return [s for s in words.summary([with_share(r, share) for r in run.records()]) if "disturbed" in s]
+
+    assert said(0.99) == []
+    assert "60% of a core" in said(0.6)[0]

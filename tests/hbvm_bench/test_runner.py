@@ -128,6 +128,7 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
     assert visits == [(0, "Steady()"), (1, "Steady()")]
     record = store.load(cases[0].id)
     assert [len(one.samples) for one in record.timing.rounds] == [2, 2]
+    assert all(0 < one.share < 1.5 for one in record.timing.rounds)
     assert record.timing.compile.seconds == 0.25
     assert record.result.metrics["warm_seconds"].value == record.timing.summary["median"]
     assert record.result.metrics["compile_seconds"].value == 0.25
