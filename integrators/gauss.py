@@ -18,7 +18,7 @@ CITATION = """\
 """
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Gauss(MethodBase):
     """Gauss(s): the collocation method of order 2s at the s Gauss nodes.
 

@@ -21,7 +21,7 @@ CITATION = """\
 SOLVERS = ("auto", "fixed_point", "newton", "blended")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class HBVM(MethodBase):
     r"""HBVM(k, s): the polynomial of degree s whose line integral of grad H vanishes.
 

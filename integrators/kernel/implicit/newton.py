@@ -105,6 +105,15 @@ def blended(ctx, m, factors):
 
 
 @compiled
+def is_finite(values):
+    """Whether all values are finite numbers."""
+    total = 0.0
+    for value in values:
+        total += value * 0.0
+    return total == 0.0
+
+
+@compiled
 def take_mean(ctx, m):
     """Set `Memory.point` to the mean of the stages."""
     lanes = get_int(ctx, at.LANES)
@@ -167,7 +176,7 @@ def iterate(ctx, m, method, source, factors, follow):
     stalled, hopeless = 0, 0
     for tried in range(most + 1):
         if tried and not correct(ctx, m, method, source, factors, follow):
-            return at.DIVERGED
+            return at.NOT_FINITE if tried == 1 and not is_finite(m.entries) else at.DIVERGED
         set_stages(ctx, m)
         if rough > CALM:
             take_sizes(ctx, m)
