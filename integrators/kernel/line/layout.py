@@ -25,8 +25,8 @@ SIDE, LAND, DENSE = range(3)
 
 # ... and in ``real``. Steps of one length h: the time is T0 + N H. Steps of varying length, which have a
 # TOLERANCE: the time is T0 + LOW, the next step's length NEXT, the length after it AFTER, the last two steps'
-# estimated errors BEHIND and AHEAD.
-T0, H, LENGTH, CHANGE, DEFECT, TOLERANCE, LOW, NEXT, AFTER, BEHIND, AHEAD, REALS = range(12)
+# estimated errors BEHIND and AHEAD; no step is longer than LIMIT.
+T0, H, LENGTH, CHANGE, DEFECT, TOLERANCE, LOW, NEXT, AFTER, BEHIND, AHEAD, LIMIT, REALS = range(13)
 
 SIZES = (
     "mode",

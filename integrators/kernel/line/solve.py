@@ -7,6 +7,7 @@ from integrators.kernel.line.views import address, call, compiled, fma, two_sum
 MAX_ITERATIONS = 200
 CONVERGED = 1e-16
 STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
+HOPELESS = 1e6  # a change this much larger than the smallest so far will not come back
 PATIENCE, SLOWNESS = 2, 16  # stagnation is 2 + (iterations so far)/16 without a new smallest change
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
@@ -153,6 +154,8 @@ def iterate(m, t, h):
         if not strict < INFINITY:
             # Growing changes overflow in the end; a NaN out of the blue is the field's own.
             return at.DIVERGED if last > 1.0 else at.NOT_FINITE
+        if strict > HOPELESS * best:
+            return at.DIVERGED
         last = strict
         if strict <= CONVERGED:
             return at.DONE

@@ -64,6 +64,7 @@ class LineStepper:
         else:
             self._real[at.TOLERANCE] = program.tol
             self._real[at.NEXT] = program.h or 0.0
+            self._real[at.LIMIT] = np.inf
         self._status, self._reason = Status.RUNNING, ""
         self._call(at.RESET)
 
