@@ -26,7 +26,7 @@ from problems.system import System
 Array = NDArray[np.float64]
 
 STAGES = 16
-DECAY = 1e-14  # of the last Legendre coefficient; its square is the size of the error
+DECAY = 1e-16  # of the last Legendre coefficient; its square is the size of the error
 MOST_ITERATIONS = 200
 
 

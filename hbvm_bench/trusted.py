@@ -8,7 +8,7 @@ long double, to 1e-15. A chaotic problem has a reference as far as they agree.
 
 import platform
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Context, Decimal
 from importlib.metadata import version
 
 import mpmath
@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 
 SMALL = 60  # unknowns
 GRID = 1000  # the bench's own grid: a reference's times are among its samples
-ROWS = 50
+ROWS = 50  # at most, of small systems
+FEW_ROWS = 10  # of large ones, whose files would be large
+FEW_DIGITS = 25
 LONG_DOUBLE_TOLERANCE = "1e-20"
 
 
@@ -63,7 +65,7 @@ class Opinions:
 
 
 def times(problem: Problem, until: float | None = None) -> Array:
-    """Return at most `ROWS` + 1 times of the bench's default grid, up to ``until``.
+    """Return at most `ROWS` + 1 (large systems: `FEW_ROWS` + 1) times of the bench's grid, up to ``until``.
 
     Raises
     ------
@@ -79,7 +81,7 @@ def times(problem: Problem, until: float | None = None) -> Array:
         count = int(part * GRID * (1 + 1e-12))
         if count == 0:
             raise InputError(f"until={until!r} comes before the first sample, {problem.t0 + span / GRID!r}.")
-    stride = -(-count // ROWS)
+    stride = -(-count // (ROWS if problem.system.dim <= SMALL else FEW_ROWS))
     # As the bench computes its own grid, so that the times are the same doubles.
     return problem.t0 + span * np.arange(0, count + 1, stride) / GRID
 
@@ -148,8 +150,14 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             "field": problem.system.fingerprint,
         },
         t=reference.hexadecimal(opinions.times[:kept]),
-        y=[[str(value) for value in row] for row in opinions.states[:kept]],
+        y=[[_text(problem, value) for value in row] for row in opinions.states[:kept]],
     )
+
+
+def _text(problem: Problem, value: Decimal) -> str:
+    if problem.system.dim <= SMALL:
+        return str(value)
+    return str(Context(prec=FEW_DIGITS).plus(value))
 
 
 def _apart(problem: Problem, one: list[list[Decimal]], other: list[list[Decimal]]) -> Array:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import integrators
 import problems
+from hbvm_bench import campaign, runner
 from hbvm_bench.identity import make_problem
 from problems import emit, expression, formula, inspection
 from problems.errors import InputError
@@ -249,3 +250,25 @@ def test_a_problem_from_text_names_what_is_wrong(arguments, reason):
     with pytest.raises(InputError) as caught:
         problems.load("expression", **arguments)
     assert reason in str(caught.value)
+
+
+def test_a_campaign_file_takes_a_hamiltonian_as_text(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        """
+name = "mine"
+title = "A system of my own"
+problems = ["""
+        + "\"expression(H='p^2/2 + k*q^4/4', q0=[1.0], p0=[0.0], parameters='k=2', t_end=5.0)\""
+        + """]
+
+[[methods]]
+use = "HBVM(k=4, s=2, h=0.1)"
+"""
+    )
+    (case,) = runner.plan(campaign.load(str(file)))
+    assert case.problem.system.separable
+    assert case.problem.par.tolist() == [2.0]
+    file.write_text(file.read_text().replace("p^2/2", "p.x"))
+    with pytest.raises(InputError, match="column"):
+        runner.plan(campaign.load(str(file)))
