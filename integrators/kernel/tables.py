@@ -10,6 +10,7 @@ linear or quadratic over the step is right to 1e-19 or so. This costs nothing
 when the rows are used.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 MODES = 13  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 MOMENTS = 3
+FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 
 NAMES = (
     "nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low",
@@ -140,22 +142,36 @@ def keep_moments(high: Array, low: Array, basis: Array) -> Array:
     high, low : ndarray, shape (n, k)
         The matrix, as a sum of two doubles.
     basis : ndarray, shape (k, m)
-        Columns with which the rounded rows shall have the products that the exact rows have.
+        Columns with which the rounded rows shall have the products that the exact rows
+        have, the most important first.
 
     Returns
     -------
     ndarray, shape (n, k)
-        Per row, the m entries that are smallest, and so are rounded most finely,
-        have moved by some units of the row's own rounding error.
+        Some entries have moved by a few units of the row's own rounding error.
     """
     rounded = high.copy()
-    m = basis.shape[1]
-    for i in range(high.shape[0]):
-        at_will = np.argsort(np.abs(high[i]))[:m]
+    k, m = basis.shape
+    weights = 0.5 ** np.arange(m)
+    for row, exact, rest in zip(rounded, high, low, strict=True):
+        far = FARTHEST * np.spacing(np.abs(exact).max())
+        # The entries that are rounded most finely, of the whole row and of its parts: of the
+        # latter none need move far.
+        parts = [np.arange(k), *np.array_split(np.arange(k), m)]
+        finest = [part[np.argsort(np.abs(exact[part]))] for part in parts]
+        pool = np.unique(np.concatenate([finest[0][:9], *(part[:3] for part in finest[1:])]))
+        sets = np.array(list(itertools.combinations(pool, m)))
+        inverses = np.linalg.inv(basis[sets].transpose(0, 2, 1))
         for _ in range(3):
-            # high - rounded is exact: they differ by a few units in the last place.
-            lost = ((high[i] - rounded[i]) + low[i]) @ basis
-            rounded[i, at_will] += np.linalg.solve(basis[at_will].T, lost)
+            lost = ((exact - row) + rest) @ basis  # exact - row is exact: they differ by a few units
+            moved = (row[sets] + inverses @ lost) - row[sets]
+            left = lost - np.einsum("si,sij->sj", moved, basis[sets])
+            sizes = np.linalg.norm(left * weights, axis=1)
+            sizes[np.abs(moved).max(axis=1) > far] = np.inf
+            best = np.argmin(sizes)
+            if sizes[best] >= np.linalg.norm(lost * weights):
+                break
+            row[sets[best]] += moved[best]
     return rounded
 
 
