@@ -93,7 +93,7 @@ def test_help_version_and_lists(capsys):
     assert capsys.readouterr().out.startswith("hbvm-bench 0.")
     assert cli.main(["list"]) == 0
     out = capsys.readouterr().out
-    assert all(name in out for name in ("sitnikov(", "HBVM(k=..., s=..., h=...)", *METRICS))
+    assert all(name in out for name in ("sitnikov(", "HBVM(k=..., s=..., h=...", *METRICS))
     assert cli.main(["run", "--help"]) == 0
     assert "--report" in capsys.readouterr().out
 
