@@ -24,8 +24,8 @@ _CONTESTS = (
     ),
     Contest(
         key="sitnikov",
-        title="Sitnikov's problem, e = 0.75, 1118 revolutions of the primaries",
-        problem="sitnikov(e=0.75, t_end=24000.0)",
+        title="Sitnikov's problem, e = 0.75, 280 revolutions of the primaries",
+        problem="sitnikov(e=0.75, t_end=6000.0)",
         position=1e-8,
         goals=(
             Goal(family="heyoka", ratio=5.0, position=1e-8),
@@ -38,8 +38,8 @@ _CONTESTS = (
     ),
     Contest(
         key="kepler",
-        title="Kepler's problem, e = 0.6, 100 revolutions",
-        problem="kepler(e=0.6, t_end=630.0)",
+        title="Kepler's problem, e = 0.6, 500 revolutions",
+        problem="kepler(e=0.6, t_end=3150.0)",
         goals=(Goal(family="heyoka", ratio=3.0),),
     ),
     Contest(
