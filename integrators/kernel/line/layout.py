@@ -87,6 +87,7 @@ ARRAYS: dict[str, tuple[str, ...]] = {
     "size": ("blocks",),
     "change": ("blocks",),
     "largest": ("blocks",),
+    "slope": ("blocks",),
     "next_y": ("dim",),
     "next_e": ("dim",),
     "time": ("one",),

@@ -154,7 +154,7 @@ def iterate(m, t, h):
         if not strict < INFINITY:
             # Growing changes overflow in the end; a NaN out of the blue is the field's own.
             return at.DIVERGED if last > 1.0 else at.NOT_FINITE
-        if strict > HOPELESS * best:
+        if floored > HOPELESS * best:
             return at.DIVERGED
         last = strict
         if strict <= CONVERGED:

@@ -13,6 +13,7 @@ BUSY = 36.0
 # stay this much shorter at first, and then approach that length again by this factor a step.
 RETREAT, APPROACH = 0.5, 1.02
 SHORTEST = 2.0**-48  # of the time: a shorter step cannot be told from none
+NOTHING = 1e-6  # of the largest size in its group: a smaller block may have any error up to this
 CLOSE = 2.0**-50  # times whose relative difference is at most this are the same
 INFINITY = float("inf")
 
@@ -25,10 +26,10 @@ def error(m, h):
     out, is of size h^s: h |gamma_s|^2 / max_j |rho_j| has the order 2s + 1 of the
     local error, and its units.
     """
-    projection, stages, rho, y, block = m.projection, m.stages, m.rho, m.y, m.block
-    size, change, largest = m.size, m.change, m.largest
+    projection, stages, rho, y, block, group = m.projection, m.stages, m.rho, m.y, m.block, m.group
+    size, change, largest, slope = m.size, m.change, m.largest, m.slope
     for b in range(m.blocks):
-        size[b], change[b], largest[b] = 0.0, 0.0, 0.0
+        size[b], change[b], largest[b], slope[b] = 0.0, 0.0, 0.0, 0.0
     for d in range(m.dim):
         missing, top = 0.0, 0.0
         for i in range(m.k):
@@ -37,12 +38,15 @@ def error(m, h):
             top = max(top, abs(rho[j, d]))
         b = block[d]
         change[b] = max(change[b], abs(missing))
-        largest[b] = max(largest[b], top)
+        slope[b] = max(slope[b], top)
         size[b] = max(size[b], abs(y[d]) + abs(h) * top)
+    for b in range(m.blocks):
+        largest[group[b]] = max(largest[group[b]], size[b])
     worst = 0.0
     for b in range(m.blocks):
         if change[b] > 0.0:
-            worst = max(worst, abs(h) * change[b] * (change[b] / largest[b]) / size[b])
+            scale = max(size[b], NOTHING * largest[group[b]])
+            worst = max(worst, abs(h) * change[b] * (change[b] / slope[b]) / scale)
     return worst
 
 
