@@ -44,7 +44,7 @@ FORCE:
 
 lock:  ## rewrite requirements.lock (needs uv)
 	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url \
-	  pyproject.toml --extra peers --group dev -o requirements.lock
+	  pyproject.toml --extra peers --extra dask --extra export --group dev -o requirements.lock
 
 clean:
 	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis
