@@ -66,6 +66,8 @@ class Drift:
         errors without a sign.
     starts : int
         Number of trajectories.
+    reached : float
+        What the growth alone has reached at the end of the span; 0 for a bound.
     """
 
     law: str | None
@@ -79,6 +81,27 @@ class Drift:
     rate_low: float
     rate_high: float
     starts: int
+    reached: float = 0.0
+
+    def curve(self, t: ArrayLike, end: float) -> Array:
+        """Return the law as it was fitted, shape (n,), for drawing; not-a-number where there is none.
+
+        Parameters
+        ----------
+        t : array_like, shape (n,)
+            Times since the start, positive.
+        end : float
+            The last time of the samples that were fitted.
+        """
+        times = np.asarray(t, dtype=np.float64)
+        if self.law is None:
+            return np.full(times.shape, math.nan)
+        if self.law == "exponential":
+            grown = np.exp(np.minimum(self.growth * (times - end), 0.0))
+        else:
+            power = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}.get(self.law, self.slope)
+            grown = (times / end) ** power
+        return np.hypot(self.floor, self.reached * grown)
 
 
 def rms(errors: ArrayLike) -> Array:
@@ -163,6 +186,7 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
         _rate_of_growth(times, rows, math.exp(fits[law].parameters[0])) if law == "exponential" else 0.0,
         drift,
         len(rows),
+        0.0 if law == "bounded" else math.exp(fits[law].parameters[1]),
     )
 
 
@@ -296,5 +320,6 @@ def _drift(
     growth: float,
     drift: tuple[float, ...],
     starts: int,
+    reached: float = 0.0,
 ) -> Drift:
-    return Drift(law, why, *slope, floor, growth, drift[0], drift[1], drift[2], starts)
+    return Drift(law, why, *slope, floor, growth, drift[0], drift[1], drift[2], starts, reached)

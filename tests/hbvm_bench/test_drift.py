@@ -124,3 +124,18 @@ def test_what_is_no_series_is_refused(t, errors, words):
 
 def test_the_rms_is_over_the_trajectories_and_does_not_overflow():
     assert drift.rms([[3e200, 0.0], [4e200, 0.0]]).tolist() == pytest.approx([math.sqrt(12.5) * 1e200, 0.0])
+
+
+@pytest.mark.parametrize(("power", "law"), [(0.5, "square root"), (1.0, "linear"), (0.0, "bounded")])
+def test_the_curve_of_a_law_goes_through_what_was_fitted(power, law):
+    t = np.geomspace(1.0, 1e5, 400)
+    errors = 1e-15 * t**power
+    found = drift.fit(t, errors)
+    assert found.law == law
+    # measured: within 3 % of the samples where the floor has no part
+    np.testing.assert_allclose(found.curve(t[100:], t[-1]), errors[100:], rtol=0.06)
+
+
+def test_without_a_law_there_is_no_curve():
+    found = drift.fit([1.0, 2.0, 3.0], [1e-15, 2e-15, 3e-15])
+    assert np.isnan(found.curve([1.0, 2.0], 3.0)).all()
