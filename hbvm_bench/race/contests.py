@@ -20,7 +20,8 @@ _CONTESTS = (
             Goal(family="ias15", ratio=25.0),
             Goal(family="whfast", ratio=3.0, energy=1e-10, position=None),
         ),
-        note="The home ground of WHFast: symplectic correctors of order 17, its plain and its lazy kernel.",
+        note="The home ground of WHFast: symplectic correctors of order 17, its plain and its lazy kernel, "
+        "safe mode off. WHFast512 does not take part: there is no adapter for it.",
     ),
     Contest(
         key="sitnikov",

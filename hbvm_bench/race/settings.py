@@ -27,8 +27,8 @@ class Family:
 
     Attributes
     ----------
-    title : str
-        For readers.
+    title, short : str
+        For readers; for column heads.
     lead : str
         The method whose colour and marker it has.
     fixed : bool
@@ -41,6 +41,7 @@ class Family:
     """
 
     title: str
+    short: str
     lead: str
     fixed: bool
     landing: str | None
@@ -50,6 +51,7 @@ class Family:
 FAMILIES: dict[str, Family] = {
     OURS: Family(
         "HBVM and Gauss, fixed step",
+        "HBVM, Gauss",
         "HBVM",
         True,
         None,
@@ -57,6 +59,7 @@ FAMILIES: dict[str, Family] = {
     ),
     "heyoka": Family(
         "heyoka, Taylor",
+        "heyoka",
         "Taylor",
         False,
         "land",
@@ -65,13 +68,15 @@ FAMILIES: dict[str, Family] = {
     "ias15": Family(
         "REBOUND, IAS15",
         "IAS15",
+        "IAS15",
         False,
         "land",
         "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
     ),
-    "whfast": Family("REBOUND, WHFast", "WHFast", True, None, "the wheel's, for any x86-64"),
+    "whfast": Family("REBOUND, WHFast", "WHFast", "WHFast", True, None, "the wheel's, for any x86-64"),
     "leapfrog": Family(
         "REBOUND, leapfrog",
+        "leapfrog",
         "Leapfrog",
         True,
         None,
@@ -79,6 +84,7 @@ FAMILIES: dict[str, Family] = {
     ),
     "dop853": Family(
         "SciPy, DOP853",
+        "DOP853",
         "DOP853",
         False,
         None,

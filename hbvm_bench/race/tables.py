@@ -36,7 +36,7 @@ def headline(races: Sequence[Race]) -> Table:
         )
     return Table(
         "How many times as long as our fastest setting each peer's fastest takes, at the same accuracy",
-        ("problem", "energy, position", "ours", *(FAMILIES[peer].lead for peer in peers)),
+        ("problem", "energy, position", "ours", *(FAMILIES[peer].short for peer in peers)),
         rows,
         "Medians over interleaved rounds; in brackets the quartiles of the ratio within each round. A ratio "
         "below 1 means that the peer is faster.",
@@ -53,7 +53,7 @@ def goals(races: Sequence[Race]) -> Table:
             rows.append(
                 (
                     race.contest.title,
-                    FAMILIES[goal.family].lead,
+                    FAMILIES[goal.family].short,
                     f"{power(goal.energy)}, {position}",
                     f"≥ {goal.ratio:g}",
                     ratio_text(found.ratio),
@@ -117,7 +117,7 @@ def levels(race: Race) -> Table:
         )
     return Table(
         "At other accuracies",
-        ("energy, position ≤", "our fastest", "time", *(f"{FAMILIES[p].lead} × ours" for p in peers)),
+        ("energy, position ≤", "our fastest", "time", *(f"{FAMILIES[p].short} × ours" for p in peers)),
         rows,
         words=(1,),
     )

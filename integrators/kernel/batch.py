@@ -88,9 +88,11 @@ def run_batch(
         grid, np.full((n, grid.size, dim), np.nan),
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
-    work = _Work(
-        program, result, starts, parameters, t0, h, SAMPLINGS[sample or "side"], *plan(grid, bases, h)
-    )
+    work = _Work(program, result, starts, parameters, t0, h, sample or "side", *plan(grid, bases, h))
+    if program.solver.strategy == layout.ALWAYS_IMPLICIT:
+        for i in range(n):
+            work.alone(i)
+        return result
     size = min(n, members_for(program.shape.rows, program.constants.route))
     groups = [range(first, min(first + size, n)) for first in range(0, n, size)]
     if threads == 1:
@@ -112,7 +114,7 @@ class _Work:
     parameters: Array
     t0: float
     h: float
-    between: int
+    sample: str
     targets: Counts
     parts: Array
 
@@ -136,22 +138,40 @@ class _Work:
             first = 0
             for last in stops:
                 engine.call(
-                    engine.ADVANCE_BATCH, here.ctypes.data, len(group), self.between, times.size,
+                    engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample], times.size,
                     times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
                     first, last, y[group[0] :].ctypes.data,
                 )  # fmt: skip
                 first = last
             for member, i in enumerate(group):
-                self._report(i, contexts[member])
+                if contexts[member].words[layout.WANTED]:
+                    self.alone(i)
+                else:
+                    self._report(i, contexts[member])
+
+    def alone(self, i: int) -> None:
+        """Integrate one trajectory by a stepper: the implicit solver works on one at a time."""
+        result = self.result
+        stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
+        samples = stepper.advance(result.t, sample=self.sample)
+        result.y[i, : samples.t.size], result.y[i, samples.t.size :] = samples.y, np.nan
+        result.status[i], result.reason[i] = samples.status, samples.reason
+        result.t_stop[i] = result.t[-1] if samples.status is Status.FINISHED else stepper.t
+        stats = stepper.stats
+        result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
+        result.evaluations[i] = stats.evaluations or 0
 
     def _stops(self, size: int) -> list[int]:
         """Cut the samples into runs of about `CHUNK` steps, between which Ctrl-C is heard."""
-        done = np.cumsum(self.targets) if self.between == layout.LAND else self.targets
+        done = np.cumsum(self.targets) if self.sample == "land" else self.targets
         cuts = np.flatnonzero(np.diff((done + 1) * size // CHUNK, prepend=0)) + 1
         return np.unique(np.append(cuts, self.targets.size)).tolist()
 
     def _reset(self, context: Context, start: Array) -> None:
         for slot in (layout.STEPS, layout.ITERATIONS, layout.EVALUATIONS, layout.RESTARTS, layout.PARTIAL):
+            context.words[slot] = 0
+        context.words[layout.STRATEGY] = self.program.solver.strategy
+        for slot in (layout.WANTED, layout.SLOW):
             context.words[slot] = 0
         context.reals[layout.T0], context.reals[layout.H] = self.t0, self.h
         engine.call(engine.RESET, context.address, start.ctypes.data)

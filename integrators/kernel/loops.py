@@ -6,7 +6,7 @@ from integrators.kernel import layout as at
 from integrators.kernel import native
 from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8
 from integrators.kernel.products import compiled
-from integrators.kernel.solve import begin, close, rewind, settle_part, solve, sweep, sweep_tested
+from integrators.kernel.solve import begin, close, reconsider, rewind, settle_part, solve, sweep, sweep_tested
 from integrators.kernel.step import (
     FARTHEST,
     prepare,
@@ -189,11 +189,12 @@ def together(contexts, count):
     most = 0
     for m in range(count):
         ctx = get_int(contexts, m)
-        put_int(ctx, at.OUTCOME, at.DONE)
-        if get_int(ctx, at.ALIVE) and get_int(ctx, at.SOLVED) == 0:
-            free = begin(ctx)
-            put_int(ctx, at.UNTESTED, free)
-            most = max(most, free)
+        if get_int(ctx, at.ALIVE):
+            put_int(ctx, at.OUTCOME, at.DONE)
+            if get_int(ctx, at.SOLVED) == 0:
+                free = begin(ctx)
+                put_int(ctx, at.UNTESTED, free)
+                most = max(most, free)
     for j in range(most):
         for m in range(count):
             ctx = get_int(contexts, m)
@@ -209,6 +210,8 @@ def together(contexts, count):
                 running = running or get_int(ctx, at.OUTCOME) == at.RUNNING
                 if get_int(ctx, at.OUTCOME) != at.RUNNING:
                     close(ctx)
+                    if get_int(ctx, at.STRATEGY) != at.FIXED_POINT:
+                        put_int(ctx, at.OUTCOME, reconsider(ctx, get_int(ctx, at.OUTCOME)))
     for m in range(count):
         ctx = get_int(contexts, m)
         if get_int(ctx, at.ALIVE):
@@ -228,7 +231,8 @@ def advance_batch(contexts, members, between, count, times, targets, parts, firs
 
     ``contexts`` points to the addresses of the members' contexts and then of those for
     their partial steps; ``out`` holds (members, count, dim) doubles. A member that fails stops living,
-    with its OUTCOME and MADE; the others go on.
+    with its OUTCOME and MADE; the others go on. One that needs the implicit solver stops so
+    as well, with WANTED set.
     """
     ctx = get_int(contexts, 0)
     dim = get_int(ctx, at.ROWS) * (2 if get_int(ctx, at.SECOND) else 1)

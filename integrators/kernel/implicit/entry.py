@@ -15,20 +15,24 @@ from integrators.kernel.memory import get_int
 def entry(ctx, place, started):
     """Solve the step of a context with the solver's memory at ``place``; see `solve_step`."""
     head = integers(place, of.HEAD)
-    rows, s, pairs, entries = head[of.ROWS], head[of.DEGREE], head[of.PAIRS], head[of.ENTRIES]
-    a = integers(place + 8 * of.HEAD, 35)
-    components = 2 * rows if get_int(ctx, at.SECOND) else rows
+    rows, k, s, pairs = head[of.ROWS], head[of.STAGES], head[of.DEGREE], head[of.PAIRS]
+    entries, whole = head[of.ENTRIES], head[of.WHOLE]
+    dim = 2 * rows if get_int(ctx, at.SECOND) else rows
+    a = integers(place + 8 * of.HEAD, 43)
     m = Memory(
         numbers(a[0], 1), numbers(a[1], 1), numbers(a[2], 1), numbers(a[3], 1),
-        table(a[4], pairs, s), table(a[5], pairs, s), table(a[6], s, pairs), table(a[7], s, pairs),
-        numbers(a[8], pairs), numbers(a[9], pairs), table(a[10], s, s), table(a[11], s, s),
-        integers(a[12], entries), integers(a[13], entries), integers(a[14], of.COUNTS),
-        numbers(a[15], of.REALS), numbers(a[16], rows), table(a[17], s, components),
-        numbers(a[18], components), table(a[19], s, components), table(a[20], s, components),
-        table(a[21], s, components), numbers(a[22], rows), numbers(a[23], rows), numbers(a[24], rows),
-        numbers(a[25], entries), table(a[26], pairs * rows, rows), table(a[27], pairs * rows, rows),
-        integers(a[28], pairs * rows), numbers(a[29], rows), numbers(a[30], rows),
-        numbers(a[31], components), numbers(a[32], components), numbers(a[33], 1), numbers(a[34], 1),
+        table(a[4], k, s), table(a[5], k, s), table(a[6], s, k),
+        table(a[7], pairs, s), table(a[8], pairs, s), table(a[9], s, pairs), table(a[10], s, pairs),
+        numbers(a[11], pairs), numbers(a[12], pairs), table(a[13], s, s), table(a[14], s, s),
+        integers(a[15], entries), integers(a[16], entries), integers(a[17], of.COUNTS),
+        numbers(a[18], of.REALS), numbers(a[19], rows), table(a[20], s, dim), numbers(a[21], dim),
+        table(a[22], s, dim), table(a[23], s, dim), table(a[24], s, dim),
+        numbers(a[25], rows), numbers(a[26], rows), numbers(a[27], rows), numbers(a[28], entries),
+        table(a[29], pairs * rows, rows), table(a[30], pairs * rows, rows), integers(a[31], pairs * rows),
+        table(a[32], whole, whole), table(a[33], whole, whole), integers(a[34], whole),
+        numbers(a[35], whole), numbers(a[36], whole),
+        numbers(a[37], rows), numbers(a[38], rows), numbers(a[39], dim), numbers(a[40], dim),
+        numbers(a[41], 1), numbers(a[42], 1),
     )  # fmt: skip
     return solve_step(ctx, m, head[of.METHOD], head[of.JACOBIAN], head[of.FACTORS], started)
 

@@ -8,7 +8,7 @@ context (`integrators.kernel.layout`).
 from typing import Any, NamedTuple
 
 # The choices and sizes at the head.
-METHOD, ROWS, DEGREE, PAIRS, ENTRIES, JACOBIAN, FACTORS, HEAD = range(8)
+METHOD, ROWS, STAGES, DEGREE, PAIRS, ENTRIES, WHOLE, JACOBIAN, FACTORS, HEAD = range(10)
 
 # How the corrections are computed.
 NEWTON, BLENDED = range(2)
@@ -52,6 +52,9 @@ class Memory(NamedTuple):
     projection: Any  # the field's values -> coefficients, packed
     basis: Any  # coefficients -> the polynomial at the nodes, packed
     weights: Any  # of the stages in a mean, one per lane of stage memory
+    integrals: Any  # (k, s), the stage table
+    reach: Any  # (k, s), the same; in the second-order form times X_s
+    moments: Any  # (s, k), the projection
     left_re: Any  # (p, s), rows of the inverse of the eigenvectors' matrix
     left_im: Any
     right_re: Any  # (s, p), eigenvectors, twice where a conjugate belongs to them
@@ -77,6 +80,11 @@ class Memory(NamedTuple):
     lu_re: Any  # (p R, R), the factors, unless they are elsewhere
     lu_im: Any
     pivots: Any  # (p R,), integers
+    whole_re: Any  # (s R, s R), the matrix with a Jacobian for each stage; none if that is too large
+    whole_im: Any
+    whole_pivots: Any  # (s R,), integers
+    whole_x: Any  # (s R,)
+    whole_y: Any
     b_re: Any  # (R,), right-hand side and solution of a system
     b_im: Any
     v_re: Any  # (D,), a vector of the first-order form

@@ -1,27 +1,9 @@
-"""The stage equations by simplified Newton or blended iteration.
-
-F(gamma) = gamma - P'Omega f(state + h I gamma) = 0, with I the table of integrals.
-A simplified Newton correction solves (I - X_s (x) h J) delta = -F. With X_s =
-V diag(z) V^{-1} this is one complex system with I - h z J for each pair of
-conjugate eigenvalues. The blended iteration needs one real matrix whatever s
-is: with rho = min |z|, eta = F, eta_1 = rho X_s^{-1} eta, theta = (I - h rho J)^{-1},
-
-    delta = -theta [eta_1 + theta (eta - eta_1)].
-
-In the second-order form gamma holds the coefficients of q' and of p', and F the
-linear relation between them as well: it is only through corrections of both that
-the rounding errors of large h J are taken out again.
-
-References
-----------
-E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, Springer
-1996, section IV.8. L. Brugnano, C. Magherini, *Blended implementation of block
-implicit methods for ODEs*, Applied Numerical Mathematics 42 (2002) 29-45.
-"""
+"""A step by an implicit solver: which start, which Jacobian, when to stop, when to give up."""
 
 from integrators.kernel import layout as at
 from integrators.kernel.implicit import layout as of
-from integrators.kernel.implicit.jacobian import contraction, factorize, linearize, resolve
+from integrators.kernel.implicit.corrections import EACH, KEPT, correct
+from integrators.kernel.implicit.jacobian import contraction, linearize
 from integrators.kernel.implicit.stages import (
     FLOORED,
     STRICT,
@@ -31,12 +13,10 @@ from integrators.kernel.implicit.stages import (
     set_stages,
     set_values,
     set_velocities,
-    swap_stages,
     take_sizes,
 )  # fmt: skip
 from integrators.kernel.line.views import compiled
 from integrators.kernel.memory import get_float, get_int, put_float, put_int
-from integrators.kernel.products import evaluate, offset
 from integrators.kernel.step import FARTHEST, prepare, start_elsewhere
 
 MOST_CORRECTIONS = 40
@@ -56,127 +36,23 @@ INFINITY = float("inf")
 
 
 @compiled
-def newton(ctx, m, factors):
-    """Set the correction from the residual: one complex system per pair of eigenvalues."""
-    s, components = m.residual.shape
-    for j in range(s):
-        for d in range(components):
-            m.correction[j, d] = 0.0
-    for i in range(m.eigen_re.size):
-        for d in range(components):
-            a, b = 0.0, 0.0
-            for j in range(s):
-                a += m.left_re[i, j] * m.residual[j, d]
-                b += m.left_im[i, j] * m.residual[j, d]
-            m.v_re[d], m.v_im[d] = a, b
-        resolve(ctx, m, factors, i)
-        for j in range(s):
-            a, b = m.right_re[j, i], m.right_im[j, i]
-            for d in range(components):
-                m.correction[j, d] += a * m.v_re[d] - b * m.v_im[d]
+def iterate(ctx, m, method, source, factors, which):
+    """Correct gamma, by the Jacobian that ``which`` tells, until the stages do not change.
 
-
-@compiled
-def blended(ctx, m, factors):
-    """Set the correction from the residual: theta twice, on two rows at a time as real and imaginary part."""
-    s, components = m.residual.shape
-    rho = m.eigen_re[0]
-    for d in range(components):
-        for i in range(s):
-            total = 0.0
-            for j in range(s):
-                total += m.inverse[i, j] * m.residual[j, d]
-            m.correction[i, d] = rho * total
-    for i in range(0, s, 2):
-        j = min(i + 1, s - 1)
-        for d in range(components):
-            m.v_re[d] = m.residual[i, d] - m.correction[i, d]
-            m.v_im[d] = m.residual[j, d] - m.correction[j, d]
-        for twice in range(2):
-            resolve(ctx, m, factors, 0)
-            if twice == 0:
-                for d in range(components):
-                    m.v_re[d] += m.correction[i, d]
-                    m.v_im[d] += m.correction[j, d]
-        for d in range(components):
-            m.correction[j, d] = m.v_im[d]
-        for d in range(components):
-            m.correction[i, d] = m.v_re[d]
-
-
-@compiled
-def is_finite(values):
-    """Whether all values are finite numbers."""
-    total = 0.0
-    for value in values:
-        total += value * 0.0
-    return total == 0.0
-
-
-@compiled
-def take_mean(ctx, m):
-    """Set `Memory.point` to the mean of the stages."""
-    lanes = get_int(ctx, at.LANES)
-    for d in range(m.point.size):
-        m.point[d] = 0.0
-    for chunk in range(get_int(ctx, at.CHUNKS)):
-        start = get_int(ctx, at.Q) + 8 * offset(ctx, chunk)
-        for d in range(m.point.size):
-            for l in range(8):
-                m.point[d] += m.weights[8 * chunk + l] * get_float(start, lanes * d + l)
-
-
-@compiled
-def correct(ctx, m, method, source, factors, follow):
-    """Evaluate the field, and correct gamma; return whether that is possible."""
-    s, components = m.gamma.shape
-    evaluate(ctx)
-    m.count[of.TRIED] += 1
-    project(ctx, m, m.residual, components - m.factor.size)
-    if get_int(ctx, at.SECOND):
-        for j in range(s):
-            for d in range(m.factor.size, components):
-                m.correction[j, d] = m.gamma[j, d]
-        set_velocities(ctx, m, m.correction)
-        for j in range(s):
-            for d in range(m.factor.size):
-                m.residual[j, d] = m.correction[j, d]
-    for j in range(s):
-        for d in range(components):
-            m.residual[j, d] -= m.gamma[j, d]
-    if follow:
-        take_mean(ctx, m)
-        t = get_float(ctx, at.T0) + (get_int(ctx, at.N) + 0.5) * get_float(ctx, at.H)
-        linearize(ctx, m, source, t)
-    if m.count[of.FACTORED] == 0 and not factorize(ctx, m, factors):
-        return False
-    if method == of.BLENDED:
-        blended(ctx, m, factors)
-    else:
-        newton(ctx, m, factors)
-    for j in range(s):
-        for d in range(components):
-            m.gamma[j, d] += m.correction[j, d]
-    swap_stages(ctx)
-    return True
-
-
-@compiled
-def iterate(ctx, m, method, source, factors, follow):
-    """Correct gamma until the stages do not change; return the outcome.
-
-    With ``follow`` the Jacobian is taken anew, at the mean of the stages, for
-    every correction. What ends the iteration is the change of the stages,
-    relative to their blocks, as in `integrators.kernel.solve`.
+    What ends the iteration is the change of the stages, relative to their blocks, as
+    in `integrators.kernel.solve`. Return DONE, DIVERGED, or NOT_FINITE if the start is
+    one at which the field or its Jacobian is not finite.
     """
     most = MOST_BLENDED if method == of.BLENDED else MOST_CORRECTIONS
     tolerance = get_float(ctx, at.TOLERANCE)
     best, rough, worst = INFINITY, INFINITY, 0.0
-    rate = m.real[of.RATE] if method == of.NEWTON and not follow else 1.0
+    rate = m.real[of.RATE] if method == of.NEWTON and which == KEPT else 1.0
     stalled, hopeless = 0, 0
     for tried in range(most + 1):
-        if tried and not correct(ctx, m, method, source, factors, follow):
-            return at.NOT_FINITE if tried == 1 and not is_finite(m.entries) else at.DIVERGED
+        if tried:
+            outcome = correct(ctx, m, method, source, factors, which)
+            if outcome != at.DONE:
+                return outcome if tried == 1 else at.DIVERGED
         set_stages(ctx, m)
         if rough > CALM:
             take_sizes(ctx, m)
@@ -185,8 +61,8 @@ def iterate(ctx, m, method, source, factors, follow):
         strict, before = changes(ctx, m, STRICT), rough
         rough = changes(ctx, m, FLOORED)
         m.real[of.CHANGE] = rough
-        if not strict < INFINITY:
-            return at.NOT_FINITE if tried == 1 else at.DIVERGED
+        if not rough < INFINITY:
+            return at.DIVERGED
         if before < CALM and rough > STAGNATION:
             worst = max(worst, rough / before)
         if strict <= tolerance or strict * max(worst, rate) < FORESEEN * tolerance:
@@ -277,7 +153,7 @@ def solve_step(ctx, m, method, source, factors, started):
             set_velocities(ctx, m, m.predicted)
     fresh = m.count[of.LINEARIZED] == 0 or m.count[of.STALE] == 1 or m.count[of.SINCE] >= OLDEST
     use = extrapolated and (started or m.count[of.PREDICT])
-    follow, trying = 0, 1
+    which, trying = KEPT, 1
     outcome = at.RUNNING
     while trying:
         if fresh:
@@ -287,20 +163,20 @@ def solve_step(ctx, m, method, source, factors, started):
         for j in range(m.gamma.shape[0]):
             for d in range(m.gamma.shape[1]):
                 m.gamma[j, d] = m.predicted[j, d] if use else 0.0
-        outcome = iterate(ctx, m, method, source, factors, follow)
+        outcome = iterate(ctx, m, method, source, factors, which)
         trying = 0
         if outcome != at.DONE:
             # First without what may have been bad: the extrapolation, an old Jacobian; then
-            # with a Jacobian for each correction.
+            # with the Jacobian of each stage, or where that is too large, of their mean.
             if use:
                 put_int(ctx, at.RESTARTS, get_int(ctx, at.RESTARTS) + 1)
             if use or m.count[of.SINCE]:
                 trying, use, fresh = 1, 0, True
-            elif outcome == at.DIVERGED and not follow:
+            elif outcome == at.DIVERGED and which == KEPT:
                 m.count[of.RESCUES] += 1
-                trying, follow, fresh = 1, 1, False
+                trying, which, fresh = 1, EACH, False
     m.count[of.SINCE] += 1
-    if follow:
+    if which != KEPT:
         m.count[of.STALE] = 1
     if outcome == at.DONE:
         if not started:

@@ -38,11 +38,12 @@ def pack(ctx, m, low, first):
     """Write gamma's components from ``first`` on as stage memory has them, the first ``low`` rows twice."""
     padded = get_int(ctx, at.PADDED)
     s, rows = m.gamma.shape[0], m.factor.size
-    for j in range(low + s):
+    for j in range(8 * groups(low + s)):
         i = j if j < low else j - low
         start = padded * 8 * (j // 8) + j % 8
         for d in range(rows):
-            m.packed[start + 8 * d] = m.gamma[i, first + d]
+            # What stands in unused places is multiplied by zero, which a NaN survives.
+            m.packed[start + 8 * d] = m.gamma[i, first + d] if i < s else 0.0
 
 
 @compiled

@@ -22,13 +22,14 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LARGEST_DENSE = 64  # rows up to which the factors are dense and in the solver's memory
+LARGEST_WHOLE = 128  # rows up to which there is a matrix with a Jacobian for each stage
 
 # The modules whose code is in the solver: an edit of any of them makes another one.
 SOURCES = (
     *("lanes", "memory", "layout", "products", "step", "native", "line/views"),
     *(
         f"implicit/{name}"
-        for name in ("layout", "external", "linear", "stages", "jacobian", "newton", "entry")
+        for name in ("layout", "external", "linear", "stages", "jacobian", "corrections", "newton", "entry")
     ),
 )
 
@@ -152,7 +153,8 @@ class Workspace:
         self.traced = linearization.jacobian is not None
         head = np.zeros(of.HEAD, dtype=np.int64)
         head[of.METHOD], head[of.JACOBIAN] = kind, linearization.address
-        head[of.ROWS], head[of.DEGREE] = shape.rows, c.s
+        head[of.ROWS], head[of.STAGES], head[of.DEGREE] = shape.rows, c.k, c.s
+        head[of.WHOLE] = self._kept["whole_x"].size
         head[of.PAIRS], head[of.ENTRIES] = self.method.eigenvalues.size, self._kept["rows"].size
         head[of.FACTORS] = 0 if self.factors is None else self.factors.address
         addresses = [self._kept[name].ctypes.data for name in of.Memory._fields]
@@ -196,11 +198,14 @@ def _arrays(shape: Shape, m: Method, places: tuple[Integers, Integers], elsewher
     weights[: c.k] = c.arrays["weights"].reshape(-1)
     low = m.integrals_low.shape[1]
     factors = 0 if elsewhere else pairs * rows
+    whole = s * rows if s * rows <= LARGEST_WHOLE else 0
     tables: dict[str, Any] = {
         "stage_table": packed(np.hstack([m.integrals_low, m.integrals]), repeat=True),
         "projection": packed(c.arrays["projection"]),
         "basis": packed(m.basis, repeat=True),
         "weights": weights,
+        "integrals": m.integrals, "reach": m.integrals @ m.x if shape.second else m.integrals,
+        "moments": c.arrays["projection"],
         "left_re": m.left.real, "left_im": m.left.imag,
         "right_re": m.right.real, "right_im": m.right.imag,
         "eigen_re": m.eigenvalues.real, "eigen_im": m.eigenvalues.imag,
@@ -209,12 +214,13 @@ def _arrays(shape: Shape, m: Method, places: tuple[Integers, Integers], elsewher
         "packed": aligned(8 * padded * -(-(s + low) // 8)),
         "trial": aligned(c.lanes * (1 + 2 * padded)),
         "count": np.zeros(of.COUNTS, dtype=np.int64),
-        "pivots": np.zeros(factors, dtype=np.int64),
+        "pivots": np.zeros(factors, dtype=np.int64), "whole_pivots": np.zeros(whole, dtype=np.int64),
     }  # fmt: skip
     sizes = {
         "real": of.REALS, "point": rows, "gamma": s * dim, "increment": dim, "predicted": s * dim,
         "residual": s * dim, "correction": s * dim, "factor": rows, "slope_strict": rows,
         "slope_floored": rows, "entries": places[0].size, "lu_re": factors * rows, "lu_im": factors * rows,
+        "whole_re": whole**2, "whole_im": whole**2, "whole_x": whole, "whole_y": whole,
         "b_re": rows, "b_im": rows, "v_re": dim, "v_im": dim,
     }  # fmt: skip
     room = {name: np.zeros(n) for name, n in sizes.items()}
