@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from hbvm_bench.report.plots import Plot
 from hbvm_bench.report.style import GRID, INK, MUTED, NEUTRALS, PAPER
 
 FONT = "DejaVu Sans"
@@ -68,6 +69,8 @@ class Picture:
         Self-contained.
     png : bytes
         The same picture.
+    plot : Plot or None
+        What it shows, as numbers.
     """
 
     key: str
@@ -76,6 +79,7 @@ class Picture:
     summary: str
     svg: str
     png: bytes
+    plot: Plot | None = None
 
 
 def drawing() -> AbstractContextManager[None]:
@@ -83,7 +87,9 @@ def drawing() -> AbstractContextManager[None]:
     return mpl.rc_context(SETTINGS)
 
 
-def picture(figure: Figure, key: str, title: str, caption: str, summary: str) -> Picture:
+def picture(
+    figure: Figure, key: str, title: str, caption: str, summary: str, plot: Plot | None = None
+) -> Picture:
     """Render a figure; the same figure gives the same bytes."""
     svg, png = io.StringIO(), io.BytesIO()
     with mpl.rc_context(SETTINGS | {"svg.hashsalt": f"hbvm-bench-{key}"}):
@@ -93,7 +99,20 @@ def picture(figure: Figure, key: str, title: str, caption: str, summary: str) ->
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    return Picture(key, title, caption, summary, text, png.getvalue())
+    return Picture(key, title, caption, summary, compact(text), png.getvalue(), plot)
+
+
+def compact(svg: str) -> str:
+    """Return an SVG without what nobody sees: digits below a hundredth of a point, ids, blanks."""
+    svg = re.sub(r'\b(d|x|y|transform)="([^"]*)"', _rounded, svg)
+    svg = re.sub(r' transform="rotate\(-0 [^"]*\)"', "", svg)
+    svg = re.sub(r' id="[A-Za-z0-9.]+_\d+"', "", svg)
+    return re.sub(r">\s*\n\s*<", "><", svg)
+
+
+def _rounded(match: re.Match[str]) -> str:
+    value = re.sub(r"-?\d+\.\d+", lambda number: f"{round(float(number[0]), 2):g}", match[2])
+    return f'{match[1]}="{" ".join(value.split())}"'
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:

@@ -15,12 +15,14 @@ from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.labels import number_points
+from hbvm_bench.report.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.style import INK, MUTED, Look, method_name, options, panels
 from hbvm_bench.table import group_of
 
 Array = NDArray[np.float64]
 
 BINS = 60  # an error series is drawn as its largest value in each of so many spans
+FINE_BINS = 120  # and in so many in the page's interactive figures
 COLUMNS = 4
 # Inches: the panels of all figures over time have one size and stand under each other.
 WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
@@ -85,7 +87,31 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
         for case in members:
             _draw_error(axes, case, what)
         panel_legend(axes, members, markers=not what.joined)
-    return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what))
+    plot = Plot([Panel("", Axis("time", both=True), Axis(what.label, log=True), _curves(shown, what))])
+    return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what), plot)
+
+
+def trace(case: Drawn, x: Array, y: Array) -> Trace:
+    """Return a curve of a case for the page."""
+    return Trace(case.look.number, case.record.case.method, x, y)
+
+
+def _curves(cases: Sequence[Drawn], what: OverTime) -> list[Trace]:
+    made = []
+    for case in cases:
+        t, values = _finite(case, what)
+        if what.joined:
+            t, values = envelope(t, values, FINE_BINS)
+        made.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
+    return made
+
+
+def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
+    got = what.get(case.series)
+    assert got is not None
+    t, values = got
+    finite = np.isfinite(values)
+    return t[finite], np.abs(values[finite])
 
 
 def family_panels(
@@ -159,6 +185,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
     times = [_number(case.record, "warm_seconds") for case in shown]
+    plotted = []
     for axes, key in ((left, keys[0]), (right, keys[1])):
         values = [_number(case.record, key) for case in shown]
         floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
@@ -175,6 +202,18 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
         axes.set_xlabel("seconds for the whole span (median)")
         axes.set_title(METRICS[key].label, color=INK)
+        clouds = [
+            trace(case, np.array([seconds]), np.array([value]))
+            for case, seconds, value in zip(shown, times, values, strict=True)
+        ]
+        plotted.append(
+            Panel(
+                METRICS[key].label,
+                Axis("seconds for the whole span (median)", log=True),
+                Axis(METRICS[key].label, log=True),
+                clouds,
+            )
+        )
     side.set_axis_off()
     handles = [
         Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
@@ -194,6 +233,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         "points beyond the upper edge are drawn on it.",
         f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
         f"is that of {best.record.case.method}.",
+        Plot(plotted, "points"),
     )
 
 
@@ -210,11 +250,7 @@ def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
 
 
 def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
-    got = what.get(case.series)
-    assert got is not None
-    t, values = got
-    finite = np.isfinite(values)
-    t, values = t[finite], np.abs(values[finite])
+    t, values = _finite(case, what)
     if t.size == 0:
         return
     if what.joined:
@@ -232,14 +268,13 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
         line.set_linewidth(0.7)
         line.set_marker(case.look.marker)
         line.set_markersize(2.6)
+        line.set_markevery(max(1, t.size // 10))
 
 
 def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
     parts = []
     for case in cases:
-        got = what.get(case.series)
-        assert got is not None
-        values = np.abs(got[1][np.isfinite(got[1])])
+        _, values = _finite(case, what)
         worst = f"{values.max():.1e}" if values.size else "none finite"
         parts.append(f"{case.record.case.method}: {worst}")
     return f"{what.title}, largest values. " + "; ".join(parts) + "."

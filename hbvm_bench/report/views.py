@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from hbvm_bench.quantities import PLANETOID_Z
 from hbvm_bench.reference import Reference
 from hbvm_bench.report.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.figures import WIDTH, Drawn, family_panels, panel_legend
+from hbvm_bench.report.figures import WIDTH, Drawn, family_panels, panel_legend, trace
+from hbvm_bench.report.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.style import INK, MUTED, TRUTH, options
 from hbvm_bench.table import status_of
 from problems.problem import Problem
@@ -29,16 +30,20 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
     if not shown:
         return None
     figure, grid = family_panels(shown, "z of the planetoid")
+    curves: list[Trace] = []
+    late_truth: tuple[Array, Array] | None = None
     for axes, members in grid:
         for case in members:
             t, z = case.series["t"], case.series["y"][:, PLANETOID_Z]
             kept = (t >= start) & (np.abs(z) <= REACH)
             (line,) = axes.plot(t[kept], z[kept], color=case.look.light)
+            curves.append(trace(case, t[kept], z[kept]))
             if case.look.dash:
                 line.set_dashes(case.look.dash)
         if reference is not None:
             late = reference.t >= start
             truth = reference.high[late, PLANETOID_Z]
+            late_truth = (reference.t[late], truth)
             axes.plot(reference.t[late], truth, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
         axes.set_xlim(start, problem.t_end)
         axes.set_ylim(-REACH, REACH)
@@ -55,7 +60,12 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
         "Rings: the stored 128-bit reference. A line that is missing has left the picture: its planetoid "
         "is far away. A curve that misses the rings conserves, at best, the energy of another motion.",
         f"z at t = {problem.t_end:g}. {ends}.",
+        Plot([Panel("", Axis("time"), Axis("z of the planetoid"), [*curves, *_truth(late_truth)])]),
     )
+
+
+def _truth(points: tuple[Array, Array] | None) -> list[Trace]:
+    return [] if points is None else [Trace(0, "128-bit reference", *points, role="truth")]
 
 
 def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
@@ -72,6 +82,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
     grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.32}).ravel().tolist()
     for axes in grid[len(shown) :]:
         axes.set_axis_off()
+    curves: tuple[list[Trace], list[Trace]] = ([], [])
     for axes, case in zip(grid, shown, strict=False):
         t = case.series["t"]
         first = best.series["t"] <= REVOLUTION
@@ -79,6 +90,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         for body in (0, 1):
             _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
             _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
+            curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::2]))
         axes.set_xlim(-3.4, 3.4)
         axes.set_ylim(-3.4, 3.4)
         axes.set_aspect("equal")
@@ -98,6 +110,13 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
         "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
         "for the direction of the apsides, whatever its energy says.",
+        Plot(
+            [
+                Panel(f"primary {body + 1}", Axis("x"), Axis("y"), curves[body], square=True)
+                for body in (0, 1)
+            ],
+            "paths",
+        ),
     )
 
 
@@ -114,13 +133,17 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     figure.subplots_adjust(left=0.07, right=0.98, top=0.97, bottom=0.15)
     left, right = figure.subplots(1, 2)
     low = 0
+    curves: tuple[list[Trace], list[Trace]] = ([], [])
     for case in shown:
         history = case.series["extra.dt_history"]
         history = history[np.abs(history[:, 1]) > 0]
         dt = np.abs(history[:, 1])
         low = min(low, int(np.floor(np.log10(dt.min()))) - 1)
         for axes, x in ((left, history[:, 0]), (right, np.arange(1, len(dt) + 1))):
-            axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2)
+            every = max(1, len(dt) // 60)
+            axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2, markevery=every)
+        curves[0].append(trace(case, history[:, 0], dt))
+        curves[1].append(trace(case, np.arange(1.0, len(dt) + 1), dt))
         left.annotate(
             f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}",
             (history[-1, 0], dt.min()),
@@ -141,6 +164,12 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
         "Step sizes of what stalled",
         "The run was ended by a watchdog that saw the time stand still, not by a time limit.",
         "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
+        Plot(
+            [
+                Panel(title, Axis(title), Axis("step size dt", log=True), traces)
+                for title, traces in zip(("time", "recorded step"), curves, strict=True)
+            ]
+        ),
     )
 
 
@@ -162,11 +191,17 @@ def _path(
     color: str,
     linewidth: float,
 ) -> None:
-    # cubic Hermite pieces: the samples know their velocities, straight lines would cut the pericentres
+    curve = path(problem, case, chosen, body)
+    axes.plot(curve[:, 0], curve[:, 1], color=color, linewidth=linewidth)
+
+
+def path(problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int) -> Array:
+    """Return the path of a body in the plane between chosen samples, shape (n, 2), for drawing."""
     t, y = case.series["t"][chosen], case.series["y"][chosen]
     velocity = problem.velocity(y)
     if velocity is None or len(t) < 2 or not np.isfinite(y).all():
-        return
+        return np.empty((0, 2))
+    # cubic Hermite pieces: the samples know their velocities, straight lines would cut the pericentres
     here = slice(3 * body, 3 * body + 2)
     q, v = y[:, here], velocity[:, here]
     h = np.diff(t)[:, None, None]
@@ -178,5 +213,4 @@ def _path(
         + u**2 * (3 - 2 * u) * q1
         + u**2 * (u - 1) * h * v1
     ).reshape(-1, 2)
-    curve = curve[np.abs(curve).max(axis=1) < 30]
-    axes.plot(curve[:, 0], curve[:, 1], color=color, linewidth=linewidth)
+    return curve[np.abs(curve).max(axis=1) < 30]

@@ -1,0 +1,204 @@
+"""What a figure shows, as numbers: for interaction in the page, for its table and for its CSV file."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+DIGITS = 4  # significant ones of what is drawn; the store has them all
+TABLE_COLUMNS = 6  # places on the horizontal axis that the table of a curve shows
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: its label, whether it is logarithmic, and whether the page offers to change that."""
+
+    label: str
+    log: bool = False
+    both: bool = False
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One curve or one cloud of points.
+
+    Attributes
+    ----------
+    case : int
+        Number of the case in the tables; 0 for what belongs to no case.
+    name : str
+        Of the case, or of what else it is.
+    x, y : ndarray, shape (n,)
+        Where it goes; what is not finite is a gap.
+    role : {"case", "law", "truth"}
+        A law is drawn thin over its case; the truth is neutral.
+    note : str
+        What the law says.
+    """
+
+    case: int
+    name: str
+    x: Array
+    y: Array
+    role: Literal["case", "law", "truth"] = "case"
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes with what is drawn in it."""
+
+    title: str
+    x: Axis
+    y: Axis
+    traces: Sequence[Trace]
+    square: bool = False
+
+
+@dataclass(frozen=True)
+class Plot:
+    """All that a figure shows.
+
+    Attributes
+    ----------
+    panels : sequence of Panel
+        Side by side.
+    kind : {"lines", "points", "paths", "dots"}
+        Curves over x, one point per case, paths in a plane, or many points per case.
+    """
+
+    panels: Sequence[Panel] = field(default_factory=list)
+    kind: Literal["lines", "points", "paths", "dots"] = "lines"
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A table of a figure's numbers: the first ``words`` columns hold words."""
+
+    head: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    words: int = 3
+
+
+def as_json(plot: Plot) -> dict[str, Any]:
+    """Return a plot for the page; numbers have `DIGITS` digits, gaps are null."""
+    return {
+        "kind": plot.kind,
+        "panels": [
+            {
+                "title": panel.title,
+                "square": panel.square,
+                "x": vars(panel.x),
+                "y": vars(panel.y),
+                "traces": [
+                    {
+                        "case": trace.case,
+                        "name": trace.name,
+                        "role": trace.role,
+                        "note": trace.note,
+                        "x": [short(value) for value in trace.x.tolist()],
+                        "y": [short(value) for value in trace.y.tolist()],
+                    }
+                    for trace in panel.traces
+                ],
+            }
+            for panel in plot.panels
+        ],
+    }
+
+
+def as_csv(plot: Plot) -> str:
+    """Return a plot as text: one line per point."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["panel", "case", "name", "kind", "x", "y"])
+    for panel in plot.panels:
+        for trace in panel.traces:
+            for x, y in zip(trace.x.tolist(), trace.y.tolist(), strict=True):
+                values = ["" if (v := short(value)) is None else repr(v) for value in (x, y)]
+                writer.writerow([panel.title, trace.case or "", trace.name, trace.role, *values])
+    return stream.getvalue()
+
+
+def numbers(plot: Plot) -> Numbers:
+    """Return a table of what a figure shows, short enough to be read aloud."""
+    traces = [(panel, trace) for panel in plot.panels for trace in panel.traces if trace.role == "case"]
+    many = len(plot.panels) > 1
+    if plot.kind == "lines":
+        ends = [trace.x[np.isfinite(trace.x)] for _, trace in traces if trace.x.size]
+        places = _places(ends, log=bool(plot.panels) and plot.panels[0].x.log)
+        laws = {
+            (panel.title, trace.case): trace.note
+            for panel in plot.panels
+            for trace in panel.traces
+            if trace.role == "law"
+        }
+        head = ("#", "case", "panel", *(f"at {place:.3g}" for place in places), "largest", "law")
+        rows = [
+            (
+                str(trace.case or ""),
+                trace.name,
+                panel.title if many else "",
+                *(_at(trace, place) for place in places),
+                _largest(trace.y),
+                laws.get((panel.title, trace.case), ""),
+            )
+            for panel, trace in traces
+        ]
+        return Numbers(head, rows)
+    head = ("#", "case", "panel", "points", "x from", "to", "y from", "to")
+    if plot.kind == "points":
+        head = ("#", "case", "panel", "x", "y")
+    rows = []
+    for panel, trace in traces:
+        first = (str(trace.case or ""), trace.name, panel.title if many else "")
+        if plot.kind == "points":
+            rows += [(*first, _text(x), _text(y)) for x, y in zip(trace.x, trace.y, strict=True)]
+        else:
+            rows.append((*first, str(trace.x.size), *_range(trace.x), *_range(trace.y)))
+    return Numbers(head, rows)
+
+
+def short(value: float) -> float | None:
+    """Return a number with `DIGITS` digits; ``None`` for what is not finite."""
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+
+
+def _places(xs: Sequence[Array], *, log: bool) -> list[float]:
+    xs = [x for x in xs if x.size]
+    if not xs:
+        return []
+    low, high = min(float(x.min()) for x in xs), max(float(x.max()) for x in xs)
+    if log and low > 0:
+        return [float(x) for x in np.geomspace(low, high, TABLE_COLUMNS)]
+    return [float(x) for x in np.linspace(low, high, TABLE_COLUMNS)]
+
+
+def _at(trace: Trace, place: float) -> str:
+    """Return the value at the last point that is not after a place; curves are not extended."""
+    known = np.isfinite(trace.x)
+    x, y = trace.x[known], trace.y[known]
+    if x.size == 0 or place > x[-1] * (1 + 1e-3) + 1e-12:
+        return "–"
+    return _text(float(y[np.argmin(np.abs(x - place))]))
+
+
+def _largest(y: Array) -> str:
+    y = np.abs(y[np.isfinite(y)])
+    return _text(float(y.max())) if y.size else "–"
+
+
+def _range(values: Array) -> tuple[str, str]:
+    values = values[np.isfinite(values)]
+    return (_text(float(values.min())), _text(float(values.max()))) if values.size else ("–", "–")
+
+
+def _text(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "–"
