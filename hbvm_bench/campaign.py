@@ -2,140 +2,57 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, get_args
 
 import msgspec
-import numpy as np
-from msgspec import Meta
-from numpy.typing import NDArray
 
+from hbvm_bench.entries import (
+    Checks,
+    Ensemble,
+    EnsembleEntry,
+    Limits,
+    MethodEntry,
+    ProblemEntry,
+    Role,
+    Settings,
+    TimingPlan,
+)
+from hbvm_bench.grid import Grid
+from hbvm_bench.spec import parse_spec
+from hbvm_bench.sweep import PLACEHOLDER, Scalar, combinations, fill, names
 from problems.errors import InputError, unknown
-from problems.problem import Problem
-
-Settings = Literal["default", "recommended", "as published", "outside its domain"]
-Role = Literal["ours", "peer"]
-
-Positive = Annotated[float, Meta(gt=0)]
-Count = Annotated[int, Meta(ge=1)]
 
 
-class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The sampling times that every case of a campaign shares.
-
-    Attributes
-    ----------
-    step : float, optional
-        Distance of the samples in the problem's unit of time.
-    count : int, optional
-        Number of equal intervals.
-
-    Without either: the problem's own grid, or else 1000 equal intervals.
-    """
-
-    step: Positive | None = None
-    count: Count | None = None
-
-    def __post_init__(self) -> None:
-        if self.step is not None and self.count is not None:
-            raise InputError("a grid has a step or a count, not both.")
-
-    def times(self, problem: Problem) -> NDArray[np.float64]:
-        """Return the sampling times from ``t0`` to ``t_end``, both included, shape (n,)."""
-        span = problem.t_end - problem.t0
-        if self.step is None and self.count is None and problem.times is not None:
-            return np.asarray(problem.times, dtype=np.float64)
-        if self.step is None:
-            count = self.count or 1000
-            return problem.t0 + span * np.arange(count + 1) / count
-        whole = round(abs(span) / self.step)
-        if whole > 10_000_000:
-            raise InputError(f"a grid step of {self.step!r} gives {whole} samples; make it larger.")
-        times = problem.t0 + np.copysign(self.step, span) * np.arange(whole + 1)
-        inside = times[np.abs(times - problem.t0) < abs(span) * (1 - 1e-12)]
-        return np.append(inside, problem.t_end)
-
-
-class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What one case may use before it is ended and reported.
-
-    Attributes
-    ----------
-    wall_seconds : float
-        Wall time of one process.
-    memory_gib : float
-        Resident memory of one process, in GiB.
-    """
-
-    wall_seconds: Positive = 120.0
-    memory_gib: Positive = 4.0
-
-
-class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The serial timing pass: every round visits every case once, in a fresh process.
-
-    Attributes
-    ----------
-    rounds : int
-        Rounds over all cases; a machine that changes its speed touches all alike.
-    samples : int
-        Samples of each case in one round.
-    shortest : float
-        A sample repeats the integration until it lasts this many seconds.
-    budget : float
-        Seconds of sampling per case and round; at least one sample is taken.
-    """
-
-    rounds: Count = 3
-    samples: Count = 2
-    shortest: Positive = 0.02
-    budget: Positive = 8.0
-
-
-class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One method of a campaign file.
-
-    Attributes
-    ----------
-    use : str
-        The method as it prints, such as ``"Taylor(tol=1e-15)"``.
-    settings : str
-        Whether these are the library's defaults, what its authors recommend for
-        such a problem, the settings of a published experiment, or a use that the
-        method was not made for.
-    note : str
-        A sentence that the report prints beside the row.
-    """
-
-    use: str
-    settings: Settings = "recommended"
-    note: str = ""
-
-
-class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a campaign file says; see ``hbvm_bench/campaigns/sitnikov.toml`` for one.
+class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a campaign file says; see the files in ``hbvm_bench/campaigns``.
 
     Attributes
     ----------
     name, title, description : str
         The name is a file name; the other two are for readers.
-    problems : list of str
-        Problems as they print.
+    problems : list of str or ProblemEntry
+        Problems as they print, or grids of them.
     methods : list of MethodEntry
-        Every method runs on every problem.
-    grid, limits, timing
+        Every method runs on every problem, unless the entry says ``only`` where.
+    ensembles : list of EnsembleEntry
+        Many trajectories at once, beside the rest.
+    grid, limits, timing, checks
         Shared by all cases.
     """
 
     name: str
-    problems: Annotated[list[str], Meta(min_length=1)]
-    methods: Annotated[list[MethodEntry], Meta(min_length=1)]
+    problems: list[str | ProblemEntry] = []
+    methods: list[MethodEntry] = []
+    ensembles: list[EnsembleEntry] = []
     title: str = ""
     description: str = ""
     grid: Grid = Grid()
     limits: Limits = Limits()
     timing: TimingPlan = TimingPlan()
+    checks: Checks = Checks()
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", self.name):
@@ -143,22 +60,79 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )
 
-    def cases(self) -> list["Case"]:
-        """Return the cases, problem by problem, in the order of the file."""
+        if not self.ensembles and not (self.problems and self.methods):
+            missing = "methods" if self.problems else "problems"
+            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
+        if bool(self.problems) != bool(self.methods):
+            missing = "methods" if self.problems else "problems"
+            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
+        known = {parse_spec(PLACEHOLDER.sub("0", entry.use)).name for entry in self.entries()}
+        for name in (name for method in self.methods for name in method.only):
+            if name not in known:
+                raise unknown("problem of the campaign", name, known)
+
+    def entries(self) -> list[ProblemEntry]:
+        """Return the problems' entries; one that is a text alone has neither values nor a sweep."""
         return [
+            entry if isinstance(entry, ProblemEntry) else ProblemEntry(use=entry) for entry in self.problems
+        ]
+
+    def cases(self) -> list["Case"]:
+        """Return the cases, problem by problem, in the order of the file; the ensembles' last.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If a placeholder has no value, or a value no placeholder.
+        """
+        made = [
             Case(
-                problem=problem,
-                method=entry.use,
-                grid=self.grid,
-                settings=entry.settings,
-                note=entry.note,
+                problem=fill(entry.use, chosen),
+                method=text,
+                grid=self.grid if entry.grid is None else entry.grid,
+                settings=method.settings,
+                note=method.note,
+                checks=self.checks,
             )
-            for problem in self.problems
-            for entry in self.methods
+            for entry in self.entries()
+            for chosen in _chosen(entry)
+            for method in self.methods
+            for text in _settings(method, entry, chosen)
+        ]
+        return made + [
+            Case(
+                problem=entry.problem,
+                method=text,
+                settings=method.settings,
+                note=method.note,
+                ensemble=entry.ensemble,
+            )
+            for entry in self.ensembles
+            for method in entry.methods
+            for text in _settings(method, ProblemEntry(use=entry.problem), {})
         ]
 
 
-class Case(msgspec.Struct, frozen=True, kw_only=True):
+def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
+    _all_used(entry.use, entry.sweep, entry.use)
+    return [entry.values | chosen for chosen in combinations(entry.sweep)]
+
+
+def _settings(method: MethodEntry, entry: ProblemEntry, values: Mapping[str, Scalar]) -> list[str]:
+    if method.only and parse_spec(fill(entry.use, values)).name not in method.only:
+        return []
+    _all_used(method.use, method.sweep, method.use)
+    return [fill(method.use, {**values, **chosen}) for chosen in combinations(method.sweep)]
+
+
+def _all_used(text: str, sweep: Mapping[str, object], where: str) -> None:
+    for name in sweep.keys() - names(text):
+        raise InputError(
+            f"{where}: the sweep gives values of {name!r}, which no placeholder {{{name}}} takes."
+        )
+
+
+class Case(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One integration to be measured; plain text, so that it travels to any process or machine.
 
     Attributes
@@ -171,6 +145,10 @@ class Case(msgspec.Struct, frozen=True, kw_only=True):
         See `MethodEntry`.
     note : str
         See `MethodEntry`.
+    checks : Checks
+        What is looked at beside the trajectory.
+    ensemble : Ensemble or None
+        Many trajectories instead of one.
     """
 
     problem: str
@@ -178,6 +156,8 @@ class Case(msgspec.Struct, frozen=True, kw_only=True):
     grid: Grid = Grid()
     settings: Settings = "recommended"
     note: str = ""
+    checks: Checks = Checks()
+    ensemble: Ensemble | None = None
 
 
 def shipped() -> dict[str, Path]:
@@ -233,13 +213,41 @@ def parse(text: str, source: str = "campaign") -> Campaign:
 
 
 def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:
-    nested = {"grid": Grid, "limits": Limits, "timing": TimingPlan, "methods": MethodEntry}
     for key, value in data.items():
         if key not in struct.__struct_fields__:
             raise InputError(f"{source}: {unknown('key', key, struct.__struct_fields__)}")
         if key == "settings" and value not in get_args(Settings):
             raise InputError(f"{source}: {unknown('settings', str(value), get_args(Settings))}")
-        if key in nested:
+        if key in NESTED:
             for item in value if isinstance(value, list) else [value]:
                 if isinstance(item, dict):
-                    _check_keys(item, nested[key], source)
+                    _check_keys(item, NESTED[key], source)
+
+
+NESTED: dict[str, type[msgspec.Struct]] = {
+    "grid": Grid,
+    "limits": Limits,
+    "timing": TimingPlan,
+    "checks": Checks,
+    "problems": ProblemEntry,
+    "methods": MethodEntry,
+    "ensembles": EnsembleEntry,
+}
+
+__all__ = [
+    "Campaign",
+    "Case",
+    "Checks",
+    "Ensemble",
+    "EnsembleEntry",
+    "Grid",
+    "Limits",
+    "MethodEntry",
+    "ProblemEntry",
+    "Role",
+    "Settings",
+    "TimingPlan",
+    "load",
+    "parse",
+    "shipped",
+]

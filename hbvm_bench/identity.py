@@ -19,7 +19,7 @@ import msgspec
 
 import integrators.registry
 import problems
-from hbvm_bench.campaign import Case
+from hbvm_bench.campaign import Case, Checks
 from hbvm_bench.spec import Spec, parse_spec
 from integrators.protocol import MethodBase
 from problems.errors import InputError
@@ -113,6 +113,11 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
         "versions": versions_of(method),
         "source": source_digest(),
         "method_source": _module_digest(type(method)),
+    } | {
+        # a case without them keeps the id it had
+        name: msgspec.to_builtins(asked)
+        for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
+        if asked not in (None, Checks())
     }
 
 

@@ -134,7 +134,7 @@ def _campaigns() -> Table:
     made = _table("campaigns", "campaign", "cases", "what")
     for name in shipped():
         campaign = load(name)
-        made.add_row(name, str(len(campaign.problems) * len(campaign.methods)), Text(campaign.title))
+        made.add_row(name, str(len(campaign.cases())), Text(campaign.title))
     return made
 
 
