@@ -19,7 +19,7 @@ from problems.errors import InputError
 from problems.problem import Problem
 
 GOLDEN = (5**0.5 - 1) / 2
-FIRST = 1e-3  # of the span: where samples in log time begin
+FIRST = 1e-2  # of the span: where samples in log time begin
 MOST = 10_000_000  # samples
 
 Positive = Annotated[float, Meta(gt=0)]
@@ -41,7 +41,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         stored reference belong, so that the position can be compared there.
     first : float, optional
         Where a logarithmic grid begins, after the start, in the problem's unit of
-        time; a thousandth of the span by default.
+        time; a hundredth of the span by default.
 
     Without step and count: the problem's own grid, or else 1000 intervals.
     """

@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.laws import Law
 from hbvm_bench.records import Compile, Counters, Result, Timing
 from hbvm_bench.reference import Reference
 from integrators.integrate import Solution
 from integrators.protocol import Status
+from problems import emit
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -31,8 +33,9 @@ class Measured:
         Quantities that a symmetry keeps at exactly zero.
     distance : ndarray, shape (n,)
         Largest distance of a body (or of q) from the origin.
-    position_t, position : ndarray, shape (m,)
-        Times of the reference that were reached, and the error of the position there.
+    position_t, position, phase : ndarray, shape (m,)
+        Times of the reference that were reached, the error of the position there, and how
+        far in time the run is ahead of the reference along its trajectory.
     reference : Reference or None
         The trusted solution, where there is one.
     complete : bool
@@ -41,6 +44,15 @@ class Measured:
         Where the method stopped.
     counters, compile, timing
         Work and time.
+    peak_gib : float or None
+        Largest resident memory of the process.
+    laws : dict of Law
+        How the error of each invariant grows.
+    drift : dict of ndarray
+        What the laws were found from: ``t`` of shape (n,), and the errors by invariant, of
+        shape (starts, n).
+    reversal : float or str
+        Distance from the start after integrating there and back, or why there is none.
     """
 
     problem: Problem
@@ -51,12 +63,17 @@ class Measured:
     distance: Array
     position_t: Array
     position: Array
+    phase: Array
     reference: Reference | None
     complete: bool
     t_stop: float
     counters: Counters = field(default_factory=Counters)
     compile: Compile | None = None
     timing: Timing | None = None
+    peak_gib: float | None = None
+    laws: dict[str, Law] = field(default_factory=dict)
+    drift: dict[str, Array] = field(default_factory=dict)
+    reversal: float | str = "not asked for"
     extra: dict[str, Array] = field(default_factory=dict)
 
     def series(self) -> dict[str, Array]:
@@ -67,8 +84,10 @@ class Measured:
             "distance": self.distance,
             "position_t": self.position_t,
             "position": self.position,
+            "phase": self.phase,
             **{f"error.{name}": values for name, values in self.errors.items()},
             **{f"guard.{name}": values for name, values in self.guards.items()},
+            **{f"drift.{name}": values for name, values in self.drift.items()},
             **{f"extra.{name}": values for name, values in self.extra.items()},
         }
 
@@ -93,7 +112,7 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
         errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
         guards = {name: np.asarray(values, float) for name, values in problem.guards(y).items()}
         distance = largest_distance(problem, positions(problem, y))
-        position_t, position = _position_error(problem, t, y, reference)
+        position_t, position, phase = _position_error(problem, t, y, reference)
     stats = solution.stats
     return Measured(
         problem=problem,
@@ -104,6 +123,7 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
         distance=distance,
         position_t=position_t,
         position=position,
+        phase=phase,
         reference=reference,
         complete=solution.status is Status.FINISHED,
         t_stop=float(solution.t_stop),
@@ -140,12 +160,15 @@ def restore(
         distance=series["distance"],
         position_t=series["position_t"],
         position=series["position"],
+        phase=series["phase"],
         reference=reference,
         complete=result.status == Status.FINISHED,
         t_stop=float("nan") if result.t_stop is None else result.t_stop,
         counters=result.counters,
         compile=result.compile,
         timing=timing,
+        laws=result.laws,
+        drift=named("drift."),
         extra=named("extra."),
     )
 
@@ -175,13 +198,34 @@ def largest_distance(problem: Problem, q: Array) -> Array:
     return (safe * np.sqrt(((groups / safe[:, :, None]) ** 2).sum(axis=2))).max(axis=1)
 
 
-def _position_error(problem: Problem, t: Array, y: Array, reference: Reference | None) -> tuple[Array, Array]:
+def _position_error(
+    problem: Problem, t: Array, y: Array, reference: Reference | None
+) -> tuple[Array, Array, Array]:
     if reference is None:
-        return np.empty(0), np.empty(0)
+        return np.empty(0), np.empty(0), np.empty(0)
     _, ours, theirs = np.intersect1d(t, reference.t, return_indices=True)
     # the reference is a pair of doubles, so that its own rounding does not enter the difference
     difference = (y[ours] - reference.high[theirs]) - reference.low[theirs]
-    return t[ours], largest_distance(problem, positions(problem, difference))
+    distance = largest_distance(problem, positions(problem, difference))
+    return t[ours], distance, _ahead(problem, t[ours], reference.high[theirs], difference)
+
+
+def _ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
+    """Return how far in time a run is ahead: its difference from the reference along the field there.
+
+    Positions and momenta are each measured in units of their largest value, so that turning
+    points, where nothing moves, and the units of either do not matter.
+    """
+    field_ = emit.numpy(problem.system, "field")
+    flow = np.array([field_(time, state, problem.par) for time, state in zip(t, y, strict=True)])
+    flow = flow.reshape(y.shape)
+    along, speed = np.zeros(len(t)), np.zeros(len(t))
+    dof = problem.system.dof or problem.system.dim
+    for block in (slice(0, dof), slice(dof, None)):
+        size = float(np.abs(y[:, block]).max(initial=0.0)) or 1.0
+        along += (difference[:, block] / size * (flow[:, block] / size)).sum(axis=1)
+        speed += ((flow[:, block] / size) ** 2).sum(axis=1)
+    return along / speed
 
 
 def _count(value: Any) -> int | None:

@@ -13,6 +13,7 @@ HEADLINE = (
     "angular_momentum_max",
     "guard_max",
     "position_end",
+    "phase_end",
     "z_end",
     "z_error",
     "steps",
