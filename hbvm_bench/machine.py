@@ -2,6 +2,8 @@
 
 import os
 import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -20,6 +22,23 @@ def describe() -> dict[str, str | int]:
 def cores() -> list[int]:
     """Return the numbers of the cores this process may use."""
     return sorted(os.sched_getaffinity(0))
+
+
+@contextmanager
+def leaving_a_core() -> Iterator[int | None]:
+    """Keep this process off the core that is yielded, for another one to be timed there.
+
+    Where there is only one core this process cannot leave it.
+    """
+    mine = cores()
+    core = max(mine, default=None)
+    others = set(mine) - {core}
+    if others:
+        os.sched_setaffinity(0, others)
+    try:
+        yield core
+    finally:
+        os.sched_setaffinity(0, mine)
 
 
 def _cpuinfo(field: str) -> str:

@@ -11,6 +11,7 @@ from typing import Literal
 import msgspec
 
 from hbvm_bench.campaign import Case, Limits, Role
+from hbvm_bench.laws import Law
 
 SCHEMA = 1
 
@@ -64,12 +65,20 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
         The compilation in this process.
     share : float
         Processor seconds per wall second while sampling: below 1 something else used the core.
+    calibration : list of float
+        Seconds of a fixed computation before each sample and after the last.
     """
 
     samples: list[float]
     repeats: int
     compile: Compile
     share: float = 1.0
+    calibration: list[float] = []
+
+    @property
+    def calibrated(self) -> list[float]:
+        """Return the samples in units of the fixed computation; empty where it was not taken."""
+        return [sample / median(self.calibration) for sample in self.samples] if self.calibration else []
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):
@@ -81,10 +90,13 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
         Round by round.
     why : str
         Why there are none, or fewer than planned.
+    machine : dict
+        Where all the rounds were taken; the case may have been measured on another one.
     """
 
     rounds: list[TimingRound] = []
     why: str = ""
+    machine: dict[str, str | int] = {}
 
     @property
     def samples(self) -> list[float]:
@@ -138,6 +150,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         Where a symmetry guard says that this is another trajectory than the one asked for.
     counters, metrics, compile
         What was measured.
+    laws : dict of Law
+        By invariant, where the campaign asks for them.
     """
 
     outcome: Outcome
@@ -148,6 +162,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     counters: Counters = Counters()
     metrics: dict[str, Value] = {}
     compile: Compile | None = None
+    laws: dict[str, Law] = {}
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):

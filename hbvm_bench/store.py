@@ -10,25 +10,30 @@ A file is complete or not there, so that the store is also the cache: a rerun
 does what is missing. Nothing is pickled.
 """
 
+import fcntl
+import io
 import os
 import tempfile
 import threading
+import time
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign import Campaign
+from hbvm_bench.campaign import Campaign, Case
 from hbvm_bench.records import SCHEMA, Record
 from problems.errors import InputError
 
 INDEX = "campaign.json"
 CASES = "cases"
 NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
+FORGOTTEN = 3600.0  # seconds after which a half-written file has nobody who writes it
 
 
 class Index(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,13 +49,20 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
         Of this package.
     command : str
         How to run it again.
+    cases : list of Case
+        The cases, in the order of their ids; empty where they are the campaign's own.
     """
 
     campaign: Campaign
     ids: list[str]
     version: str
     command: str
+    cases: list[Case] = []
     schema: int = SCHEMA
+
+    def listed(self) -> list[tuple[str, Case]]:
+        """Return the ids with their cases, in order."""
+        return list(zip(self.ids, self.cases or self.campaign.cases(), strict=True))
 
 
 class Store:
@@ -69,6 +81,34 @@ class Store:
             If nothing can be written there; nothing is left behind.
         """
         ensure_writable(self.cases)
+        for path in self.cases.glob(".*.part"):  # of a runner that was killed while it wrote
+            with suppress(FileNotFoundError):
+                if time.time() - path.stat().st_mtime > FORGOTTEN:
+                    path.unlink()
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out of the directory; the lock ends with the process, however it ends.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If another run is writing there.
+        """
+        handle = os.open(self.directory, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(
+                    f"another run is writing to {str(self.directory)!r}; "
+                    "wait for its end, or give another --out."
+                ) from None
+            except OSError:  # a file system without locks; two runs there repeat work but harm nothing
+                pass
+            yield
+        finally:
+            os.close(handle)
 
     def load(self, case_id: str) -> Record | None:
         """Return the record of a case, or ``None`` if it is missing or unreadable."""
@@ -78,11 +118,12 @@ class Store:
             return None
         return record if record.id == case_id and record.schema == SCHEMA else None
 
-    def save(self, record: Record, series: dict[str, NDArray[np.float64]] | None = None) -> None:
+    def save(self, record: Record, series: Mapping[str, NDArray[np.float64]] | bytes | None = None) -> None:
         """Store a record, its series first so that a record never lacks them."""
         if series is not None:
-            with atomic(self._series_path(record.id)) as path, path.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **series)  # pyright: ignore[reportArgumentType]
+            encoded = series if isinstance(series, bytes) else encode_series(series)
+            with atomic(self._series_path(record.id)) as path:
+                path.write_bytes(encoded)
         encoded = msgspec.json.format(msgspec.json.encode(record), indent=1)
         with atomic(self._record_path(record.id)) as path:
             path.write_bytes(encoded + b"\n")
@@ -90,12 +131,8 @@ class Store:
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
         """Return the series of a case by name; empty where it has none."""
         try:
-            with (
-                self._series_path(case_id).open("rb") as stream,
-                np.load(stream, allow_pickle=False) as stored,
-            ):
-                return {name: stored[name] for name in stored.files}
-        except (FileNotFoundError, ValueError, EOFError, zipfile.BadZipFile):
+            return decode_series(self._series_path(case_id).read_bytes())
+        except FileNotFoundError:
             return {}
 
     def write_index(self, index: Index) -> None:
@@ -130,19 +167,44 @@ class Store:
 
         Labels and notes are the campaign's present ones: they are words, and no reason to run again.
         """
-        index = self.index()
         made: list[Record] = []
-        for case_id, case in zip(index.ids, index.campaign.cases(), strict=True):
+        for case_id, case in self.index().listed():
             if (record := self.load(case_id)) is not None:
                 words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
                 made.append(msgspec.structs.replace(record, case=words))
         return made
+
+    def everything(self) -> Iterator[Record]:
+        """Yield all records in the directory, those of earlier versions and other settings too."""
+        for path in sorted(self.cases.glob("[!.]*.json")):
+            try:
+                record = msgspec.json.decode(path.read_bytes(), type=Record)
+            except (OSError, ValueError):
+                continue
+            if record.schema == SCHEMA and path == self._record_path(record.id):
+                yield record
 
     def _record_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.json"
 
     def _series_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
+
+
+def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
+    """Return arrays by name as a compressed ``.npz`` file without pickles."""
+    stream = io.BytesIO()
+    np.savez_compressed(stream, allow_pickle=False, **series)  # pyright: ignore[reportArgumentType]
+    return stream.getvalue()
+
+
+def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of a ``.npz`` file by name; empty if it is cut, something else, or has pickles."""
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (ValueError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error):
+        return {}
 
 
 @contextmanager

@@ -153,10 +153,11 @@ def _peak_gib(pid: int) -> float:
         status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
     except OSError:
         return 0.0
-    for line in status.splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1]) / 2**20
-    return 0.0
+    sizes = {name: value for name, _, value in (line.partition(":") for line in status.splitlines())}
+    peak, resident, swapped = (
+        int((sizes.get(name) or "0").split()[0]) for name in ("VmHWM", "VmRSS", "VmSwap")
+    )
+    return max(peak, resident + swapped) / 2**20  # what was swapped out is eaten, too
 
 
 def _signal_name(number: int) -> str:

@@ -1,19 +1,15 @@
-"""What the command line shows: progress while it runs, tables afterwards."""
+"""What the command line shows of results: tables that fit."""
 
-import time
 from collections.abc import Sequence
 
 from rich import box
 from rich.console import Console, Group, RenderableType
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench.identity import Resolved
 from hbvm_bench.metrics import Metric
 from hbvm_bench.records import Record
-from hbvm_bench.table import GROUPS, Row, columns, numbers, rows, seconds, status_of
+from hbvm_bench.table import GROUPS, Row, columns, numbers, rows
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -37,73 +33,13 @@ def console(*, stderr: bool = False) -> Console:
     return made
 
 
-class Live:
-    """Progress of a run: a bar on a terminal, a line per case elsewhere."""
-
-    def __init__(self, total: int) -> None:
-        self._console = console(stderr=True)
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=24),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("[dim]{task.fields[now]}"),
-            console=self._console,
-            disable=not self._console.is_terminal,
-        )
-        self._task: TaskID | None = None
-        self._total = total
-        self._count = 0
-        self._round = -1
-        self._start = time.monotonic()
-
-    def __enter__(self) -> "Live":
-        self._bar.start()
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self._bar.stop()
-
-    def phase(self, title: str, total: int, done: int = 0) -> None:
-        """Begin a phase of ``total`` visits."""
-        if self._task is not None:
-            self._bar.remove_task(self._task)
-        self._task = self._bar.add_task(title, total=total, completed=done, now="")
-        self._total, self._count = total, done
-        kept = f", {done} already there" if done else ""
-        self._console.print(f"{title}: {total} to do{kept}" if not done else f"{title}: {total}{kept}")
-
-    def case(self, record: Record) -> None:
-        """Report a case that has ended."""
-        self._advance()
-        mark = "[green]ok[/]" if status_of(record) == "ok" else f"[yellow]{escape(status_of(record))}[/]"
-        self._console.print(
-            f"  [{self._count}/{self._total}]".replace("[", "\\[", 1)
-            + f" {escape(record.case.method)}  {mark}  [dim]{seconds(record.seconds)}[/]"
-        )
-
-    def visit(self, round_: int, resolved: Resolved) -> None:
-        """Say which case is timed now, in which round from 0, and count it."""
-        self._advance()
-        if round_ != self._round:
-            self._round = round_
-            self._console.print(f"  round {round_ + 1}")
-        if self._task is not None:
-            self._bar.update(self._task, now=escape(resolved.case.method))
-
-    def say(self, words: str) -> None:
-        """Print a sentence."""
-        self._console.print(escape(words))
-
-    @property
-    def elapsed(self) -> float:
-        """Seconds since the start."""
-        return time.monotonic() - self._start
-
-    def _advance(self) -> None:
-        self._count += 1
-        if self._task is not None:
-            self._bar.advance(self._task)
+def print_results(
+    records: Sequence[Record], keys: Sequence[str] | None = None, sort: str | None = None
+) -> None:
+    """Print the tables of `results` as wide as the terminal is."""
+    terminal = console()
+    for table in results(records, keys, sort, terminal.width):
+        terminal.print(table)
 
 
 def results(

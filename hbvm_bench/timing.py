@@ -97,21 +97,25 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
     run = Run(program, problem.y0, problem.par, problem.t0, problem.t_end)
     run.until(WARM_UP).seconds()
     wall, busy = time.perf_counter(), time.process_time()
+    calibration = [calibrate()]
     first, reached = run.seconds()
     if reached.status is not Status.FINISHED:
         return f"not timed: the integration ended as {reached.status.value}"
     repeats = repeats_for(first, plan.shortest)
     samples = [first] if first > SLOW else []
+    calibration += [calibrate()] if samples else []
     spent = sum(samples)
     while len(samples) < plan.samples and (not samples or spent + first * repeats <= plan.budget):
         mean, _ = run.seconds(repeats)
         samples.append(mean)
+        calibration.append(calibrate())
         spent += mean * repeats
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
     return TimingRound(
         share=round(busy / wall, 3),
         samples=samples,
         repeats=repeats,
+        calibration=calibration,
         compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
     )
 
@@ -133,7 +137,8 @@ def calibrate() -> float:
 def _calibration_loop() -> Any:
     import numba
 
-    @numba.njit
+    # it calls nothing else that is compiled, so numba's own cache cannot be stale; a second saved per visit
+    @numba.njit(cache=True)
     def loop(n: int) -> float:
         a, b, c, d = 1.1, 1.2, 1.3, 1.4
         for _ in range(n):

@@ -5,12 +5,14 @@ request and leaves the store alone; whatever happens to it, the runner that
 started it says what.
 """
 
+import contextlib
 import ctypes
 import os
 import resource
 import signal
 import sys
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -19,12 +21,13 @@ import numpy as np
 
 from hbvm_bench import reference, timing
 from hbvm_bench.campaign import Case, TimingPlan
+from hbvm_bench.checks import check
 from hbvm_bench.identity import Resolved, resolve
 from hbvm_bench.measure import measure
 from hbvm_bench.metrics import evaluate, guard_violation
 from hbvm_bench.records import Result, TimingRound
-from hbvm_bench.store import atomic
-from integrators import integrate
+from hbvm_bench.solve import solve
+from hbvm_bench.store import atomic, encode_series
 from integrators.integrate import Solution
 from integrators.protocol import Status
 from problems.errors import InputError
@@ -93,6 +96,8 @@ def _limit_and_die_with(runner: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
+        with contextlib.suppress(OSError):  # short of memory the system ends this process, not the runner
+            Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
         pr_set_pdeathsig = 1
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
         if os.getppid() != runner:  # it died while this process was starting
@@ -105,7 +110,8 @@ def _measure(request: Request, directory: Path) -> Result:
         if reason := resolved.method.accepts(resolved.problem):
             return Result(outcome="refused", reason=reason)
         grid = resolved.case.grid.times(resolved.problem)
-        solution = integrate(resolved.problem, resolved.method, grid)
+        program = resolved.method.compile(resolved.problem.system)
+        solution = solve(resolved.problem, resolved.method, program, grid)
     except InputError as error:  # a missing library among them
         return Result(outcome="refused", reason=str(error))
     except Exception as error:
@@ -114,8 +120,20 @@ def _measure(request: Request, directory: Path) -> Result:
     if wrong := _garbage(solution, grid):
         return Result(outcome="crashed", reason=wrong, status=solution.status.value)
     measured = measure(solution, reference.find(resolved.problem))
-    with atomic(directory / "series.npz") as temporary, temporary.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **measured.series())  # pyright: ignore[reportArgumentType]
+    try:
+        checked = check(measured, resolved.method, program, resolved.case.checks)
+    except Exception as error:
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
+    measured = replace(
+        measured,
+        laws=checked.laws,
+        drift={"t": checked.t, **checked.errors} if checked.errors else {},
+        reversal=checked.reversal,
+        peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
+    )
+    with atomic(directory / "series.npz") as temporary:
+        temporary.write_bytes(encode_series(measured.series()))
     return Result(
         outcome="stalled" if solution.status is Status.STALLED else "ok",
         status=solution.status.value,
@@ -125,6 +143,7 @@ def _measure(request: Request, directory: Path) -> Result:
         counters=measured.counters,
         metrics=evaluate(measured),
         compile=measured.compile,
+        laws=measured.laws,
     )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from hbvm_bench import runner, supervise
+from hbvm_bench import execute, executors, runner, serial, supervise
 from hbvm_bench.campaign import Case, Grid, Limits, TimingPlan
 from hbvm_bench.identity import resolve
 from hbvm_bench.store import Store
@@ -112,7 +112,7 @@ def test_a_lost_symmetry_voids_position_and_time(toys, store):
 def test_cases_run_on_any_executor(toys, store):
     cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        records = list(runner.run_accuracy(cases, store, GENEROUS, pool))
+        records = list(runner.run_accuracy(cases, store, GENEROUS, executors.of(pool)))
     assert {record.id for record in records} == {one.id for one in cases}
 
 
@@ -120,9 +120,9 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
     cases = [resolve(case(method)) for method in ("Steady()", "Crashing()", "Stalling()")]
     for one in cases:
         runner.run_case(one.case, str(store.directory), GENEROUS)
-    assert runner.missing_visits(cases, store, PLAN) == 2
+    assert serial.missing_visits(cases, store, PLAN) == 2 * [cases[0].id]
     visits = []
-    runner.time_cases(
+    serial.time_cases(
         cases, store, PLAN, GENEROUS, lambda round_, one: visits.append((round_, one.case.method))
     )
     assert visits == [(0, "Steady()"), (1, "Steady()")]
@@ -132,19 +132,19 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
     assert record.timing.compile.seconds == 0.25
     assert record.result.metrics["warm_seconds"].value == record.timing.summary["median"]
     assert record.result.metrics["compile_seconds"].value == 0.25
-    runner.time_cases(cases, store, PLAN, GENEROUS, lambda *visit: pytest.fail("timed again"))
+    serial.time_cases(cases, store, PLAN, GENEROUS, lambda *visit: pytest.fail("timed again"))
     more = msgspec.structs.replace(PLAN, rounds=3)
-    assert runner.missing_visits(cases, store, more) == 1
+    assert serial.missing_visits(cases, store, more) == [cases[0].id]
 
 
 def test_a_timing_that_fails_says_why(toys, store):
     one = resolve(case("Steady(wait=0.5)"))
     runner.run_case(one.case, str(store.directory), GENEROUS)
-    runner.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
+    serial.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
     record = store.load(one.id)
     assert record.timing.why == "not timed: the time limit"
     assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
-    assert runner.missing_visits([one], store, PLAN) == 0
+    assert serial.missing_visits([one], store, PLAN) == []
 
 
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
@@ -155,7 +155,7 @@ def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
     (child,) = supervise._children
     supervise.stop_all()
     try:
-        with pytest.raises(runner.InterruptedRunError):
+        with pytest.raises(execute.InterruptedRunError):
             future.result(timeout=10)
     finally:
         supervise.allow()

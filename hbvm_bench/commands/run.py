@@ -1,0 +1,157 @@
+"""The command ``hbvm-bench run``."""
+
+import shlex
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hbvm_bench import executors, runner, serial, supervise, terminal
+from hbvm_bench.campaign import Campaign, Grid, MethodEntry, load
+from hbvm_bench.estimate import Estimate
+from hbvm_bench.execute import InterruptedRunError
+from hbvm_bench.identity import Resolved, make_method
+from hbvm_bench.live import Live
+from hbvm_bench.store import Index, Store, ensure_writable
+from problems.errors import InputError
+
+UNFINISHED = 1
+INTERRUPTED = 130
+
+
+def run(
+    name: Annotated[str | None, typer.Argument(help="A campaign's name, or a TOML file.")] = None,
+    problem: Annotated[
+        list[str] | None, typer.Option("-p", "--problem", help='A problem, as in "sitnikov(e=0.6)".')
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option("-m", "--method", help='A method, as in "HBVM(k=16, s=8, h=0.25)".')
+    ] = None,
+    step: Annotated[float | None, typer.Option(help="Distance of the samples, with -p and -m.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Where results go; default runs/NAME.")] = None,
+    report_to: Annotated[Path | None, typer.Option("--report", help="Also write the report there.")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Cases side by side; default one per core.")] = None,
+    executor: Annotated[
+        str,
+        typer.Option(
+            help="Where cases run: local, dask://HOST:PORT, or MODULE:NAME of a concurrent.futures executor."
+        ),
+    ] = executors.LOCAL,
+    timing: Annotated[
+        bool, typer.Option("--timing/--no-timing", help="The serial timing pass, on this machine.")
+    ] = True,
+) -> None:
+    """Run a campaign, or the given problems and methods; a rerun does only what is missing.
+
+    Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
+    """
+    campaign = _campaign(name, problem, method, step)
+    cases = runner.plan(campaign)
+    store = Store(out or Path("runs") / campaign.name)
+    store.prepare()
+    if report_to is not None:
+        ensure_writable(report_to)
+    with store.locked():
+        index = Index(
+            campaign=campaign,
+            ids=[case.id for case in cases],
+            version=version("hbvm-bench"),
+            command=_command(name, problem, method, step),
+        )
+        store.write_index(index)
+        try:
+            _run(campaign, cases, store, executor, jobs, timing)
+        except (KeyboardInterrupt, InterruptedRunError):
+            raise _given_up("interrupted", cases, store, INTERRUPTED) from None
+        except runner.UnfinishedRunError as error:
+            raise _given_up(str(error), cases, store, UNFINISHED) from None
+    terminal.print_results(store.records())
+    if report_to is not None:
+        from hbvm_bench.report.write import write_report
+
+        for path in write_report(store, report_to):
+            print(path)
+
+
+def _given_up(why: str, cases: list[Resolved], store: Store, code: int) -> typer.Exit:
+    supervise.stop_all()
+    kept = sum(store.load(case.id) is not None for case in cases)
+    message = f"{why}: {kept} of {len(cases)} cases are kept in {store.directory}; "
+    print(f"hbvm-bench: {message}run the same command again to go on.", file=sys.stderr)
+    return typer.Exit(code)
+
+
+def _campaign(
+    name: str | None, problems: list[str] | None, methods: list[str] | None, step: float | None
+) -> Campaign:
+    if name is not None:
+        if problems or methods or step is not None:
+            raise InputError("give either a campaign or -p, -m and --step, not both.")
+        return load(name)
+    if not problems or not methods:
+        raise InputError('give a campaign, or at least one -p "PROBLEM(...)" and one -m "METHOD(...)".')
+    if step is not None and not 0 < step < float("inf"):
+        raise InputError(f"--step must be a positive number, not {step!r}.")
+    for text in methods:
+        make_method(text)
+    return Campaign(
+        name="custom",
+        title="Problems and methods given on the command line",
+        problems=list(problems),
+        methods=[MethodEntry(use=text) for text in methods],
+        grid=Grid(step=step),
+    )
+
+
+def _command(
+    name: str | None, problems: list[str] | None, methods: list[str] | None, step: float | None
+) -> str:
+    words = ["hbvm-bench", "run", *([name] if name else [])]
+    words += [word for text in problems or [] for word in ("-p", text)]
+    words += [word for text in methods or [] for word in ("-m", text)]
+    words += ["--step", repr(step)] if step is not None else []
+    return shlex.join(words)
+
+
+def _run(
+    campaign: Campaign, cases: list[Resolved], store: Store, executor: str, jobs: int | None, timing: bool
+) -> None:
+    supervise.allow()
+    missing = [case for case in cases if not runner.is_done(store.load(case.id), campaign.limits)]
+    with Live() as live, executors.opened(executor, jobs) as pool:
+        try:
+            estimate = Estimate(_known_seconds(store, missing), campaign.limits.wall_seconds)
+            ids = [case.id for case in missing]
+            live.phase(f"measuring {pool.where}", ids, len(cases) - len(missing), estimate)
+            for record in runner.run_accuracy(missing, store, campaign.limits, pool, live.running):
+                live.case(record)
+            if timing:
+                _time(campaign, cases, store, live)
+        except BaseException:
+            supervise.stop_all()  # or the executor would wait for the ends of its cases
+            raise
+        live.say(f"done in {live.elapsed:.0f} s; results in {store.directory}")
+
+
+def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
+    """Return what the same problems and methods took in this directory before, stale or not."""
+    before = (
+        {(record.case.problem, record.case.method): record.seconds for record in store.everything()}
+        if missing
+        else {}
+    )
+    keys = {case.id: (case.case.problem, case.case.method) for case in missing}
+    return {id_: before[key] for id_, key in keys.items() if key in before}
+
+
+def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -> None:
+    visits = serial.missing_visits(cases, store, campaign.timing)
+    known = {case.id: record.seconds for case in cases if (record := store.load(case.id)) is not None}
+    live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
+    serial.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
+    live.visited()
+
+
+__all__ = ["run"]

@@ -1,0 +1,116 @@
+"""How long a run still takes: a range, and nothing where nothing is known."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+FEWEST = 2  # finished cases before anything is said about one that never ran
+SPREAD = 0.3  # relative standard deviation of a case whose seconds are known from before
+
+
+class Estimate:
+    """Learns from what finished what is still to come.
+
+    Cases differ by orders of magnitude, so the answer is a range of two standard
+    deviations: seconds known from an earlier run, scaled to how fast this one is, or
+    else the mean of what finished, with the doubt that a small sample leaves.
+
+    Parameters
+    ----------
+    known : mapping of str to float
+        Seconds of cases by id, from an earlier run.
+    limit : float
+        Wall seconds after which a case is ended.
+    """
+
+    def __init__(self, known: Mapping[str, float], limit: float) -> None:
+        self._known = dict(known)
+        self._limit = limit
+        self._taken: dict[str, float] = {}
+
+    def learn(self, key: str, seconds: float) -> None:
+        """Take note that a case took ``seconds``."""
+        self._taken = {**self._taken, key: seconds}  # a copy, for another thread reads it
+
+    def left(
+        self, waiting: Sequence[str], running: Mapping[str, float], slots: int
+    ) -> tuple[float, float] | None:
+        """Return the range of seconds until all is done.
+
+        Parameters
+        ----------
+        waiting : sequence of str
+            Ids of cases that have not begun; one that comes twice is run twice.
+        running : mapping of str to float
+            Ids of those that run, and their seconds so far.
+        slots : int
+            Cases side by side.
+
+        Returns
+        -------
+        low, high : float
+            Or ``None`` where too little is known.
+        """
+        counts = [self._mean(key) for key in [*waiting, *running]]
+        if slots < 1 or any(mean is None for mean in counts):
+            return None
+        means = [mean for mean in counts if mean is not None]
+        rest = [
+            self._rest(mean, ran) for mean, ran in zip(means[len(waiting) :], running.values(), strict=True)
+        ]
+        total = sum(means[: len(waiting)]) + sum(rest)
+        doubt = 2 * math.sqrt(self._variance(waiting, means))
+        longest = max(rest, default=0.0)
+        most = self._limit * math.ceil((len(waiting) + len(running)) / slots)
+        low = max((total - doubt) / slots, 0.0)
+        return low, max(min(max((total + doubt) / slots, longest), most), low)
+
+    def _rest(self, mean: float, ran: float) -> float:
+        """Return the seconds left of a case; one that is overdue may take as long again."""
+        return mean - ran if ran < mean else max(min(ran, self._limit - ran), 0.0)
+
+    def _mean(self, key: str) -> float | None:
+        if key in self._taken:
+            return self._taken[key]
+        if key in self._known:
+            return self._known[key] * self._speed()
+        if len(self._taken) < FEWEST:
+            return None
+        return sum(self._taken.values()) / len(self._taken)
+
+    def _speed(self) -> float:
+        """Return how much longer this run takes than the earlier one."""
+        both = self._taken.keys() & self._known.keys()
+        before = sum(self._known[key] for key in both)
+        return sum(self._taken[key] for key in both) / before if before > 0 else 1.0
+
+    def _variance(self, waiting: Sequence[str], means: Sequence[float]) -> float:
+        strangers = [key for key in waiting if key not in self._known and key not in self._taken]
+        familiar = sum(
+            (SPREAD * mean) ** 2
+            for key, mean in zip(waiting, means, strict=False)
+            if key in self._known or key in self._taken
+        )
+        if not strangers:
+            return familiar
+        taken = list(self._taken.values())
+        mean = sum(taken) / len(taken)
+        spread = sum((seconds - mean) ** 2 for seconds in taken) / (len(taken) - 1)
+        return familiar + spread * (len(strangers) + len(strangers) ** 2 / len(taken))
+
+
+def in_words(left: tuple[float, float] | None) -> str:
+    """Say a range of seconds: ``"2 to 5 min left"``, ``"about 40 s left"``, or that nothing is known."""
+    if left is None:
+        return "no estimate yet"
+    low, high = left
+    if high < 10:
+        return "a few seconds left"
+    for unit, size in (("s", 1.0), ("min", 60.0), ("h", 3600.0)):
+        if high < 90 * size or unit == "h":
+            first, last = _rounded(low / size), _rounded(high / size)
+            return f"about {last} {unit} left" if first == last else f"{first} to {last} {unit} left"
+    raise AssertionError
+
+
+def _rounded(number: float) -> str:
+    return f"{round(number, -1):.0f}" if number >= 30 else f"{number:.0f}" if number >= 3 else f"{number:.2g}"
