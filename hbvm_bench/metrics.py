@@ -152,7 +152,7 @@ _TABLE = [
         better="lower",
         scale="linear",
         function=quantities.law_number("slope"),
-        description="Power of t with which the energy error grows, over several starts: 1/2 for a random walk.",
+        description="Power of t with which the energy error grows, over starts: 1/2 for a random walk.",
         same_trajectory=True,
     ),
     Metric(

@@ -1,0 +1,160 @@
+"""Which integrator for which need: the answers of a run, in rows of text.
+
+A need is a goal and a number to be small. On every problem the settings that reach the
+goal are compared, and each family stands for its best; families are then ordered by on
+how many problems they serve, and by how far, in the median, they are from the best.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from hbvm_bench.metrics import find
+from hbvm_bench.records import Record
+from hbvm_bench.summaries.points import family_of, number, problems_of, work_of
+from hbvm_bench.summaries.profiles import Goal, reaches
+from hbvm_bench.table import group_of
+
+SHOWN = 3
+ROUND_OFF = 1e-15  # an error below this is as good as any other
+
+
+@dataclass(frozen=True)
+class Need:
+    """What somebody wants of an integrator.
+
+    Attributes
+    ----------
+    title : str
+        For readers.
+    serves : callable
+        Whether a case serves the need.
+    cost : str
+        Key of the metric that is then to be small.
+    floor : float
+        Costs below it are equal.
+    """
+
+    title: str
+    serves: Callable[[Record], bool]
+    cost: str
+    floor: float = 0.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """How a family serves a need.
+
+    Attributes
+    ----------
+    family : str
+        Name of the method.
+    problems : int
+        On how many problems it serves.
+    best : int
+        On how many it is the best.
+    behind : float
+        Its cost over the best family's, the median over the problems it serves; 1 where
+        it is the best on most.
+    """
+
+    family: str
+    problems: int
+    best: int
+    behind: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A need and who serves it.
+
+    Attributes
+    ----------
+    title, cost : str
+        Of the need; the cost is the label of its metric.
+    problems : int
+        On how many problems any family serves it.
+    candidates : list of Candidate
+        The first are the ones to take.
+    """
+
+    title: str
+    cost: str
+    problems: int
+    candidates: list[Candidate]
+
+    @property
+    def text(self) -> str:
+        """Return the first candidates in a sentence without verb."""
+        parts = [
+            f"{c.family} ({c.problems} of {self.problems}"
+            + (f", {c.behind:.3g} times the best)" if c.behind > 1.005 else ")")
+            for c in self.candidates[:SHOWN]
+        ]
+        return "; ".join(parts) or "none"
+
+
+def answers(records: Sequence[Record]) -> list[Answer]:
+    """Return the answers that a run has data for, in the order of `needs_of`."""
+    found = [_answer(records, need) for need in needs_of(records)]
+    return [answer for answer in found if answer.candidates]
+
+
+def needs_of(records: Sequence[Record]) -> list[Need]:
+    """Return the needs, with the measure of work that the run has."""
+    work = work_of(records)
+    return [
+        Need("a position right to 1e-4 of its size, cheaply", _reaching(Goal(1e-4)), work),
+        Need("a position right to 1e-8, cheaply", _reaching(Goal(1e-8)), work),
+        Need(
+            "position to 1e-8 and energy to 1e-13, cheaply", _reaching(Goal(1e-8, 1e-13)), work
+        ),
+        Need("the most accurate position at the end", _reaching(Goal(1.0)), "position_end", ROUND_OFF),
+        Need("the most accurate phase at the end", _reaching(Goal(1.0)), "phase_end", ROUND_OFF),
+        Need("energy at round-off, position right to 1e-4", _reaching(Goal(1e-4)), "energy_max", ROUND_OFF),
+        Need("all other invariants, position right to 1e-4", _reaching(Goal(1e-4)), "invariants_max", ROUND_OFF),
+        Need("energy errors that do not grow, or as round-off does", _without_drift, "energy_max", ROUND_OFF),
+        Need("the way back to the start", _on, "reversal", ROUND_OFF),
+        Need("a first result soon: little to compile", _reaching(Goal(1e-4)), "compile_seconds"),
+        Need("little memory", _on, "peak_memory"),
+    ]  # fmt: skip
+
+
+def _reaching(goal: Goal) -> Callable[[Record], bool]:
+    return lambda record: reaches(record, goal)
+
+
+def _on(record: Record) -> bool:
+    return group_of(record) == "on" and record.case.ensemble is None
+
+
+def _without_drift(record: Record) -> bool:
+    law = record.result.laws.get("energy")
+    return _on(record) and law is not None and law.law in ("bounded", "square root")
+
+
+def _answer(records: Sequence[Record], need: Need) -> Answer:
+    behind: dict[str, list[float]] = {}
+    wins: dict[str, int] = {}
+    served = 0
+    for problem in problems_of(records):
+        costs: dict[str, float] = {}
+        for record in records:
+            cost = number(record, need.cost)
+            if record.case.problem != problem or cost is None or not need.serves(record):
+                continue
+            family = family_of(record)
+            costs[family] = min(costs.get(family, math.inf), max(cost, need.floor))
+        if not costs:
+            continue
+        served += 1
+        least = min(costs.values())
+        for family, cost in costs.items():
+            behind.setdefault(family, []).append(cost / least if least > 0.0 else 1.0)
+            wins[family] = wins.get(family, 0) + (cost == least)
+    made = [Candidate(family, len(ratios), wins[family], median(ratios)) for family, ratios in behind.items()]
+    ordered = sorted(made, key=lambda c: (-c.problems, c.behind))
+    # who serves nearly as often but much better comes first
+    ordered.sort(key=lambda c: c.behind * (served / c.problems) ** 2)
+    return Answer(need.title, find(need.cost).label, served, ordered)
