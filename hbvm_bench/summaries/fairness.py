@@ -136,7 +136,7 @@ def doubts(records: Sequence[Record]) -> list[str]:
     if timeouts:
         which = ", ".join(f"{family} {count}" for family, count in timeouts.items())
         said.append(
-            f"The time limit ended {timeouts.total()} cases ({which}); on a faster machine some of them finish."
+            f"The time limit ended {timeouts.total()} cases ({which}); a faster machine may finish some."
         )
     return said
 

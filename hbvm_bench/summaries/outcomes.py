@@ -72,7 +72,7 @@ def _outcome(records: Sequence[Record]) -> Outcome:
         if state != "ok":
             said.setdefault(reason_of(record), []).append(record.case.method)
     reasons = [reason if _same(records) else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
-    best: State = min(states, key=order.index, default="absent")
+    best: State = next((state for state in order if state in states), "absent")
     return Outcome(best, states.count("ok"), len(states), reasons)
 
 
