@@ -38,8 +38,12 @@ class Gauss(MethodBase):
     ----------
     s : int
         Number of stages, s >= 1; the order is 2s. s = 1 is the implicit midpoint rule.
-    h : float
-        Length of a step, > 0; integration backwards takes steps of -h.
+    h : float, optional
+        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
+        the first step's.
+    tol : float, optional
+        Local error per step, as for `HBVM`; s > 1. With the steps that then vary, Gauss
+        keeps no energy over long times (`test_adaptive`): it is there to be compared with.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved; see `HBVM`.
 
@@ -50,7 +54,8 @@ class Gauss(MethodBase):
     """
 
     s: int
-    h: float
+    h: float | None = None
+    tol: float | None = None
     solver: str = "auto"
 
     library = "hbvm-bench"
@@ -58,12 +63,15 @@ class Gauss(MethodBase):
     family = "gauss"
 
     def __post_init__(self) -> None:
+        if self.h is None and self.tol is None:
+            raise InputError("Gauss needs a step h, or a tolerance tol for steps of varying length.")
         try:
             twin = self.as_hbvm()
         except InputError as error:
             raise InputError(str(error).replace("HBVM", "Gauss")) from None
         object.__setattr__(self, "s", twin.s)
         object.__setattr__(self, "h", twin.h)
+        object.__setattr__(self, "tol", twin.tol)
 
     @property
     def order(self) -> int:
@@ -72,7 +80,7 @@ class Gauss(MethodBase):
 
     def as_hbvm(self) -> HBVM:
         """Return the HBVM that this method is."""
-        return HBVM(k=self.s, s=self.s, h=self.h, solver=self.solver)
+        return HBVM(k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver)
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system of ordinary differential equations."""
@@ -80,6 +88,11 @@ class Gauss(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
+        if self.tol is not None:
+            from integrators.kernel.adaptive.program import AdaptiveProgram
+
+            return AdaptiveProgram(system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver)
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
+        assert self.h is not None
         return HBVMProgram(system, k=self.s, s=self.s, h=self.h, solver=self.solver)

@@ -1,10 +1,8 @@
-"""Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step."""
+"""Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
 
-import math
-import operator
 from dataclasses import dataclass
-from typing import Any
 
+from integrators.options import length, tolerance, whole
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError, unknown
 from problems.problem import Problem, System
@@ -17,6 +15,9 @@ CITATION = """\
   year = {2016}
 }
 """
+
+TOLERANCE = 1e-15
+"""Of a method that is given neither a step nor a tolerance."""
 
 SOLVERS = ("auto", "fixed_point", "newton", "blended")
 
@@ -44,6 +45,12 @@ class HBVM(MethodBase):
       if k >= nu s / 2 (`test_energy`); any other smooth one in practice, once k is
       large enough that the quadrature error is below round-off (`test_sitnikov`).
 
+    With a tolerance the steps vary, each as long as its estimated local error allows.
+    This costs an energy-preserving method nothing, whereas a symplectic one, such as
+    Gauss, loses its long-time behaviour (`test_adaptive`). Without k and s these are
+    chosen too (`integrators.automatic`), and the length of a step is bounded such that
+    the error of the quadrature, by which the energy changes, is at round-off.
+
     Limits: energy is not accuracy. At a step too large for the trajectory the
     energy is still conserved and the trajectory is wrong; other invariants, such
     as the angular momentum, are kept only as far as the order does (`LineIntegral`
@@ -60,13 +67,19 @@ class HBVM(MethodBase):
 
     Parameters
     ----------
-    k : int
+    k : int, optional
         Nodes of the quadrature, k >= s.
-    s : int
-        Degree of the polynomial, s >= 1; the order is 2s.
-    h : float
-        Length of a step, > 0; integration backwards takes steps of -h.
-
+    s : int, optional
+        Degree of the polynomial, s >= 1; the order is 2s. Left out, together with k:
+        both are chosen, from ``tol`` and the system.
+    h : float, optional
+        Length of a step, > 0; integration backwards takes steps of -h. With ``tol``,
+        the first step's.
+    tol : float, optional
+        Local error per step, relative to the size of each block of the state (the
+        momenta of one body, else each component), as estimated by
+        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 1e-15 where neither
+        ``h`` nor ``tol`` is given: as accurate as double precision allows.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved. The fixed-point iteration contracts while h
         times the largest frequency is below about s. ``"newton"``: simplified Newton
@@ -91,9 +104,10 @@ class HBVM(MethodBase):
     methods for Poisson problems*, Numer. Algorithms (2022), doi:10.1007/s11075-022-01285-z.
     """
 
-    k: int
-    s: int
-    h: float
+    k: int | None = None
+    s: int | None = None
+    h: float | None = None
+    tol: float | None = None
     solver: str = "auto"
 
     library = "hbvm-bench"
@@ -101,18 +115,35 @@ class HBVM(MethodBase):
     family = "hbvm"
 
     def __post_init__(self) -> None:
+        if self.h is None and self.tol is None:
+            object.__setattr__(self, "tol", TOLERANCE)
+        if (self.k is None) != (self.s is None):
+            missing = "k" if self.k is None else "s"
+            raise InputError(f"HBVM needs k and s, or neither of them; give {missing} too.")
+        if self.k is None and self.tol is None:
+            raise InputError(
+                f"HBVM needs k and s with a fixed step, h={self.h!r}; or give tol, and they are chosen."
+            )
         for name in ("s", "k"):
-            object.__setattr__(self, name, _whole(type(self).__name__, name, getattr(self, name)))
-        object.__setattr__(self, "h", _length(type(self).__name__, self.h))
-        if self.k < self.s:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, whole(type(self).__name__, name, getattr(self, name)))
+        if self.h is not None:
+            object.__setattr__(self, "h", length(type(self).__name__, self.h))
+        if self.tol is not None:
+            object.__setattr__(self, "tol", tolerance(type(self).__name__, self.tol))
+        if self.k is not None and self.s is not None and self.k < self.s:
             raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")
+        if self.k == 1 and self.tol is not None:
+            raise InputError(
+                "HBVM needs k > 1 with a tolerance: one stage tells nothing about its error; give h instead."
+            )
         if self.solver not in SOLVERS:
             raise unknown("solver", str(self.solver), SOLVERS)
 
     @property
-    def order(self) -> int:
-        """Order of convergence, 2s."""
-        return 2 * self.s
+    def order(self) -> int | None:
+        """Order of convergence, 2s; ``None`` where s is chosen."""
+        return None if self.s is None else 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system; Poisson systems with fixed-point iteration only."""
@@ -130,34 +161,23 @@ class HBVM(MethodBase):
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
+        k, s, defect = self.k, self.s, None
+        if k is None or s is None:
+            from integrators.automatic import choose
+
+            assert self.tol is not None
+            k, s, defect = choose(system, self.tol)
         if system.kind == "poisson":
             from integrators.kernel.line.program import LineProgram
 
-            return LineProgram(system, k=self.k, s=self.s, h=self.h)
+            return LineProgram(system, k=k, s=s, h=self.h, tol=self.tol)
+        if self.tol is not None:
+            from integrators.kernel.adaptive.program import AdaptiveProgram
+
+            return AdaptiveProgram(
+                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver
+            )
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
-        return HBVMProgram(system, k=self.k, s=self.s, h=self.h, solver=self.solver)
-
-
-def _whole(method: str, name: str, value: Any) -> int:
-    """Return an option as an int >= 1, or refuse it."""
-    try:
-        number = 0 if isinstance(value, bool) else operator.index(value)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise InputError(f"{method} needs a whole number {name} >= 1, not {name}={value!r}.")
-    return number
-
-
-def _length(method: str, h: Any) -> float:
-    """Return the step as a float > 0, or refuse it."""
-    try:
-        length = math.nan if isinstance(h, (bool, str)) else float(h)
-    except (TypeError, ValueError):
-        length = math.nan
-    if not (length > 0.0 and math.isfinite(length)):
-        raise InputError(
-            f"{method} needs a finite step h > 0, not h={h!r}; the sign of time is that of the times."
-        )
-    return length
+        assert self.h is not None
+        return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver)

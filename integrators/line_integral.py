@@ -1,12 +1,11 @@
 """Line integral methods that keep several invariants at once."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from integrators.hbvm import CITATION as BOOK
-from integrators.hbvm import _length, _whole
+from integrators.options import length, tolerance, whole
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -24,8 +23,6 @@ CITATION = (
 """
     + BOOK
 )
-
-SMALLEST = 2.0**-52
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -109,7 +106,7 @@ class LineIntegral(MethodBase):
 
     def __post_init__(self) -> None:
         for name in ("s", "k"):
-            object.__setattr__(self, name, _whole("LineIntegral", name, getattr(self, name)))
+            object.__setattr__(self, name, whole("LineIntegral", name, getattr(self, name)))
         if self.k <= self.s:
             raise InputError(
                 f"LineIntegral needs k > s, not k={self.k}, s={self.s}: {self.k} nodes see no more of the "
@@ -118,9 +115,9 @@ class LineIntegral(MethodBase):
         if self.h is None and self.tol is None:
             raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
         if self.h is not None:
-            object.__setattr__(self, "h", _length("LineIntegral", self.h))
+            object.__setattr__(self, "h", length("LineIntegral", self.h))
         if self.tol is not None:
-            object.__setattr__(self, "tol", _tolerance(self.tol))
+            object.__setattr__(self, "tol", tolerance("LineIntegral", self.tol))
         object.__setattr__(self, "invariants", _names(self.invariants))
 
     @property
@@ -163,17 +160,3 @@ def _names(invariants: Any) -> tuple[str, ...]:
     if len(set(listed)) < len(listed):
         raise InputError(f"LineIntegral needs different invariants, not {list(listed)!r}.")
     return listed
-
-
-def _tolerance(tol: Any) -> float:
-    """Return the tolerance as a float, or refuse it."""
-    try:
-        value = math.nan if isinstance(tol, (bool, str)) else float(tol)
-    except (TypeError, ValueError):
-        value = math.nan
-    if not SMALLEST <= value < 1.0:
-        raise InputError(
-            f"LineIntegral needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={tol!r}: "
-            "an error smaller than this cannot be told from rounding."
-        )
-    return value

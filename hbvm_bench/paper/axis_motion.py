@@ -28,7 +28,8 @@ PULL = 2.0  # of both primaries: G (m1 + m2)
 SCALE = 3.0  # a typical frequency: makes the components of u comparable, so that steps converge
 TURN = 2 * math.pi
 PER_TURN = 96  # steps in a revolution
-METHOD = Gauss(s=5, h=TURN / PER_TURN)
+STEP = TURN / PER_TURN
+METHOD = Gauss(s=5, h=STEP)
 START = (1e-9, 0.5)  # the paper's z and velocity
 FAR = 100.0  # |z| of a planetoid that is not coming back soon
 
@@ -157,7 +158,7 @@ def _every_turn(program: Program, par: Array, y0: Sequence[float], turns: int) -
     made = np.empty((0, len(y0)))
     while len(made) < turns:
         ahead = np.arange(len(made) + 1.0, min(len(made) + 50, turns) + 1)
-        samples = stepper.advance(math.pi + ahead * PER_TURN * METHOD.h)
+        samples = stepper.advance(math.pi + ahead * PER_TURN * STEP)
         made = np.vstack([made, samples.y])
         far = np.flatnonzero(~(np.abs(made[:, 0]) < FAR))
         if far.size or samples.status.failed:

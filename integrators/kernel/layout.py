@@ -1,6 +1,6 @@
 """Where things are: the slots of a context, the block of memory a trajectory is integrated in.
 
-A context is 96 words of eight bytes, integers and doubles side by side: the
+A context is 112 words of eight bytes, integers and doubles side by side: the
 addresses of all tables and arrays, and the state of the nonlinear solver.
 Compiled functions take its address and nothing else, so their signature does
 not change with what they do, and a batch is a row of contexts.
@@ -112,7 +112,35 @@ PARTIAL = 78
 IMPLICIT_STEPS = 87
 SWITCHES = 88
 
-CONTEXT = 96
+# Steps of varying length; see `integrators.kernel.adaptive.steps`.
+TIME_LOW = 90  # double: what T0 lacks
+ALLOWED_ERROR = 91  # double: the estimated local error of a step, relative, at most
+ALLOWED_DEFECT = 92  # double: the same of the quadrature; infinite: any
+ERROR_DEGREE = 93  # degree of the Legendre coefficient that the error is estimated by
+ESTIMATORS = 94  # b_l P_j(c_l) for eight j: 0 .. 3, the two up to ERROR_DEGREE, the last two
+ESTIMATES = 95  # room for these coefficients of the field, row by row, and for the blocks' numbers
+NEXT_LENGTH = 96  # double: of the next step to be tried
+LENGTH_AFTER = 97  # double: of the one after the step that is solved
+LENGTH_BEHIND = 98  # double: of the last step; 0: unknown
+ERROR_BEHIND = 99  # double: logarithm of the last step's estimated error, divided by its order ...
+ERROR_AHEAD = 100  # double: ... and of that of the step that is solved
+DEFECT_BEHIND = 101  # double: the same for the defect
+DEFECT_AHEAD = 102  # double
+LENGTH_LIMIT = 103  # double: no step is longer
+REJECTED = 104  # 1: F is that of a rejected step of length LENGTH, from the present state
+REJECTIONS = 105
+ERROR_DECAY = 106  # double: of coefficients from one degree to the next, where the error is allowed
+DEFECT_DECAY = 107  # double: the same where the defect is
+ERROR_AIM = 108  # double: logarithm of the error to aim at, divided by its order
+DEFECT_AIM = 109  # double
+LOG_RATE = 110  # double: logarithm of the iteration's contraction, as measured
+RECURRENCE = (
+    111  # by which each mode follows from the two before: pairs a, b for P_{j+1} = a x P_j - b P_{j-1}
+)
+
+CONTEXT = 112
+
+BLOCK_ROOM = 4  # numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's
 
 # Routes of a product that are not a number of columns.
 WIDE, THROUGH = 0, 1
@@ -123,7 +151,7 @@ BY_INCREMENT = 2
 FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 
 # How a step, or an advance, ended.
-RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET = range(5)
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW = range(6)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)

@@ -58,14 +58,15 @@ def set_step(ctx, h):
 
 @compiled
 def set_times(ctx):
-    """Set TIMES to t0 + n h + c h, with n h as a sum of two doubles."""
+    """Set TIMES to t0 + n h + c h, with t0 and n h as sums of two doubles."""
     h = get_float(ctx, at.H)
     t0 = get_float(ctx, at.T0)
     n = float(get_int(ctx, at.N))
     elapsed = n * h
     t = t0 + elapsed
     part = t - t0
-    low = splat8((t0 - (t - part)) + (elapsed - part) + fma(n, h, -elapsed))
+    rest = (t0 - (t - part)) + (elapsed - part) + fma(n, h, -elapsed)
+    low = splat8(rest + get_float(ctx, at.TIME_LOW))
     step = splat8(h)
     times = get_int(ctx, at.TIMES)
     nodes = get_int(ctx, at.NODES)
@@ -151,16 +152,16 @@ def start_elsewhere(ctx, source, first, ratio):
     groups = get_int(ctx, at.MODE_CHUNKS)
     nodes = get_int(ctx, at.NODES)
     basis = get_int(ctx, at.BASIS)
+    recurrence = get_int(ctx, at.RECURRENCE)
     for chunk in range(chunks):
         x = 2.0 * (first + ratio * get(nodes, 8 * chunk)) - 1.0
         before = splat8(0.0)
-        legendre = splat8(1.0)
-        for j in range(8 * groups):
-            size = (2.0 * j + 1.0) ** 0.5 if j < modes else 0.0
-            put(basis, 8 * (chunk * 8 * groups + j), size * legendre)
-            after = ((2.0 * j + 1.0) * x * legendre - j * before) / (j + 1.0)
-            before = legendre
-            legendre = after
+        here = splat8(1.0)
+        for j in range(modes):
+            put(basis, 8 * (chunk * 8 * groups + j), here)
+            after = fma(get_float(recurrence, 2 * j) * x, here, -get_float(recurrence, 2 * j + 1) * before)
+            before = here
+            here = after
     project(source, get_int(ctx, at.MODE_PROJECTION), groups)
     multiply(
         basis, chunks, groups, get_int(source, at.COEFFICIENTS), 8,

@@ -69,14 +69,18 @@ class HBVMStepper:
         for context in (self._context, self._side):
             program.load(context, par)
         self._dim = y.size
-        self._context.reals[layout.H] = program.h
-        self._context.reals[layout.T0] = t0
-        engine.call(engine.RESET, self._context.address, y.ctypes.data)
+        self._begin(y, t0)
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._context.words[layout.STRATEGY] = program.solver.strategy
         if program.solver.strategy == layout.ALWAYS_IMPLICIT:
             self._take_implicit()
         self._status, self._reason = Status.RUNNING, ""
+
+    def _begin(self, y: Array, t0: float) -> None:
+        """Put the trajectory at its start."""
+        self._context.reals[layout.H] = self._program.h
+        self._context.reals[layout.T0] = t0
+        engine.call(engine.RESET, self._context.address, y.ctypes.data)
 
     @property
     def t(self) -> float:

@@ -235,7 +235,17 @@ def fixed(constants: Constants) -> dict[str, Array]:
         "WEIGHTS_LOW": _vector(a["weights_low"]),
         "POSITION_WEIGHTS": _vector(a["position_weights"]),
         "POSITION_WEIGHTS_LOW": _vector(a["position_weights_low"]),
+        "RECURRENCE": _recurrence(constants.modes),
     }
+
+
+def _recurrence(modes: int) -> Array:
+    """Return pairs a, b with P_{j+1} = a x P_j - b P_{j-1}, x = 2 c - 1, for the orthonormal basis."""
+    j = np.arange(modes, dtype=np.float64)
+    up = np.sqrt(2.0 * j + 3.0)
+    return np.stack([np.sqrt(2.0 * j + 1.0) * up, j * up / np.sqrt(np.abs(2.0 * j - 1.0))], axis=1) / (
+        j[:, None] + 1.0
+    )
 
 
 def _times(high: Array, low: Array, h: float) -> tuple[Array, Array]:

@@ -9,6 +9,8 @@ from integrators.kernel import native, store
 # The modules whose code is in the kernel: an edit of any of them makes another kernel.
 SOURCES = (
     "native",
+    "products",
+    "control",
     *(f"line/{name}" for name in ("layout", "views", "invariants", "solve", "sample", "varying", "loops")),
 )
 

@@ -1,21 +1,28 @@
 """Steps whose length follows the estimated local error."""
 
+from math import log
+
+from integrators.kernel.control import (
+    APPROACH,
+    CLOSE,
+    INFINITY,
+    NOTHING,
+    RETREAT,
+    SAFETY,
+    SHORTEST,
+    TINY,
+    bounded,
+    log_factor,
+)
 from integrators.kernel.line import layout as at
 from integrators.kernel.line.sample import sample
 from integrators.kernel.line.solve import commit, end, slope, solve
 from integrators.kernel.line.views import compiled, two_sum
 
-SAFETY, SHRINK, GROW = 0.9, 0.2, 4.0  # of the length from one step to the next
+GROW = 4.0  # of the length from one step to the next, at most
 # Iterations to aim at, at most: with a contraction h w, a unit of time costs least at h w = 1/e, which
 # takes 36 to 1e-16.
 BUSY = 36.0
-# Fast modes at rest show neither in the error nor in the first iterations. Where the iteration failed, steps
-# stay this much shorter at first, and then approach that length again by this factor a step.
-RETREAT, APPROACH = 0.5, 1.02
-SHORTEST = 2.0**-48  # of the time: a shorter step cannot be told from none
-NOTHING = 1e-6  # of the largest size in its group: a smaller block may have any error up to this
-CLOSE = 2.0**-50  # times whose relative difference is at most this are the same
-INFINITY = float("inf")
 
 
 @compiled
@@ -69,26 +76,6 @@ def first_length(m):
 
 
 @compiled
-def factor_after(m, h, estimate, grow):
-    """Return the next step's length relative to h, from the estimated error of this one.
-
-    The length that would have met the tolerance, corrected by how it changed over
-    the last step, which foresees an approach.
-    """
-    real = m.real
-    if not estimate < INFINITY:
-        return SHRINK
-    if estimate == 0.0:
-        return grow
-    power = 1.0 / (2.0 * m.s + 1.0)
-    factor = SAFETY * (real[at.TOLERANCE] / estimate) ** power
-    if real[at.BEHIND] > 0.0:
-        trend = abs(h / real[at.LENGTH]) * (real[at.BEHIND] / estimate) ** power
-        factor *= min(trend, 1.0)
-    return max(SHRINK, min(grow, factor))
-
-
-@compiled
 def ready(m):
     """Solve the step ahead with a length that the tolerance allows; H is its length."""
     real, count = m.real, m.count
@@ -96,6 +83,7 @@ def ready(m):
         return at.DONE
     t = real[at.T0] + real[at.LOW]
     grow, failure = GROW, at.UNDERFLOW
+    power = 1.0 / (2.0 * m.s + 1.0)
     while True:
         h = real[at.NEXT]
         if not abs(h) > SHORTEST * abs(t):
@@ -107,7 +95,15 @@ def ready(m):
         if outcome == at.DONE and count[at.ACCEPTED]:
             break
         estimate = error(m, h) if outcome == at.DONE else INFINITY
-        factor = factor_after(m, h, estimate, grow)
+        factor = bounded(
+            log_factor(
+                power * log(real[at.TOLERANCE]),
+                power * log(max(estimate, TINY)),
+                power * log(real[at.BEHIND]) if real[at.BEHIND] > 0.0 else INFINITY,
+                log(abs(h / real[at.LENGTH])) if real[at.BEHIND] > 0.0 else 0.0,
+            ),
+            grow,
+        )
         if estimate <= real[at.TOLERANCE]:
             factor = min(factor, max(BUSY / (count[at.ITERATIONS] - before), 0.5))
             real[at.LIMIT] *= APPROACH

@@ -1,0 +1,50 @@
+"""Which HBVM(k, s) a tolerance calls for: the choice of `integrators.HBVM` without k and s."""
+
+import math
+
+from problems.inspection import degree, exact_k
+from problems.system import System
+
+FEW, MANY = 8, 16
+"""Stages that the field takes at a time: fewer cost as much."""
+
+HIGHEST = 14
+"""Degree at round-off: two nodes are left over for the estimates."""
+
+DEFECT = 1e-16
+"""Error of a step's quadrature, estimated by the last coefficient that k nodes see; it is much smaller."""
+
+
+def choose(system: System, tol: float) -> tuple[int, int, float | None]:
+    """Return k, s and what the quadrature's error is bounded by.
+
+    With as many stages as the processor takes at a time, a higher degree costs nothing.
+    But where Legendre coefficients fall off geometrically, a step at which gamma_s
+    meets the tolerance, ``|gamma_s|^2 = tol``, leaves a quadrature error of about
+    ``tol^(k/s)``: s is as high as this permits. A polynomial energy of degree nu is
+    conserved exactly by k >= nu s/2 nodes, which may be fewer, and needs no bound.
+
+    Parameters
+    ----------
+    system : System
+        What to integrate.
+    tol : float
+        Local error per step.
+
+    Returns
+    -------
+    k, s : int
+        Of HBVM(k, s).
+    defect : float or None
+        Bound on the estimated error of a step's quadrature; ``None``: it is 0, or there is no
+        energy to keep.
+    """
+    s = max(2, min(HIGHEST, math.ceil(HIGHEST * math.log(tol) / math.log(DEFECT))))
+    if "hamiltonian" not in system.offered():
+        return MANY, s, None
+    nu = degree(system)
+    if nu is not None:
+        for k in (FEW, MANY):
+            if k > s + 1 and exact_k(nu, s) <= k:
+                return k, s, None
+    return MANY, s, DEFECT

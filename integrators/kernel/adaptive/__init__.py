@@ -1,0 +1,1 @@
+"""Steps of varying length on the compiled kernel."""

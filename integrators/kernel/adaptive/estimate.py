@@ -1,0 +1,108 @@
+"""Estimates from the Legendre coefficients that the polynomial of a step leaves out."""
+
+from integrators.kernel import layout as at
+from integrators.kernel.control import INFINITY, NOTHING
+from integrators.kernel.lanes import fma
+from integrators.kernel.memory import get, get_float, get_int, put, put_float, splat8, sums
+from integrators.kernel.products import compiled, evaluate, offset
+from integrators.kernel.step import prepare, set_step, start_plain
+
+
+@compiled
+def coefficient(ctx, row, which):
+    """Return eight partial sums of the coefficient that row ``which`` of ESTIMATORS makes of the field."""
+    f = get_int(ctx, at.F)
+    i = get_int(ctx, at.LANES) * row
+    chunks = get_int(ctx, at.CHUNKS)
+    table = get_int(ctx, at.ESTIMATORS) + 64 * chunks * which
+    result = splat8(0.0)
+    for chunk in range(chunks):
+        result = fma(get(table, 8 * chunk), get(f, i + offset(ctx, chunk)), result)
+    return result
+
+
+@compiled
+def momentum(ctx, d):
+    """Return the component of the state whose slope is row d of the field."""
+    i = 8 * (d // 4) + d % 4 if get_int(ctx, at.SECOND) else d
+    return get_float(get_int(ctx, at.STATE), i)
+
+
+@compiled
+def estimate(ctx):
+    """Return the estimated local error of the solved step, and that of its quadrature.
+
+    gamma_j, the Legendre coefficients of the field that the polynomial leaves out,
+    j >= s, are of size h^j. ``h |gamma_s|^2 / |gamma|`` has the order 2s + 1 of the
+    local error, and its units; with the last one that k nodes see, gamma_{k-1}, it is
+    of the size of the quadrature's error or larger. Both relative to the size of each
+    block of the state; the largest of all.
+    """
+    rows = get_int(ctx, at.ROWS)
+    h = abs(get_float(ctx, at.H))
+    found = get_int(ctx, at.ESTIMATES)
+    for d in range(rows):
+        first = coefficient(ctx, d, 0), coefficient(ctx, d, 1), coefficient(ctx, d, 2), coefficient(ctx, d, 3)
+        last = coefficient(ctx, d, 4), coefficient(ctx, d, 5), coefficient(ctx, d, 6), coefficient(ctx, d, 7)
+        put(found, 8 * d, abs(sums(*first, *last)))
+    block, group = get_int(ctx, at.BLOCK), get_int(ctx, at.GROUP)
+    blocks = get_int(ctx, at.BLOCK_COUNT)
+    largest = get_int(ctx, at.LARGEST)
+    error_decay, defect_decay = get_float(ctx, at.ERROR_DECAY), get_float(ctx, at.DEFECT_DECAY)
+    room = found + 64 * rows
+    for i in range(at.BLOCK_ROOM * blocks):
+        put_float(room, i, 0.0)
+    for g in range(get_int(ctx, at.GROUP_COUNT)):
+        put_float(largest, g, 0.0)
+    for d in range(rows):
+        b = at.BLOCK_ROOM * get_int(block, d)
+        i = 8 * d
+        slope = max(
+            max(get_float(found, i), get_float(found, i + 1)),
+            max(get_float(found, i + 2), get_float(found, i + 3)),
+        )
+        missing = max(get_float(found, i + 5), error_decay * get_float(found, i + 4))
+        unseen = max(get_float(found, i + 7), defect_decay * get_float(found, i + 6))
+        put_float(room, b, max(get_float(room, b), abs(momentum(ctx, d)) + h * slope))
+        put_float(room, b + 1, max(get_float(room, b + 1), slope))
+        put_float(room, b + 2, max(get_float(room, b + 2), missing))
+        put_float(room, b + 3, max(get_float(room, b + 3), unseen))
+    for b in range(blocks):
+        g = get_int(group, b)
+        put_float(largest, g, max(get_float(largest, g), get_float(room, at.BLOCK_ROOM * b)))
+    error, defect = 0.0, 0.0
+    for b in range(blocks):
+        i = at.BLOCK_ROOM * b
+        slope = get_float(room, i + 1)
+        if slope > 0.0:
+            size = max(get_float(room, i), NOTHING * get_float(largest, get_int(group, b)))
+            part = h / slope / size
+            error = max(error, part * get_float(room, i + 2) ** 2)
+            defect = max(defect, part * get_float(room, i + 3) ** 2)
+    return error, defect
+
+
+@compiled
+def first_length(ctx):
+    """Return a first step from the field at the state: short, the following grow."""
+    set_step(ctx, 0.0)
+    prepare(ctx)
+    start_plain(ctx)
+    evaluate(ctx)
+    rows, lanes = get_int(ctx, at.ROWS), get_int(ctx, at.LANES)
+    f = get_int(ctx, at.F)
+    position, speed, pull = 0.0, 0.0, 0.0
+    for d in range(rows):
+        slope = abs(get_float(f, lanes * d))
+        position = max(position, abs(get_float(get_int(ctx, at.ROW_STATE), d)))
+        if get_int(ctx, at.SECOND):
+            velocity = get_float(get_int(ctx, at.VELOCITY), d)
+            speed = max(speed, abs(velocity * momentum(ctx, d)))
+            pull = max(pull, abs(velocity) * slope)
+        else:
+            speed = max(speed, slope)
+    rate = speed
+    if position > 0.0:
+        rate = max(speed / position, (pull / position) ** 0.5)
+    length = get_float(ctx, at.ALLOWED_ERROR) ** (1.0 / (2.0 * get_int(ctx, at.ERROR_DEGREE) + 1.0))
+    return length / rate if 0.0 < rate < INFINITY else length

@@ -1,0 +1,88 @@
+"""HBVM(k, s) with steps of varying length, compiled for one system."""
+
+import math
+from time import perf_counter
+
+from numpy.typing import ArrayLike
+
+from integrators.kernel import layout
+from integrators.kernel.adaptive import engine
+from integrators.kernel.adaptive.stepper import AdaptiveStepper
+from integrators.kernel.program import HBVMProgram
+from integrators.kernel.tables import aligned
+from integrators.kernel.workspace import Context
+from integrators.legendre import legendre
+from integrators.protocol import check_state
+from problems.problem import System
+
+FIRST_RATE = 0.01
+
+
+class AdaptiveProgram(HBVMProgram):
+    """HBVM(k, s) with steps as long as a tolerance allows, compiled for one system.
+
+    Parameters
+    ----------
+    system : System
+        What to integrate.
+    k, s : int
+        Stages and degree, k >= s >= 1, k > 1.
+    tol : float
+        Local error per step, relative to the size of each block of the state.
+    defect : float, optional
+        The same for the error of the quadrature, by which the energy changes; by default any.
+    h : float, optional
+        Length of the first step.
+    solver : {"auto", "fixed_point", "newton", "blended"}, optional
+        How the stage equations are solved; see `integrators.hbvm.HBVM`.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        k: int,
+        s: int,
+        tol: float,
+        defect: float | None = None,
+        h: float | None = None,
+        solver: str = "auto",
+    ):
+        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
+        started = perf_counter()
+        self.tol, self.defect, self.first = tol, defect, h
+        made = engine.code()
+        self.from_cache = self.from_cache and made.from_cache
+        c = self.constants
+        # P_s vanishes at the nodes of the rule with s nodes.
+        self.degree = s if k > s else s - 1
+        basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
+        m = self.degree
+        degrees = [0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1]
+        self._estimators = aligned(len(degrees) * 8 * -(-k // 8))
+        self._estimators.reshape(len(degrees), -1)[:, :k] = basis.T[degrees]
+        self.compile_seconds += perf_counter() - started
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
+        """Return a stepper at ``t0``; as `HBVMProgram.start`."""
+        return AdaptiveStepper(self, check_state(y0, self.system.dim), self.parameters(par), float(t0))
+
+    def context(self, *, side: bool = False) -> Context:
+        """Return fresh memory for a trajectory, or for its partial steps."""
+        context = super().context(side=True)  # with a matrix of its own
+        shape = self.shape
+        room = 8 * shape.rows + layout.BLOCK_ROOM * shape.group.size
+        context.point({"ESTIMATORS": self._estimators, "ESTIMATES": aligned(room)})
+        reals, order = context.reals, 2 * self.degree + 1
+        context.words[layout.ERROR_DEGREE] = self.degree
+        reals[layout.ALLOWED_ERROR] = self.tol
+        reals[layout.ALLOWED_DEFECT] = math.inf if self.defect is None else self.defect
+        reals[layout.ERROR_AIM] = math.log(self.tol) / order
+        reals[layout.ERROR_DECAY] = self.tol ** (0.5 / self.degree)
+        if self.defect is not None:
+            last = self.constants.k - 1
+            reals[layout.DEFECT_AIM] = math.log(self.defect) / (2 * last + 1)
+            reals[layout.DEFECT_DECAY] = self.defect ** (0.5 / last)
+        reals[layout.LENGTH_LIMIT] = math.inf
+        reals[layout.LOG_RATE] = math.log(FIRST_RATE)
+        return context

@@ -1,0 +1,231 @@
+"""Steps of varying length: each as long as the estimated errors and the iterations allow."""
+
+from math import log
+
+from integrators.kernel import layout as at
+from integrators.kernel.adaptive.estimate import estimate
+from integrators.kernel.control import (
+    APPROACH,
+    CLOSE,
+    INFINITY,
+    RETREAT,
+    SAFETY,
+    SHORTEST,
+    SHRINK,
+    TINY,
+    bounded,
+    log_factor,
+)
+from integrators.kernel.line.views import two_sum
+from integrators.kernel.loops import sample
+from integrators.kernel.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.products import compiled, evaluate
+from integrators.kernel.solve import ROUNDING, close, rewind, settle, sweep, sweep_tested
+from integrators.kernel.step import FARTHEST, prepare, set_step, start_elsewhere, start_plain, take_sizes
+from integrators.kernel.update import commit, update, write
+
+GROW = FARTHEST  # of the length from one step to the next, at most
+# Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
+# and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
+BUSY, BUSY_FIRST = 18.0, 36.0
+GOAL = log(1e-17)  # a change that is going to be no larger is not waited for
+LEAST_RATE, MOST_RATE = log(1e-4), log(0.9)
+HOPE = log(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+
+
+@compiled
+def attempt(ctx, h):
+    """Solve the step of length h from STATE; return the outcome."""
+    set_step(ctx, h)
+    rewind(ctx)
+    prepare(ctx)
+    length = get_float(ctx, at.LENGTH)
+    if length != 0.0 and abs(h / length) <= FARTHEST:
+        start_elsewhere(ctx, ctx, 0.0 if get_int(ctx, at.REJECTED) else 1.0, h / length)
+    else:
+        start_plain(ctx)
+    age = get_int(ctx, at.AGE) - 1
+    put_int(ctx, at.AGE, age)
+    predicted = get_int(ctx, at.PREDICTED)
+    if age < 0 or predicted == 0:
+        take_sizes(ctx)
+    outcome = iterate(ctx)
+    return update(ctx) if outcome == at.DONE else outcome
+
+
+@compiled
+def iterate(ctx):
+    """Iterate until the step is solved or has failed; return the outcome.
+
+    The first change and the rate of contraction, as it was at the last step, tell how
+    many iterations need no test. Nor does the one that will not change anything.
+    """
+    sweep_tested(ctx)
+    tried = get_int(ctx, at.TRIED)
+    if get_int(ctx, at.OUTCOME) != at.RUNNING or tried != 1:
+        return settle(ctx)
+    first = log(get_float(ctx, at.LAST))
+    rate = get_float(ctx, at.LOG_RATE)
+    for _ in range(int((GOAL - first) / rate) - 1):
+        sweep(ctx)
+    while get_int(ctx, at.OUTCOME) == at.RUNNING:
+        sweep_tested(ctx)
+        tries = get_int(ctx, at.TRIED) - tried
+        if tries <= 0:  # started anew
+            return settle(ctx)
+        last = get_float(ctx, at.LAST)
+        if last > ROUNDING:
+            rate = min(max((log(last) - first) / tries, LEAST_RATE), MOST_RATE)
+        elif last == 0.0 and tries > 1:
+            rate = max(rate + HOPE, LEAST_RATE)
+        if get_int(ctx, at.OUTCOME) == at.RUNNING and (last < ROUNDING or log(last) + rate < GOAL):
+            evaluate(ctx)
+            put_int(ctx, at.TRIED, get_int(ctx, at.TRIED) + 1)
+            put_int(ctx, at.OUTCOME, at.DONE)
+    put_float(ctx, at.LOG_RATE, rate)
+    close(ctx)
+    return get_int(ctx, at.OUTCOME)
+
+
+@compiled
+def longer(ctx, error, defect, grow):
+    """Return the next step's length relative to this one's, from what is estimated for this one."""
+    if not error < INFINITY:
+        return SHRINK
+    h = get_float(ctx, at.H)
+    behind = get_float(ctx, at.LENGTH_BEHIND)
+    change = log(abs(h / behind)) if behind != 0.0 else 0.0
+    power = 1.0 / (2.0 * get_int(ctx, at.ERROR_DEGREE) + 1.0)
+    here = power * log(max(error, TINY))
+    before = get_float(ctx, at.ERROR_BEHIND) if behind != 0.0 else INFINITY
+    factor = log_factor(get_float(ctx, at.ERROR_AIM), here, before, change)
+    put_float(ctx, at.ERROR_AHEAD, here)
+    if get_float(ctx, at.ALLOWED_DEFECT) < INFINITY:
+        power = 1.0 / (2.0 * get_int(ctx, at.STAGES) - 1.0)
+        here = power * log(max(defect, TINY))
+        before = get_float(ctx, at.DEFECT_BEHIND) if behind != 0.0 else INFINITY
+        factor = min(factor, log_factor(get_float(ctx, at.DEFECT_AIM), here, before, change))
+        put_float(ctx, at.DEFECT_AHEAD, here)
+    return bounded(factor, grow)
+
+
+@compiled
+def ready(ctx):
+    """Solve the step ahead with a length that the tolerance allows; H is its length."""
+    if get_int(ctx, at.SOLVED):
+        return at.DONE
+    t = get_float(ctx, at.T0)
+    allowed, allowed_defect = get_float(ctx, at.ALLOWED_ERROR), get_float(ctx, at.ALLOWED_DEFECT)
+    busy = BUSY if get_int(ctx, at.SECOND) else BUSY_FIRST
+    put_int(ctx, at.REJECTED, 0)
+    grow, failure = GROW, at.UNDERFLOW
+    while True:
+        h = get_float(ctx, at.NEXT_LENGTH)
+        if not abs(h) > SHORTEST * abs(t):
+            return failure
+        before = get_int(ctx, at.ITERATIONS)
+        outcome = attempt(ctx, h)
+        put_int(ctx, at.SOLVED, 0)
+        error, defect = INFINITY, INFINITY
+        if outcome == at.DONE:
+            error, defect = estimate(ctx)
+        factor = longer(ctx, error, defect, grow)
+        if error <= allowed and defect <= allowed_defect:
+            factor = min(factor, max(busy / (get_int(ctx, at.ITERATIONS) - before), 0.5))
+            limit = get_float(ctx, at.LENGTH_LIMIT) * APPROACH
+            put_float(ctx, at.LENGTH_LIMIT, limit)
+            put_float(ctx, at.LENGTH_AFTER, h * min(factor, limit / abs(h)))
+            put_int(ctx, at.SOLVED, 1)
+            return at.DONE
+        failure = at.UNDERFLOW
+        if outcome == at.DONE:
+            put_float(ctx, at.LENGTH, h)
+            put_int(ctx, at.REJECTED, 1)
+        else:
+            failure = outcome
+            put_float(ctx, at.LENGTH, 0.0)
+            put_float(ctx, at.LENGTH_LIMIT, RETREAT * abs(h))
+            if outcome == at.DIVERGED:
+                factor = RETREAT
+        put_float(ctx, at.NEXT_LENGTH, h * min(factor, SAFETY))
+        put_int(ctx, at.REJECTIONS, get_int(ctx, at.REJECTIONS) + 1)
+        grow = 1.0
+
+
+@compiled
+def take(ctx):
+    """Take the step ahead, which is solved."""
+    t, low = two_sum(get_float(ctx, at.T0), get_float(ctx, at.H))
+    commit(ctx)
+    put_int(ctx, at.N, 0)
+    t, low = two_sum(t, low + get_float(ctx, at.TIME_LOW))
+    put_float(ctx, at.T0, t)
+    put_float(ctx, at.TIME_LOW, low)
+    put_float(ctx, at.NEXT_LENGTH, get_float(ctx, at.LENGTH_AFTER))
+    put_float(ctx, at.LENGTH_BEHIND, get_float(ctx, at.H))
+    put_float(ctx, at.ERROR_BEHIND, get_float(ctx, at.ERROR_AHEAD))
+    put_float(ctx, at.DEFECT_BEHIND, get_float(ctx, at.DEFECT_AHEAD))
+
+
+@compiled
+def remaining(ctx, t):
+    """Return how far the time t is ahead; 0 where it is the present but for rounding."""
+    rest = (t - get_float(ctx, at.T0)) - get_float(ctx, at.TIME_LOW)
+    return 0.0 if abs(rest) <= CLOSE * abs(t) else rest
+
+
+@compiled
+def dimension(ctx):
+    """Return the length of the state."""
+    return get_int(ctx, at.ROWS) * (2 if get_int(ctx, at.SECOND) else 1)
+
+
+@compiled
+def vary(ctx, side, between, count, times, first, out, budget):
+    """Take steps to the samples' times and make the samples; see `integrators.kernel.loops.advance`."""
+    dim = dimension(ctx)
+    for i in range(first, count):
+        put_int(ctx, at.MADE, i)
+        t = get_float(times, i)
+        while True:
+            rest = remaining(ctx, t)
+            if rest == 0.0:
+                break
+            outcome = ready(ctx)
+            if outcome != at.DONE:
+                return outcome
+            if abs(rest) < abs(get_float(ctx, at.H)) - CLOSE * abs(t):
+                break
+            if budget == 0:
+                return at.BUDGET
+            budget -= 1
+            take(ctx)
+        put_float(side, at.TIME_LOW, get_float(ctx, at.TIME_LOW))
+        outcome = sample(ctx, side, between, t, rest, out + 8 * dim * i)
+        if outcome != at.DONE:
+            return outcome
+        if between == at.LAND:
+            put_float(ctx, at.TIME_LOW, 0.0)
+    put_int(ctx, at.MADE, count)
+    return at.DONE
+
+
+@compiled
+def walk(ctx, times, out, end, budget):
+    """Take ``budget`` steps at most, none beyond the time ``end``, and note their times and states."""
+    dim = dimension(ctx)
+    for i in range(budget):
+        put_int(ctx, at.MADE, i)
+        rest = remaining(ctx, end)
+        if rest == 0.0:
+            return at.DONE
+        outcome = ready(ctx)
+        if outcome != at.DONE:
+            return outcome
+        if abs(rest) < abs(get_float(ctx, at.H)) - CLOSE * abs(end):
+            return at.DONE
+        take(ctx)
+        put_float(times, i, get_float(ctx, at.T0))
+        write(ctx, get_int(ctx, at.STATE), out + 8 * dim * i)
+    put_int(ctx, at.MADE, budget)
+    return at.BUDGET

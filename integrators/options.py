@@ -1,0 +1,49 @@
+"""The options that several methods have: checked, and refused with one sentence."""
+
+import math
+import operator
+from typing import Any
+
+from problems.errors import InputError
+
+SMALLEST = 2.0**-52
+"""The smallest tolerance of a step: a smaller error cannot be told from rounding."""
+
+
+def whole(method: str, name: str, value: Any) -> int:
+    """Return an option as an int >= 1, or refuse it."""
+    try:
+        number = 0 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise InputError(f"{method} needs a whole number {name} >= 1, not {name}={value!r}.")
+    return number
+
+
+def length(method: str, h: Any) -> float:
+    """Return a step as a float > 0, or refuse it."""
+    value = _number(h)
+    if not (value > 0.0 and math.isfinite(value)):
+        raise InputError(
+            f"{method} needs a finite step h > 0, not h={h!r}; the sign of time is that of the times."
+        )
+    return value
+
+
+def tolerance(method: str, tol: Any) -> float:
+    """Return a tolerance as a float, or refuse it."""
+    value = _number(tol)
+    if not SMALLEST <= value < 1.0:
+        raise InputError(
+            f"{method} needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={tol!r}: "
+            "an error smaller than this cannot be told from rounding."
+        )
+    return value
+
+
+def _number(value: Any) -> float:
+    try:
+        return math.nan if isinstance(value, (bool, str)) else float(value)
+    except (TypeError, ValueError):
+        return math.nan
