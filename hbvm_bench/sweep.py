@@ -14,7 +14,7 @@ from problems.errors import InputError, unknown
 PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
 DIGITS = 12  # of a product: 3 * 0.1 is 0.3 here
 
-Scalar = float | int | str
+Scalar = float | int | str | list[str]
 Sweep = Mapping[str, Sequence[Scalar]]
 
 
@@ -53,11 +53,11 @@ def fill(text: str, values: Mapping[str, Scalar]) -> str:
 def _product(text: str, inside: str, values: Mapping[str, Scalar]) -> str:
     factors = [_factor(text, part.strip(), values) for part in inside.split("*")]
     if len(factors) == 1:
-        return repr(factors[0])
+        return repr(tuple(factors[0]) if isinstance(factors[0], list) else factors[0])
     product = 1.0
     for factor in factors:
-        if isinstance(factor, str):
-            raise InputError(f"{text}: {{{inside}}} multiplies the word {factor!r}; give numbers.")
+        if isinstance(factor, str | list):
+            raise InputError(f"{text}: {{{inside}}} multiplies {factor!r}; give numbers.")
         product *= factor
     return repr(float(f"{product:.{DIGITS}g}"))
 

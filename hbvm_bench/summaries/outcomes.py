@@ -19,6 +19,10 @@ STATES: dict[State, str] = {
 }
 
 
+ORDER: tuple[State, ...] = ("ok", "off", "ended", "refused")
+"""From best to worst, of the cases there are."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What became of all settings of a family on a problem.
@@ -65,14 +69,15 @@ def reason_of(record: Record) -> str:
 
 
 def _outcome(records: Sequence[Record]) -> Outcome:
-    order: tuple[State, ...] = ("ok", "off", "ended", "refused")
     states: list[State] = [_state(record) for record in records]
     said: dict[str, list[str]] = {}
     for record, state in zip(records, states, strict=True):
         if state != "ok":
             said.setdefault(reason_of(record), []).append(record.case.method)
     reasons = [reason if _same(records) else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
-    best: State = next((state for state in order if state in states), "absent")
+    best: State = "absent"
+    for state in reversed(ORDER):
+        best = state if state in states else best
     return Outcome(best, states.count("ok"), len(states), reasons)
 
 
