@@ -107,7 +107,22 @@ def compact(svg: str) -> str:
     svg = re.sub(r'\b(d|x|y|transform)="([^"]*)"', _rounded, svg)
     svg = re.sub(r' transform="rotate\(-0 [^"]*\)"', "", svg)
     svg = re.sub(r' id="[A-Za-z0-9.]+_\d+"', "", svg)
-    return re.sub(r">\s*\n\s*<", "><", svg)
+    svg = re.sub(r">\s*\n\s*<", "><", svg)
+    svg = re.sub(r'(?<=style=")[^"]*', lambda style: style[0].replace("; ", ";").replace(": ", ":"), svg)
+    svg = re.sub(r"<g((?: clip-path=\"[^\"]*\")?)>((?:<use [^>]*/>)+)</g>", _with_one_style, svg)
+    families = re.findall(r"font-family:[^;\"]*", svg)
+    if len(set(families)) == 1:
+        svg = svg.replace(f"{families[0]};", "").replace("</style>", f"text{{{families[0]}}}</style>", 1)
+    return svg
+
+
+def _with_one_style(match: re.Match[str]) -> str:
+    """Put the style that all markers of a line share on their group."""
+    styles = set(re.findall(r' style="[^"]*"', match[2]))
+    if len(styles) != 1 or match[2].count(" style=") != match[2].count("<use "):
+        return match[0]
+    style = styles.pop()
+    return f"<g{match[1]}{style}>{match[2].replace(style, '')}</g>"
 
 
 def _rounded(match: re.Match[str]) -> str:

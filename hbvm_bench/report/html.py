@@ -1,17 +1,21 @@
 """The report as one self-contained page: no request leaves it."""
 
 import math
+import re
+from collections.abc import Sequence
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hbvm_bench.metrics import Metric
+from hbvm_bench.report import pack
 from hbvm_bench.report.canvas import Picture, inline_svg
 from hbvm_bench.report.content import Content
 from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.table import Cell, Row, seconds
 
+FEW = 3  # problems whose summaries all stand at the top
 DIGITS = 16  # of a double: a bar of this many digits is full
 
 # Paths of the markers in a box of 12 by 12, as the figures draw them.
@@ -42,7 +46,7 @@ def page(content: Content) -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    colours = {look.light: f"--m{look.number}" for look in content.looks.values()}
+    colours = {look.light: f"--m{look.number}" for look in _looks(content)}
     environment.globals |= {
         "figure": lambda picture: figure(picture, colours),
         "chip": chip,
@@ -50,11 +54,19 @@ def page(content: Content) -> str:
         "bar": bar,
         "spread": spread,
         "sort_key": sort_key,
+        "key": key,
     }
+    libraries = list(dict.fromkeys(record.library for record in content.records))
     return environment.get_template("report.html.j2").render(
         c=content,
+        few=len(content.sections) <= FEW,
+        keys=_looks(content),
+        symbols=symbols(_looks(content)),
+        libraries=libraries,
         css=Markup(_text("style.css")),
-        script=Markup(_text("script.js")),
+        script=Markup(_text("script.js") + _text("table.js") + _text("explore.js")),
+        data=Markup(pack.page_data(content)),
+        library=Markup(pack.library()),
         light=_variables(
             {v: k for k, v in NEUTRALS.items()}, {f"--m{x.number}": x.light for x in _looks(content)}
         ),
@@ -69,11 +81,32 @@ def figure(picture: Picture, colours: dict[str, str]) -> Markup:
 
 def chip(look: Look) -> Markup:
     """Return the marker of a case in its colour."""
-    shape = MARKERS.get(look.marker, MARKERS["*"])
+    use = f'<use href="#k{_marker(look)}"/>'
+    return Markup(f'<svg class="chip k{look.number}" aria-hidden="true">{use}</svg>')
+
+
+def key(look: Look) -> Markup:
+    """Return the line and marker of a case, for the legend of an interactive figure."""
+    dashes = f' stroke-dasharray="{" ".join(f"{length:g}" for length in look.dash)}"' if look.dash else ""
     return Markup(
-        f'<svg class="chip" viewBox="0 0 12 12" width="12" height="12" aria-hidden="true" '
-        f'style="fill:var(--m{int(look.number)})">{shape}</svg>'
+        f'<svg class="line k{look.number}" viewBox="0 0 40 12" width="40" height="12" aria-hidden="true">'
+        f'<path d="M0 6h40" fill="none" stroke="currentColor" stroke-width="2"{dashes}/>'
+        f'<use href="#k{_marker(look)}" x="14" width="12" height="12"/></svg>'
     )
+
+
+def symbols(looks: Sequence[Look]) -> Markup:
+    """Return the markers once, for all rows, and the colours of the cases."""
+    shapes = "".join(
+        f'<symbol id="k{number}" viewBox="0 0 12 12">{shape}</symbol>'
+        for number, shape in enumerate(MARKERS.values())
+    )
+    colours = "".join(f".k{look.number}{{color:var(--m{look.number})}}" for look in looks)
+    return Markup(f'<style>{colours}</style><svg class="symbols" aria-hidden="true">{shapes}</svg>')
+
+
+def _marker(look: Look) -> int:
+    return list(MARKERS).index(look.marker if look.marker in MARKERS else "*")
 
 
 def call(text: str) -> Markup:
@@ -106,9 +139,11 @@ def spread(metric: Metric, row: Row) -> str:
     return ""
 
 
-def sort_key(cell: Cell | None) -> str:
-    """Return what the page's script sorts by: a number, or nothing for last."""
-    return "" if cell is None or math.isinf(cell.sort) else repr(cell.sort)
+def sort_key(cell: Cell | None) -> Markup:
+    """Return the attribute that the page's script sorts by, where the text itself is not the number."""
+    if cell is None or math.isinf(cell.sort) or re.fullmatch(r"[\d.e+-]+", cell.text):
+        return Markup("")
+    return Markup(' data-v="{}"').format(repr(cell.sort))
 
 
 def _looks(content: Content) -> list[Look]:

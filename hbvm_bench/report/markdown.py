@@ -8,7 +8,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from hbvm_bench.table import Row, seconds
 
 if TYPE_CHECKING:  # so that the escapes below cost no plotting library
-    from hbvm_bench.report.content import Content, Section
+    from collections.abc import Sequence
+
+    from hbvm_bench.metrics import Metric
+    from hbvm_bench.report.content import Content
 
 
 def markdown(content: "Content") -> str:
@@ -45,10 +48,10 @@ def code(text: object) -> str:
     return f"{fence}{pad}{escaped}{pad}{fence}"
 
 
-def row_cells(section: "Section", row: Row) -> list[str]:
+def row_cells(columns: "Sequence[Metric]", row: Row) -> list[str]:
     """Return the cells of a row: void ones in brackets, times with their quartiles."""
     made = []
-    for metric in section.columns:
+    for metric in columns:
         cell = row.cells.get(metric.key)
         text = "–" if cell is None else f"({cell.text})" if cell.void else cell.text
         if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:

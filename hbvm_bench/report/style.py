@@ -81,26 +81,26 @@ class Look:
 
 
 def looks(records: Sequence[Record]) -> dict[str, Look]:
-    """Return the look of every case by its id."""
-    seen: dict[tuple[str, str], int] = {}
+    """Return the look of every case by its id; a method looks the same on every problem."""
+    seen: dict[str, int] = {}
     taken: set[str] = set()
     number = numbers(records)
-    made: dict[str, Look] = {}
+    by_method: dict[str, Look] = {}
     for record in records:
+        if record.case.method in by_method:
+            continue
         name = method_name(record)
         light, dark = base_colours(name)
         # settings of one colour are told apart by shade and dash, whatever their method's name
-        index = seen.get((record.case.problem, light), 0)
-        seen[record.case.problem, light] = index + 1
-        shade = _unique(_shade(light, index, towards=0.0), taken)
-        made[record.id] = Look(
+        index = seen[light] = seen.get(light, -1) + 1
+        by_method[record.case.method] = Look(
             number=number[record.id],
-            light=shade,
+            light=_unique(_shade(light, index, towards=0.0), taken),
             dark=_shade(dark, index, towards=1.0),
             dash=DASHES[index % len(DASHES)],
             marker=MARKERS.get(name, "*"),
         )
-    return made
+    return {record.id: by_method[record.case.method] for record in records}
 
 
 def base_colours(name: str) -> tuple[str, str]:

@@ -90,7 +90,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         for body in (0, 1):
             _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
             _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
-            curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::2]))
+            curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::4]))
         axes.set_xlim(-3.4, 3.4)
         axes.set_ylim(-3.4, 3.4)
         axes.set_aspect("equal")

@@ -133,6 +133,19 @@ def settings_count(records: Sequence[Record]) -> list[tuple[str, str, dict[str, 
     return [(name, library, kinds) for (name, library), kinds in counted.items()]
 
 
+def excluded(records: Sequence[Record]) -> list[str]:
+    """Return which cases take no part in any ranking, and why."""
+    said = []
+    for record in records:
+        group = group_of(record)
+        if group == "on":
+            continue
+        why = record.result.violation if group == "off" else status_of(record)
+        reason = f": {record.result.reason}" if group == "ended" and record.result.reason else ""
+        said.append(f"{record.case.method} on {record.case.problem}: {why}{reason}".rstrip(". ") + ".")
+    return said
+
+
 def _best(title: str, records: Sequence[Record], key: str) -> str:
     unit = METRICS[key].unit
     parts = []

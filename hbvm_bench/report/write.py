@@ -1,8 +1,10 @@
 """Write a report: everything is made first, then every file is put in place whole."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from hbvm_bench.report.content import gather
+from hbvm_bench.report import pack
+from hbvm_bench.report.content import Content, gather
 from hbvm_bench.report.html import page
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store import Store, atomic, ensure_writable
@@ -11,12 +13,12 @@ from problems.errors import InputError
 FIGURES = "figures"
 
 
-def write_report(store: Store, directory: Path) -> list[Path]:
-    """Write ``report.md``, ``index.html`` and ``figures/`` of a run.
+def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]:
+    """Write ``report.md``, ``index.html``, ``figures/`` and ``data/`` of one run, or of several together.
 
     Parameters
     ----------
-    store : Store
+    stores : Store or sequence of Store
         With at least one finished case.
     directory : Path
         Made if missing.
@@ -29,24 +31,31 @@ def write_report(store: Store, directory: Path) -> list[Path]:
     Raises
     ------
     problems.errors.InputError
-        If the run has no finished case, or the directory cannot be written.
+        If no run has a finished case, or the directory cannot be written.
     """
-    index = store.index()
-    if not store.records():
+    stores = [stores] if isinstance(stores, Store) else list(stores)
+    if not any(store.records() for store in stores):
+        planned = sum(len(store.index().ids) for store in stores)
         raise InputError(
-            f"none of the {len(index.ids)} cases of the run in {str(store.directory)!r} has finished; "
-            f"run: {index.command}."
+            f"none of the {planned} cases of the run in {str(stores[0].directory)!r} has finished; "
+            f"run: {stores[0].index().command}."
         )
-    # everything is made before anything is written
-    content = gather(store)
-    documents = {"report.md": markdown(content), "index.html": page(content)}
-    files: dict[Path, bytes] = {}
-    for picture in (picture for section in content.sections for picture in section.pictures):
-        files[directory / FIGURES / f"{picture.key}.svg"] = picture.svg.encode()
-        files[directory / FIGURES / f"{picture.key}.png"] = picture.png
-    files |= {directory / name: text.encode() for name, text in documents.items()}
-    ensure_writable(directory / FIGURES)
-    for path, data in files.items():
-        with atomic(path) as temporary:
+    made = rendered(gather(stores))
+    for folder in {(directory / name).parent for name in made}:
+        ensure_writable(folder)
+    for name, data in made.items():
+        with atomic(directory / name) as temporary:
             temporary.write_bytes(data)
-    return [directory / name for name in documents]
+    return [directory / "report.md", directory / "index.html"]
+
+
+def rendered(content: Content) -> dict[str, bytes]:
+    """Return all files of a report by their path in its directory."""
+    made: dict[str, bytes] = {}
+    for picture in (picture for section in content.sections for picture in section.pictures):
+        made[f"{FIGURES}/{picture.key}.svg"] = picture.svg.encode()
+        made[f"{FIGURES}/{picture.key}.png"] = picture.png
+    made |= pack.files(content)
+    made["report.md"] = markdown(content).encode()
+    made["index.html"] = page(content).encode()
+    return made

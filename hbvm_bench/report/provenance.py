@@ -1,0 +1,44 @@
+"""What was measured with: days, versions, machines, and what the machine code is built for."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from hbvm_bench.records import Record
+
+# Machine code of the libraries: what the times were made with.
+BUILT = {
+    "hbvm-bench": "compiled on this machine by numba",
+    "heyoka": "compiled on this machine by LLVM",
+    "diffrax": "compiled on this machine by XLA",
+    "rebound": "generic wheel",
+    "scipy": "generic wheel; vector field compiled on this machine by numba",
+}
+
+
+def days(records: Sequence[Record]) -> str:
+    """Return the days on which the cases ran: ``"2026-11-21"``, ``"2026-11-20 to 2026-11-21"``."""
+    found = sorted({datetime.fromisoformat(r.finished).date().isoformat() for r in records if r.finished})
+    return "" if not found else found[0] if found[0] == found[-1] else f"{found[0]} to {found[-1]}"
+
+
+def versions(records: Sequence[Record]) -> list[tuple[str, str]]:
+    """Return the libraries with their versions and how their machine code came about."""
+    found: dict[str, set[str]] = {}
+    for record in records:
+        for name, number in record.versions.items():
+            found.setdefault(name, set()).add(number)
+    return [
+        (name, ", ".join(sorted(numbers)) + (f" ({BUILT[name.lower()]})" if name.lower() in BUILT else ""))
+        for name, numbers in sorted(found.items())
+    ]
+
+
+def machines(records: Sequence[Record]) -> list[tuple[str, str]]:
+    """Return what is known of the machine; values that differ between cases stand side by side."""
+    found: dict[str, list[str]] = {}
+    for record in records:
+        for name, value in sorted(record.machine.items()):
+            values = found.setdefault(name.replace("_", " "), [])
+            if str(value) not in values:
+                values.append(str(value))
+    return [(name, " | ".join(sorted(values))) for name, values in sorted(found.items())]

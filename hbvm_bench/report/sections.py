@@ -1,0 +1,195 @@
+"""One problem's part of a report: sentences, rows and figures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench import reference as references
+from hbvm_bench.campaign import Case
+from hbvm_bench.identity import make_problem
+from hbvm_bench.quantities import PLANETOID_Z
+from hbvm_bench.records import Record
+from hbvm_bench.reference import Reference
+from hbvm_bench.report import figures, views, words
+from hbvm_bench.report.canvas import Picture, drawing
+from hbvm_bench.report.figures import Drawn, OverTime
+from hbvm_bench.report.style import Look
+from hbvm_bench.store import Store
+from hbvm_bench.table import GROUPS, Row, rows
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One problem's part of the report.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was integrated.
+    summary, shortcomings : list of str
+        Sentences.
+    groups : list of (str, list of Row)
+        Its rows, each group with its title.
+    missing : list of Case
+        Cases that have not run.
+    pictures : list of Picture
+        In order.
+    reference : Reference or None
+        The trusted solution.
+    truth : list of (str, str)
+        Its values that the table's readers want beside it.
+    """
+
+    problem: Problem
+    summary: list[str]
+    shortcomings: list[str]
+    groups: list[tuple[str, list[Row]]]
+    missing: list[Case]
+    pictures: list[Picture]
+    reference: Reference | None
+    truth: list[tuple[str, str]]
+
+
+def section(
+    text: str,
+    found: Sequence[tuple[Record, Store]],
+    look: dict[str, Look],
+    missing: list[Case],
+    number: int,
+) -> Section:
+    """Gather what the report says about one problem.
+
+    Parameters
+    ----------
+    text : str
+        The problem as it prints.
+    found : sequence of (Record, Store)
+        Its cases and where their series are.
+    look : dict of Look
+        By case id.
+    missing : list of Case
+        Those that have no result yet.
+    number : int
+        Of the section, from 1.
+    """
+    problem = make_problem(text)
+    records = [record for record, _ in found]
+    known = references.find(problem)
+    cases = [Drawn(record, look[record.id], store.series(record.id)) for record, store in found]
+    drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
+    table = rows(records)
+    return Section(
+        problem=problem,
+        summary=words.summary(records),
+        shortcomings=words.shortcomings(records),
+        groups=[
+            (title, [row for row in table if row.group == key])
+            for key, title in GROUPS.items()
+            if any(row.group == key for row in table)
+        ],
+        missing=missing,
+        pictures=_pictures(problem, drawn, known, number),
+        reference=known,
+        truth=_truth(problem, known),
+    )
+
+
+def _pictures(
+    problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int
+) -> list[Picture]:
+    with drawing():
+        made = [figures.work_precision(cases)]
+        made += [figures.over_time(cases, what) for what in OVER_TIME]
+        made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
+        made.append(views.step_sizes(cases))
+    suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
+    return [replace(picture, key=picture.key + suffix) for picture in made if picture is not None]
+
+
+OVER_TIME = (
+    OverTime(
+        key="energy",
+        title="Energy error over time",
+        caption="Relative error of the energy. A line is the largest value in each of "
+        f"{figures.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
+        label="|H − H₀| / |H₀|",
+        get=lambda series: _pair(series, "t", "error.energy"),
+        low=-17,
+        high=2,
+    ),
+    OverTime(
+        key="position",
+        title="Position error over time",
+        caption="Largest distance of a body from the stored 128-bit reference, at the reference's times.",
+        label="position error",
+        get=lambda series: _pair(series, "position_t", "position"),
+        low=-17,
+        high=4,
+        joined=False,
+    ),
+    OverTime(
+        key="angular-momentum",
+        title="Angular momentum error over time",
+        caption="2-norm of the error of the angular momentum vector, relative to its length.",
+        label="|L − L₀| / |L₀|",
+        get=lambda series: _pair(series, "t", "error.angular_momentum"),
+        low=-17,
+        high=2,
+    ),
+    OverTime(
+        key="symmetry",
+        title="Off-axis distance over time",
+        caption="What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
+        "what is smaller than the lowest power is drawn just above it.",
+        label="distance from the axis",
+        get=lambda series: _guard(series),
+        low=-24,
+        high=4,
+        zero=True,
+    ),
+    OverTime(
+        key="distance",
+        title="Largest distance from the origin over time",
+        caption="Shows what escaped, and when.",
+        label="largest distance",
+        get=lambda series: _pair(series, "t", "distance"),
+        low=0,
+        high=5,
+    ),
+)
+
+
+def _pair(series: dict[str, Array], t: str, values: str) -> tuple[Array, Array] | None:
+    return (series[t], series[values]) if values in series and series[t].size else None
+
+
+def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
+    names = [name for name in series if name.startswith("guard.")]
+    return (series["t"], series[names[0]]) if names else None
+
+
+def _truth(problem: Problem, known: Reference | None) -> list[tuple[str, str]]:
+    if known is None:
+        return []
+    made = known.provenance
+    text = f"{made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"
+    floor = problem.errors(known.high, known.t)
+    least = ", ".join(
+        f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}"
+        for name in ("energy", "angular_momentum")
+        if name in floor
+    )
+    values = [("Reference", text)]
+    if least:
+        values.append(
+            ("Errors of the reference itself once rounded to doubles, the least a run can show", least)
+        )
+    if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
+        z = known.high[-1, PLANETOID_Z]
+        values.insert(0, (f"Reference value of z at t = {problem.t_end:g}", f"{z:.16g}"))
+    return values
