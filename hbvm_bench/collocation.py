@@ -26,7 +26,7 @@ from problems.system import System
 Array = NDArray[np.float64]
 
 STAGES = 16
-DECAY = 1e-16  # of the last Legendre coefficient; its square is the size of the error
+DECAY = 1e-17  # of the last Legendre coefficient; its square is the size of the error
 MOST_ITERATIONS = 200
 
 
@@ -74,7 +74,7 @@ def decimals(states: Array) -> list[list[Any]]:
 
 @cache
 def _tables(s: int) -> tuple[Array, Array, Array, Array]:
-    """Return nodes and weights (s, 2), coefficients (s, s, 2), and b_l P_j(c_l) in double."""
+    """Return nodes and weights (s, 2), coefficients (s, s, 2), and some b_l P_j(c_l)."""
     with mpmath.workdps(60):
         roots = [_root(s, x) for x in np.polynomial.legendre.leggauss(s)[0].tolist()]
         slopes = [_slope(s, x) for x in roots]
@@ -86,7 +86,8 @@ def _tables(s: int) -> tuple[Array, Array, Array, Array]:
             [b[m] * mpmath.fsum(i * v for i, v in zip(integral[l], value[m], strict=True)) for m in range(s)]
             for l in range(s)
         ]
-        projection = np.array([[float(b[l] * value[l][j]) for l in range(s)] for j in range(s)])
+        # Of the first Legendre coefficient and the last two.
+        projection = np.array([[_pair(b[l] * value[l][j]) for l in range(s)] for j in (0, s - 2, s - 1)])
         nodes = np.array([_pair(x) for x in c])
         matrix = np.array([[_pair(x) for x in line] for line in a])
         return nodes, np.array([_pair(x) for x in b]), matrix, projection
@@ -141,7 +142,6 @@ def _compiled(field: Any) -> Any:
         slope = np.zeros((s, dim, 2))
         new = np.zeros((s, dim, 2))
         stage = np.zeros((dim, 2))
-        gamma = np.zeros((s, dim))
         direction = 1.0 if end > t else -1.0
         if h == 0.0:
             h = direction * 1e-3 * abs(end - t)
@@ -188,7 +188,7 @@ def _compiled(field: Any) -> Any:
                     return 1, h
                 h = 0.25 * step
                 continue
-            ratio = _decay(slope, legendre, gamma)
+            ratio = _decay(slope, legendre)
             factor = 0.9 * (decay / max(ratio, 1e-300)) ** (1.0 / (s - 1))
             factor = min(2.0, max(0.1, factor))
             if ratio > 30.0 * decay:
@@ -211,18 +211,20 @@ def _compiled(field: Any) -> Any:
 
 
 @njit
-def _decay(slope, legendre, gamma):
-    """Return the largest of the last two Legendre coefficients relative to the largest of all."""
+def _decay(slope, legendre):
+    """Return the largest of the last two Legendre coefficients relative to the largest of the first."""
     s, dim, _ = slope.shape
     top, tail = 1e-300, 0.0
-    for j in range(s):
+    for j in range(3):
         for d in range(dim):
-            total = 0.0
+            total = number(0.0, 0.0)
             for i in range(s):
-                total += legendre[j, i] * slope[i, d, 0]
-            top = max(top, abs(total))
-            if j >= s - 2:
-                tail = max(tail, abs(total))
+                weight = number(legendre[j, i, 0], legendre[j, i, 1])
+                total = plus(total, times(weight, number(slope[i, d, 0], slope[i, d, 1])))
+            if j == 0:
+                top = max(top, abs(total.hi))
+            else:
+                tail = max(tail, abs(total.hi))
     return tail / top
 
 

@@ -14,7 +14,7 @@ from problems.problem import Problem
 LIBRARIES = ("numpy", "numba", "jax", "heyoka")
 BODIES, FORCES = "REBOUND's bodies", "REBOUND's forces"
 # Values for what a method must be given: whether it accepts a problem does not depend on them.
-_NUMBERS = {"h": 1e-3, "k": 2, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
+_NUMBERS = {"h": 1e-3, "k": 4, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
 _REQUIRED: dict[str, Any] = {**_NUMBERS, "invariants": ("energy",)}
 
 

@@ -24,9 +24,10 @@ Array = NDArray[np.float64]
 
 SMALL = 60  # unknowns
 GRID = 1000  # the bench's own grid: a reference's times are among its samples
-ROWS = 50  # at most, of small systems
-FEW_ROWS = 10  # of large ones, whose files would be large
-FEW_DIGITS = 25
+# How many states are kept at most, so that the files stay small: (unknowns up to, states).
+ROWS = ((20, 50), (SMALL, 20), (100, 10))
+FEW_ROWS = 4  # of larger systems
+FEW_DIGITS = 21  # above SMALL unknowns
 LONG_DOUBLE_TOLERANCE = "1e-20"
 
 
@@ -65,7 +66,7 @@ class Opinions:
 
 
 def times(problem: Problem, until: float | None = None) -> Array:
-    """Return at most `ROWS` + 1 (large systems: `FEW_ROWS` + 1) times of the bench's grid, up to ``until``.
+    """Return some times of the bench's grid, the start and the last one up to ``until`` among them.
 
     Raises
     ------
@@ -81,9 +82,10 @@ def times(problem: Problem, until: float | None = None) -> Array:
         count = int(part * GRID * (1 + 1e-12))
         if count == 0:
             raise InputError(f"until={until!r} comes before the first sample, {problem.t0 + span / GRID!r}.")
-    stride = -(-count // (ROWS if problem.system.dim <= SMALL else FEW_ROWS))
+    rows = next((rows for most, rows in ROWS if problem.system.dim <= most), FEW_ROWS)
+    places = np.append(np.arange(0, count, -(-count // rows)), count)
     # As the bench computes its own grid, so that the times are the same doubles.
-    return problem.t0 + span * np.arange(0, count + 1, stride) / GRID
+    return problem.t0 + span * places / GRID
 
 
 def ask(problem: Problem, at: Array) -> Opinions:
@@ -131,9 +133,9 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
     if kept < 2:
         raise InputError(
             f"two computations of {problem!r} differ by {opinions.apart[1]:.1e} already at "
-            f"t = {opinions.times[1]!r}; ask for less with until=."
+            f"t = {float(opinions.times[1])!r}; ask for less with until=."
         )
-    horizon = "the whole span" if kept == len(opinions.times) == len(times(problem)) else "this horizon"
+    horizon = "the whole span" if opinions.times[kept - 1] == problem.t_end else "this horizon"
     return ReferenceFile(
         problem=repr(problem),
         start=reference.start(problem),

@@ -33,7 +33,7 @@ def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float 
     -------
     Problem
         State: positions body by body, then momenta. Parameters ``m``, ``eps``;
-        invariants: energy, angular momentum.
+        invariants: energy, angular momentum (the linear momentum is 0 but for rounding).
 
     Raises
     ------

@@ -75,9 +75,20 @@ recomputes and compares.
 |---|---|---|
 """
 
-ENGINES = """## Engines
+ENGINES = """<!-- made by: hbvm-bench gallery docs -->
+# Engines
 
-Which library takes the vector field and which method takes the problem, and why not (`hbvm-bench engines`).
+Which library takes the vector field, how REBOUND takes the problem, and which method takes it: ✓, or the
+number of the reason why not. The table is made by code (`hbvm-bench engines --markdown`) at each problem's
+default arguments, with methods at some step or tolerance.
+
+- numpy, numba, jax, heyoka: the field is emitted to them from one traced graph, the same operations in the
+  same order. numpy and numba agree bit for bit where there are only + - * / square roots and integer powers,
+  and within 2 units in the last place of the terms where there are other functions; jax and heyoka, whose
+  compilers contract products and sums, within 8.
+- REBOUND's bodies: gravity is REBOUND's own, from masses, positions and velocities.
+- REBOUND's forces: q'' = -grad U(q) through `additional_forces`, a compiled callback; three coordinates a
+  particle, as many particles as it takes.
 
 """
 
@@ -86,11 +97,11 @@ def text(names: Sequence[str]) -> str:
     """Return the page on the given problems as Markdown."""
     loaded = {name: problems.load(name) for name in names}
     parts = [HEAD, _overview(loaded), *(_section(name, problem) for name, problem in loaded.items())]
-    return "".join([*parts, OWN, REFERENCES, _references(), "\n", ENGINES, engines.markdown(names)])
+    return "".join([*parts, OWN, REFERENCES, _references()])
 
 
 def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
-    """Write ``problems.md`` and a picture of each problem into a directory.
+    """Write ``problems.md``, ``engines.md`` and a picture of each problem into a directory.
 
     Parameters
     ----------
@@ -106,8 +117,9 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     """
     names = [name for name in problems.names() if name in pictures.PICTURES]
     directory.mkdir(parents=True, exist_ok=True)
-    written = [directory / "problems.md"]
-    written[0].write_text(text(names), encoding="utf-8")
+    written = [directory / "problems.md", directory / "engines.md"]
+    for path, page in zip(written, (text(names), ENGINES + engines.markdown(names)), strict=True):
+        path.write_text(page, encoding="utf-8")
     for name in names if with_pictures else ():
         path = directory / "problems" / f"{name}.svg"
         pictures.draw(name, path)

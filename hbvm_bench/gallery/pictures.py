@@ -39,15 +39,15 @@ class Picture:
     points: int = POINTS
 
 
-def _bodies(dimension: int, axes: tuple[int, int] = (0, 1), hidden: int = 0) -> Callable[..., None]:
+def _bodies(dimension: int, first: int = 0, last: int | None = None) -> Callable[..., None]:
     def draw(ax: Any, problem: Problem, t: Array, y: Array) -> None:
         n = (problem.system.dof or 0) // dimension
-        for i in range(hidden, n):
-            x, z = (y[:, dimension * i + c] for c in axes)
+        for i in range(n)[first:last]:
+            x, z = y[:, dimension * i], y[:, dimension * i + 1]
             color = COLORS[i % len(COLORS)]
             ax.plot(x, z, lw=0.8, color=color)
             ax.plot(x[0], z[0], "o", ms=4, color=color)
-        ax.set(xlabel="xyz"[axes[0]], ylabel="xyz"[axes[1]], aspect="equal")
+        ax.set(xlabel="x", ylabel="y", aspect="equal")
 
     return draw
 
@@ -68,9 +68,14 @@ def _time(parts: tuple[tuple[int, str], ...]) -> Callable[..., None]:
         for (part, label), color in zip(parts, COLORS, strict=False):
             ax.plot(t, y[:, part], lw=0.9, color=color, label=label)
         ax.set(xlabel="t")
-        ax.legend(frameon=False, loc="upper right", ncols=len(parts))
+        _legend(ax, len(parts))
 
     return draw
+
+
+def _legend(ax: Any, columns: int) -> None:
+    """Put the legend above the axes, where no curve is."""
+    ax.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.0)
 
 
 def _lattice(ax: Any, problem: Problem, t: Array, y: Array) -> None:
@@ -79,7 +84,7 @@ def _lattice(ax: Any, problem: Problem, t: Array, y: Array) -> None:
     ax.pcolormesh(
         t, np.arange(values.shape[1]), values.T, cmap="RdBu_r", vmin=-size, vmax=size, rasterized=True
     )
-    ax.set(xlabel="t", ylabel="mass")
+    ax.set(xlabel="t", ylabel="number along the chain")
 
 
 def _moving_lattice(ax: Any, problem: Problem, t: Array, y: Array) -> None:
@@ -96,7 +101,9 @@ def _phase(ax: Any, problem: Problem, t: Array, y: Array) -> None:
     here = problem.invariants(problem.y0)["energy"][0]
     low = level.min()
     step = max((here - low) / 3, 1e-9)
-    ax.contour(q, p, level, levels=low + step * np.arange(0.3, 8.0), colors=GRID, linewidths=0.7)
+    ax.contour(
+        q, p, level, levels=low + step * np.arange(0.3, 8.0), colors=GRID, linewidths=0.7, linestyles="-"
+    )
     ax.plot(y[:, 0], y[:, 1], lw=1.2, color=COLORS[0])
     ax.set(xlabel="q", ylabel="p")
 
@@ -115,7 +122,20 @@ def _sitnikov(ax: Any, problem: Problem, t: Array, y: Array) -> None:
         t, np.hypot(y[:, 0] - y[:, 3], y[:, 1] - y[:, 4]), lw=0.7, color=COLORS[1], label="primaries apart"
     )
     ax.set(xlabel="t")
-    ax.legend(frameon=False, loc="upper right", fontsize=7)
+    _legend(ax, 2)
+
+
+def _pythagorean(ax: Any, problem: Problem, t: Array, y: Array) -> None:
+    _bodies(2)(ax, problem, t, y)
+    ax.set(xlim=(-6.0, 6.0), ylim=(-6.0, 6.0))  # the escape at the end leaves the picture
+
+
+def _planets(ax: Any, problem: Problem, t: Array, y: Array) -> None:
+    _bodies(3, 5)(ax, problem, t, y)
+    ax.set_xlim(-35.0, 75.0)
+    inner = ax.inset_axes((0.66, 0.28, 0.34, 0.5))
+    _bodies(3, 1, 5)(inner, problem, t, y[t <= 1.9])  # a year of Mars
+    inner.set(xlabel="", ylabel="", title="Mercury to Mars")
 
 
 def _sphere(ax: Any, problem: Problem, t: Array, y: Array) -> None:
@@ -136,17 +156,17 @@ PICTURES = {
     "kepler": Picture(_plane(), 6.5, 600),
     "lennard_jones": Picture(_bodies(2), 0.02, 800),
     "lotka_volterra": Picture(_time(((0, "y₁"), (1, "y₂"), (2, "y₃"))), 20.0, 500),
-    "morse": Picture(_phase, 20.0, 600),
+    "morse": Picture(_phase, 8.0, 600),
     "nonlinear_wave": Picture(_lattice, 30.0, 300),
-    "outer_solar_system": Picture(_bodies(3, hidden=1), 260.0, 2500),
-    "pendulum": Picture(_phase, 40.0, 600),
+    "outer_solar_system": Picture(_bodies(3, 1), 260.0, 2500),
+    "pendulum": Picture(_phase, 11.0, 600),
     "penning_trap": Picture(_plane(labels=("x", "y")), 80.0, 3000),
-    "period_annulus": Picture(_phase, 60.0, 1200),
-    "pythagorean": Picture(_bodies(2), 66.0, 6000),
+    "period_annulus": Picture(_phase, 30.0, 4000),
+    "pythagorean": Picture(_pythagorean, 66.0, 6000),
     "rigid_body": Picture(_sphere, 40.0, 600),
     "sine_gordon": Picture(_lattice, 40.0, 300),
     "sitnikov": Picture(_sitnikov, 200.0, 2000),
-    "solar_system": Picture(_bodies(3, hidden=1), 12.0, 4000),
+    "solar_system": Picture(_planets, 165.0, 6000),
     "spring_pendulum": Picture(_plane(labels=("x", "y")), 40.0, 2000),
     "stiff_chain": Picture(_time(((3, "x₄"), (4, "x₅"), (5, "x₆"))), 200.0, 3000),
     "toda": Picture(_moving_lattice, 40.0, 300),

@@ -1,0 +1,138 @@
+"""docs/compile_times.md: how long it takes until the field of a large system runs."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from hbvm_bench import machine
+from hbvm_bench.identity import make_problem
+from integrators.kernel import field
+from problems import emit
+from problems.problem import Problem
+
+CASES = (
+    "cluster(n=10)",
+    "cluster(n=50)",
+    "cluster(n=200)",
+    "outer_solar_system()",
+    "solar_system()",
+    "lennard_jones(rings=5)",
+    "fput(n=1000)",
+    "toda(n=1000)",
+    "sine_gordon(n=1000)",
+    "nonlinear_wave(n=1000)",
+)
+LANES = 8
+
+HEAD = """<!-- made by: hbvm-bench gallery docs --compile-times -->
+# From a Hamiltonian to machine code
+
+Large systems are declared with `m.sum(term, index)`: the term is traced once and stays a loop, so that the
+code grows with the term and not with the number of bodies. Processor seconds of one process on {processor}
+({python}), nothing cached, but numba and its first function loaded.
+
+- trace: running the function on symbols, and differentiating it;
+- emit: writing the source, `lines` long;
+- compile: by numba, for one state (as SciPy's solvers call it), and of what HBVM calls on {lanes}
+  stages at once (the force of a separable system, otherwise the field).
+
+| problem | unknowns | trace (ms) | emit (ms) | lines | compile, one state (s) | compile, {lanes} stages (s) |
+|---|--:|--:|--:|--:|--:|--:|
+"""
+
+
+@dataclass(frozen=True)
+class Times:
+    """What one system took, in processor seconds.
+
+    Attributes
+    ----------
+    problem : str
+        As it prints.
+    unknowns : int
+        Length of its state.
+    trace, emit : float
+        Seconds.
+    lines : int
+        Of the emitted source.
+    scalar, lanes : float
+        Seconds of numba for one state, and for `LANES` stages at once.
+    """
+
+    problem: str
+    unknowns: int
+    trace: float
+    emit: float
+    lines: int
+    scalar: float
+    lanes: float
+
+
+def measure(text: str) -> Times:
+    """Trace, emit and compile the field of a problem from nothing.
+
+    Parameters
+    ----------
+    text : str
+        The problem as it prints.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the text names no problem.
+    """
+    traced, problem = _seconds(lambda: _traced(text))
+    emitted, source = _seconds(lambda: emit.source(problem.system, "field", "numba"))
+    return Times(
+        problem=repr(problem),
+        unknowns=problem.system.dim,
+        trace=traced,
+        emit=emitted,
+        lines=source.text.count("\n"),
+        scalar=_seconds(lambda: _compiled(problem))[0],
+        lanes=_seconds(lambda: _on_lanes(problem))[0],
+    )
+
+
+def page() -> str:
+    """Measure `CASES` and return the page; it takes half a minute."""
+    for text in ("pendulum()", "cluster(n=4)"):
+        measure(text)  # what is done only once in a process is not the systems'
+    rows = [measure(text) for text in CASES]
+    here = machine.describe()
+    head = HEAD.format(processor=here["processor"], python=here["python"], lanes=LANES)
+    return head + "".join(
+        f"| `{row.problem}` | {row.unknowns} | {1e3 * row.trace:.1f} | {1e3 * row.emit:.1f} | {row.lines} | "
+        f"{row.scalar:.2f} | {row.lanes:.2f} |\n"
+        for row in rows
+    )
+
+
+def _seconds(action: Callable[[], Any]) -> tuple[float, Any]:
+    started = time.process_time()
+    result = action()
+    return time.process_time() - started, result
+
+
+def _traced(text: str) -> Problem:
+    problem = make_problem(text)
+    problem.system.function("field")
+    return problem
+
+
+def _compiled(problem: Problem) -> None:
+    import numba
+
+    vector = numba.types.Array(numba.types.float64, 1, "C")
+    kinds = (numba.types.float64, vector, vector, vector)
+    numba.njit(kinds, error_model="numpy")(_function(problem, "field"))
+
+
+def _on_lanes(problem: Problem) -> None:
+    what = "force" if problem.system.separable else "field"
+    field.build(_function(problem, what), LANES)
+
+
+def _function(problem: Problem, what: str) -> Any:
+    return emit.numba(problem.system, what).py_func
