@@ -4,6 +4,7 @@
 (``integrators.IAS15``, ...) are attributes, imported when first used.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from integrators import registry
@@ -11,17 +12,23 @@ from integrators.integrate import Solution, integrate
 from integrators.protocol import MethodBase, Samples, Stats, Status
 
 if TYPE_CHECKING:
+    from integrators.events import Event as Event
+    from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
     from integrators.hbvm import HBVM as HBVM
 
 __all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", "registry"]
 
+_LATER = {"Event": "integrators.events", "section": "integrators.events"}  # imported when first used
+
 
 def __getattr__(name: str) -> Any:
+    if name in _LATER:
+        return getattr(import_module(_LATER[name]), name)
     if name.startswith("_") or name not in registry.names():
         raise AttributeError(f"module 'integrators' has no attribute {name!r}")
     return registry.get(name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *registry.names()})
+    return sorted({*globals(), *_LATER, *registry.names()})

@@ -1,13 +1,19 @@
 """Integrate a problem with a method: the one function most users need."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.protocol import Array, MethodBase, Stats, Status
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_times
 from problems.errors import InputError
 from problems.problem import Problem
+
+if TYPE_CHECKING:
+    from integrators.events import Event, Occurrences
+    from integrators.events.search import Found
 
 DEFAULT_SAMPLES = 1001
 
@@ -36,6 +42,8 @@ class Solution:
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
         What was integrated, and how.
+    events : dict of str to Occurrences
+        Times, states and directions of the events that were asked for, by name.
     """
 
     t: Array
@@ -48,6 +56,7 @@ class Solution:
     from_cache: bool | None
     problem: Problem
     method: MethodBase
+    events: "Mapping[str, Occurrences]" = field(default_factory=dict)
 
     @property
     def v(self) -> Array | None:
@@ -68,7 +77,11 @@ class Solution:
 
 
 def integrate(
-    problem: Problem, method: MethodBase, times: ArrayLike | None = None, sample: str | None = None
+    problem: Problem,
+    method: MethodBase,
+    times: ArrayLike | None = None,
+    sample: str | None = None,
+    events: "Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]]" = (),
 ) -> Solution:
     """Integrate ``problem`` with ``method`` and return the states at ``times``.
 
@@ -83,6 +96,11 @@ def integrate(
         the problem's own grid, or else 1001 equidistant times to ``t_end``.
     sample : {"side", "steps", "land", "dense"}, optional
         How states between the method's steps are made; see `Stepper.advance`.
+    events : Event or callable, or a sequence of them, optional
+        Functions of time and state, and what happens where they vanish: see
+        `integrators.events.Event`. They change nothing of the steps and samples, but a
+        terminal event ends them. Finding them takes every step once more (twice where
+        the steps vary); ``stats.extra["event_search"]`` counts that work.
 
     Returns
     -------
@@ -91,24 +109,30 @@ def integrate(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or for times, samplings and
+        If the method does not accept the problem, or for times, samplings, events and
         initial states that cannot be used.
     """
-    if not isinstance(problem, Problem):
-        raise InputError(
-            f"problem must be a Problem, not {problem!r}; make one with problems.load or problems.Problem."
-        )
-    if not isinstance(method, MethodBase):
-        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {method!r}.")
-    reason = method.accepts(problem)
-    if reason is not None:
-        raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
-
+    check(problem, method)
     program = method.compile(problem.system)
+    grid = _grid(problem, times)
+    found = None
+    if not isinstance(events, Sequence) or events:
+        from integrators.events.event import named
+        from integrators.events.search import search
+
+        if sample == "land":
+            raise InputError(
+                "events are those of the method's own steps, which sample='land' changes; use 'side'."
+            )
+        found = search(problem, method, program, named(events), float(check_times(grid, problem.t0)[-1]))
+        if found.terminal:
+            grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
     stepper = program.start(problem.y0, problem.par, problem.t0)
-    samples = stepper.advance(_grid(problem, times), sample=sample)
+    samples = Samples(grid, np.empty((0, problem.system.dim)), Status.FINISHED)
+    if grid.size:
+        samples = stepper.advance(grid, sample=sample)
     finished = samples.status is Status.FINISHED
-    return Solution(
+    solution = Solution(
         t=samples.t,
         y=samples.y,
         status=samples.status,
@@ -120,6 +144,31 @@ def integrate(
         problem=problem,
         method=method,
     )
+    return solution if found is None else _with_events(solution, found)
+
+
+def check(problem: Problem, method: MethodBase) -> None:
+    """Raise `problems.errors.InputError` unless ``method`` can integrate ``problem``."""
+    if not isinstance(problem, Problem):
+        raise InputError(
+            f"problem must be a Problem, not {problem!r}; make one with problems.load or problems.Problem."
+        )
+    if not isinstance(method, MethodBase):
+        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {method!r}.")
+    reason = method.accepts(problem)
+    if reason is not None:
+        raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
+
+
+def _with_events(solution: Solution, found: "Found") -> Solution:
+    """Return the solution with what a search for events has found."""
+    work = {name: getattr(found.stats, name) for name in ("steps", "evaluations", "iterations")}
+    stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": work})
+    solution = replace(solution, stats=stats, events=found.events)
+    if found.status is Status.FINISHED or solution.status.failed:
+        return solution
+    stop = found.t_stop if found.terminal else solution.t_stop
+    return replace(solution, status=found.status, reason=found.reason, t_stop=stop)
 
 
 def _grid(problem: Problem, times: ArrayLike | None) -> Array:

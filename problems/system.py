@@ -121,6 +121,25 @@ class System:
     def _scalar(self, function: Callable[..., Any], what: str) -> Node:
         return arguments.scalar(self._call(function, what), graph=self._graph, function=function, what=what)
 
+    def trace(self, function: Callable[..., Any], what: str) -> Function:
+        """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
+
+        Parameters
+        ----------
+        function : callable
+            Returns one number; its arguments are among ``t, q, p, y, par, m``.
+        what : str
+            What it is, for messages.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For anything that cannot be traced, with the line.
+        """
+        graph = Graph(self.dof)
+        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
+        return functions.plain(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
+
     @property
     def separable(self) -> bool:
         """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""
@@ -230,6 +249,13 @@ class System:
                 raise InputError(f"parameter {key!r} of {self.name} needs {size} numbers, not {value!r}.")
             par[offset : offset + (size or 1)] = value
         return par
+
+    def unpack(self, par: NDArray[np.float64]) -> dict[str, float | NDArray[np.float64]]:
+        """Return the parameters by name from the flat vector that `pack` makes; sequences as arrays."""
+        return {
+            key: float(par[offset]) if size is None else par[offset : offset + size].copy()
+            for key, (offset, size) in self._layout.items()
+        }
 
     @cached_property
     def fingerprint(self) -> str:

@@ -15,6 +15,7 @@ from problems.emit.plan import SMALL, make_plan
 from problems.emit.scalar import numba_text
 from problems.emit.symbolic import heyoka_text
 from problems.errors import MissingLibraryError, unknown
+from problems.functions import Function
 from problems.hamiltonian import System
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
@@ -109,10 +110,20 @@ def numpy(system: System, what: str, *, limit: int | None = SMALL) -> Callable[.
     the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
     made = source(system, what, "numpy", limit=limit)
+    return _on_arrays(made, len(system.function(what).outputs))
+
+
+def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
+    """Return a function that is none of a system's own, such as one of `System.trace`, like `numpy`."""
+    text = numpy_text(make_plan(function, limit=limit), name)
+    made = Source(text, name, hashlib.sha256(text.encode()).hexdigest())
+    return _on_arrays(made, len(function.outputs))
+
+
+def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
     key = ("numpy", made.sha256)
     if key not in _compiled:
         inner = _executed(made, {"np": np})
-        n_out = len(system.function(what).outputs)
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
             y = np.asarray(y, dtype=np.float64)
@@ -211,5 +222,6 @@ __all__ = [
     "jax",
     "numba",
     "numpy",
+    "numpy_of",
     "source",
 ]

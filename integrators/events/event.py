@@ -1,0 +1,109 @@
+"""What a user says about an event, and what is found."""
+
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.protocol import Array
+from problems.errors import InputError
+
+
+@dataclass(frozen=True)
+class Event:
+    """Where ``g`` vanishes along the trajectory.
+
+    Parameters
+    ----------
+    g : callable
+        A number, from the arguments that it names among ``t, q, p, y, par, m``, as a
+        Hamiltonian is written. It is traced once and then runs on whole arrays. What
+        cannot be traced (comparisons, NumPy, any other code) is called with numbers
+        instead, state by state, which is slow.
+    direction : {0, 1, -1}
+        1: only where g rises in the order in which states are passed (also backwards in
+        time), -1: only where it falls, 0: everywhere, also where g touches zero.
+    terminal : bool or int
+        True: the integration ends at the first occurrence; a number n: at the n-th.
+    name : str, optional
+        What it is called in the solution; the function's own name by default.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values outside these ranges.
+
+    Examples
+    --------
+    >>> Event(lambda q: q[0], direction=1)  # doctest: +ELLIPSIS
+    Event(g=<function ...>, direction=1, terminal=False, name=None)
+    """
+
+    g: Callable[..., Any]
+    _: KW_ONLY
+    direction: int = 0
+    terminal: bool | int = False
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.g):
+            raise InputError(f"an event needs a function g, not {self.g!r}.")
+        if self.direction not in (-1, 0, 1):
+            raise InputError(f"direction={self.direction!r} of an event must be 1, -1 or 0 (both).")
+        try:
+            last = operator.index(self.terminal)
+        except TypeError:
+            last = -1
+        if last < 0:
+            raise InputError(f"terminal={self.terminal!r} of an event must be True, False, or a count >= 1.")
+
+    @property
+    def last(self) -> int:
+        """The occurrence that ends the integration; 0: none."""
+        return int(self.terminal)
+
+
+@dataclass(frozen=True, eq=False)
+class Occurrences:
+    """Where one event happened.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        Times, in the order of integration.
+    y : ndarray, shape (n, dim)
+        States there: ends of steps of solved length.
+    direction : ndarray of int, shape (n,)
+        1 where g rises, -1 where it falls, 0 where it touches zero and turns back.
+    """
+
+    t: Array
+    y: Array
+    direction: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return self.t.size
+
+
+def named(events: Any) -> dict[str, Event]:
+    """Return the events by their names, from one event, one function, or a sequence of them.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else, or two events of one name.
+    """
+    listed = list(events) if isinstance(events, Sequence) else [events]
+    made = [event if isinstance(event, Event) else Event(event) for event in listed]
+    found: dict[str, Event] = {}
+    for i, event in enumerate(made):
+        own = getattr(event.g, "__name__", "<lambda>")
+        plain = own if own.isidentifier() else ("event" if len(made) == 1 else f"event_{i}")
+        name = event.name or plain
+        if name in found:
+            raise InputError(f"two events have the name {name!r}; give one of them another with name=.")
+        found[name] = event
+    return found

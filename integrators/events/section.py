@@ -1,0 +1,82 @@
+"""Poincaré sections."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from integrators.events.event import Event, named
+from integrators.events.search import search
+from integrators.integrate import Solution, check
+from integrators.protocol import MethodBase
+from problems import Problem
+from problems.errors import InputError
+
+
+def section(
+    problem: Problem,
+    method: MethodBase,
+    g: Callable[..., Any],
+    *,
+    direction: int = 1,
+    count: int | None = None,
+    t_end: float | None = None,
+) -> Solution:
+    """Return the states at which a trajectory passes through the surface g = 0: a Poincaré section.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate.
+    method : MethodBase
+        How; see `Event` for what is required.
+    g : callable
+        Its arguments are among ``t, q, p, y, par, m``.
+    direction : {1, -1, 0}
+        Whether g must rise, or fall, or either.
+    count : int, optional
+        Passages after which to stop.
+    t_end : float, optional
+        The latest time; the problem's own by default.
+
+    Returns
+    -------
+    Solution
+        ``t`` and ``y`` are the passages; ``y[0]`` is the first, not the start.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a method without states between its steps, or values that cannot be used.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import HBVM
+    >>> made = section(problems.load("henon_heiles"), HBVM(k=6, s=4, h=0.5), lambda q: q[0], count=3)
+    >>> made.y.shape
+    (3, 4)
+    """
+    check(problem, method)
+    end = problem.t_end if t_end is None else float(t_end)
+    if not np.isfinite(end) or end == problem.t0:
+        raise InputError(f"t_end={t_end!r} of a section must be a finite time other than t0={problem.t0!r}.")
+    if count is not None and (not isinstance(count, int | np.integer) or count < 1):
+        raise InputError(f"count={count!r} of a section must be a whole number of at least 1.")
+    program = method.compile(problem.system)
+    events = named(Event(g, direction=direction, terminal=int(count or 0), name="section"))
+    found = search(problem, method, program, events, end)
+    passages = found.events["section"]
+    return Solution(
+        t=passages.t,
+        y=passages.y,
+        status=found.status,
+        reason=found.reason,
+        t_stop=found.t_stop,
+        stats=found.stats,
+        compile_seconds=program.compile_seconds,
+        from_cache=program.from_cache,
+        problem=problem,
+        method=method,
+        events=found.events,
+    )

@@ -1,0 +1,250 @@
+"""Events are all found, on the trajectory itself, and change nothing of it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import integrators
+from integrators import HBVM, Event, Gauss, LineIntegral, integrate
+from integrators.protocol import Status
+from problems import Hamiltonian, InputError, Problem, VectorField
+
+OSCILLATOR = Hamiltonian(
+    lambda q, p: (q[0] * q[0] + p[0] * p[0]) / 2, dof=1, parameters={"level": 0.5}, name="oscillator"
+)
+WHOLE = Gauss(s=8, h=2.0)  # a third of a revolution per step
+
+
+def oscillator(*, t_end=20.0, phase=0.0, **options):
+    return Problem(OSCILLATOR, q0=[math.sin(phase)], p0=[math.cos(phase)], t_end=t_end, **options)
+
+
+def happened(problem, method, *events, **options):
+    solution = integrate(problem, method, events=list(events), **options)
+    return solution, list(solution.events.values())
+
+
+@pytest.mark.parametrize(
+    ("method", "error"),
+    [
+        (HBVM(k=6, s=4, h=0.5), 5e-9),  # measured 2.8e-9
+        (WHOLE, 1e-12),  # measured 2.5e-13
+        (Gauss(s=16, h=7.0), 1e-12),  # measured 5.3e-15: more than a revolution per step
+        (LineIntegral(k=6, s=4, h=0.5, invariants=["energy"]), 5e-9),  # measured 2.8e-9
+        (LineIntegral(k=6, s=4, tol=1e-12, invariants=["energy"]), 1e-10),  # measured 1.7e-11
+    ],
+)
+def test_times_are_those_of_the_method_and_energy_is_at_round_off(method, error):
+    solution, (zeros,) = happened(oscillator(), method, Event(lambda q: q[0], name="q"))
+    assert solution.status is Status.FINISHED
+    assert list(zeros.direction) == [-1, 1, -1, 1, -1, 1]
+    assert np.abs(zeros.t - np.pi * np.arange(1, 7)).max() < error
+    assert np.abs(zeros.y[:, 0]).max() < 1e-14  # measured 1.8e-15: rounding of the time
+    # Measured 7.1e-15 with s = 16, the same as at its own steps; 4.4e-16 for the others.
+    assert solution.problem.errors(zeros.y)["energy"].max() < (2e-14 if method.s > 8 else 2e-15)
+
+
+def test_states_at_events_keep_the_energy_and_the_polynomial_there_does_not(henon_heiles):
+    method = HBVM(k=6, s=4, h=1.0)
+    solution, (zeros,) = happened(henon_heiles, method, Event(lambda q: q[1]))
+    polynomial = integrate(henon_heiles, method, zeros.t, sample="dense")
+    assert len(zeros) == 13
+    assert henon_heiles.errors(zeros.y)["energy"].max() < 5e-15  # measured 6.3e-16
+    assert polynomial.errors()["energy"].max() > 1e-5  # measured 2.4e-4
+    assert np.abs(zeros.y[:, 1]).max() < 1e-14  # measured 7.4e-16
+    assert np.abs(polynomial.y[:, 1]).max() > 1e-6  # measured 2.2e-5
+    assert solution.stats.extra["event_search"]["steps"] >= 50
+
+
+def test_directions_are_in_the_order_of_integration():
+    events = [Event(lambda q: q[0], direction=d, name=f"d{d}") for d in (1, -1, 0)]
+    for t_end in (20.0, -20.0):
+        _, (up, down, both) = happened(oscillator(t_end=t_end), WHOLE, *events)
+        sign = np.sign(t_end)
+        even, odd = np.pi * np.array([2, 4, 6]), np.pi * np.array([1, 3, 5])
+        # Backwards q is negative first: in the order in which it is passed it rises at -pi.
+        assert np.allclose(up.t, even if sign > 0 else -odd, rtol=0, atol=1e-11)
+        assert np.allclose(down.t, odd if sign > 0 else -even, rtol=0, atol=1e-11)
+        assert list(both.direction) == [-1 if sign > 0 else 1, 1 if sign > 0 else -1] * 3
+
+
+def test_two_events_in_one_step_are_two():
+    solution, (zeros,) = happened(oscillator(t_end=4.0), WHOLE, Event(lambda q, par: q[0] - 0.99))
+    angle = math.asin(0.99)
+    assert np.allclose(zeros.t, [angle, np.pi - angle], rtol=0, atol=1e-11)  # both in the step from 0 to 2
+    assert list(zeros.direction) == [1, -1]
+    assert solution.problem.errors(zeros.y)["energy"].max() < 1e-15  # measured 4.4e-16
+
+
+@pytest.mark.parametrize(("gap", "expected"), [(1e-6, 2), (1e-10, 2), (-1e-6, 0), (-1e-10, 0)])
+def test_near_grazing_is_two_events_or_none(gap, expected):
+    _, (zeros,) = happened(oscillator(t_end=3.0), HBVM(k=10, s=8, h=1.0), Event(lambda q: q[0] - (1 - gap)))
+    assert len(zeros) == expected
+    if expected:
+        # q = 1 - d^2/2: half the distance is sqrt(2 gap), and rounding of q moves it by eps / distance.
+        assert abs(np.diff(zeros.t)[0] / 2 - math.sqrt(2 * gap)) < 1e-9  # measured 1.2e-10, of gap^1.5
+
+
+def test_a_touch_is_one_event_without_direction():
+    problem = oscillator(t_end=20.0)
+    method = HBVM(k=10, s=8, h=0.7)
+    events = [Event(lambda p: 1 - p[0] * p[0], name="touch")]
+    events += [Event(lambda p: 1 - p[0] * p[0], direction=d, name=f"crossing{d}") for d in (1, -1)]
+    _, (touch, up, down) = happened(problem, method, *events)
+    assert len(touch) == 6
+    assert not touch.direction.any()
+    assert np.abs(touch.t - np.pi * np.arange(1, 7)).max() < 2e-7  # measured 1.3e-8: g is flat there
+    assert len(up) == len(down) == 0
+
+
+def test_a_terminal_event_ends_the_integration_there():
+    times = np.linspace(0.0, 20.0, 41)
+    solution, (zeros,) = happened(oscillator(), WHOLE, Event(lambda q: q[0], terminal=True), times=times)
+    assert solution.status is Status.EVENT
+    assert not solution.status.failed
+    assert solution.reason == f"the event 'event' ended the integration at t = {solution.t_stop!r}."
+    assert solution.t_stop == zeros.t[-1] == pytest.approx(np.pi, abs=1e-11)
+    assert np.array_equal(solution.t, times[:7])
+    assert len(zeros) == 1
+
+
+def test_the_nth_occurrence_may_be_terminal_and_others_stop_with_it():
+    events = [Event(lambda q: q[0], terminal=3, direction=-1, name="q"), Event(lambda p: p[0], name="p")]
+    solution, (q, p) = happened(oscillator(), WHOLE, *events)
+    assert solution.t_stop == pytest.approx(5 * np.pi, abs=1e-11)
+    assert (len(q), len(p)) == (3, 5)
+
+
+def test_events_change_nothing_of_the_samples():
+    problem, times = oscillator(), np.linspace(0.0, 20.0, 37)
+    for sample in (None, "steps", "dense", "side"):
+        alone = integrate(problem, WHOLE, times, sample)
+        watched = integrate(problem, WHOLE, times, sample, events=lambda q: q[0])
+        assert np.array_equal(alone.t, watched.t)
+        assert np.array_equal(alone.y, watched.y)
+        assert alone.stats.steps == watched.stats.steps
+
+
+def test_what_cannot_be_traced_is_called_and_gives_the_same():
+    def g(t, y):
+        return max(float(y[0]), -2.0) * (1 if t < 100 else 0)
+
+    _, (traced, called) = happened(oscillator(), WHOLE, Event(lambda q: q[0], name="traced"), g)
+    assert np.allclose(traced.t, called.t, rtol=0, atol=1e-14)
+    assert np.array_equal(traced.direction, called.direction)
+
+
+def test_arguments_are_had_by_name_traced_or_called():
+    problem = oscillator(parameters={"level": 0.25}, t_end=3.0)
+
+    def called(q, p, par, m, t):
+        return m.sqrt(abs(q[0] - par.level)) * np.sign(q[0] - par.level)
+
+    _, found = happened(problem, WHOLE, Event(lambda q, par: q[0] - par.level, name="traced"), called)
+    for zeros in found:
+        assert np.allclose(zeros.t, [math.asin(0.25), np.pi - math.asin(0.25)], rtol=0, atol=1e-11)
+
+
+def test_a_function_of_time_alone_may_vary_faster_than_the_steps():
+    solution, (zeros,) = happened(oscillator(), WHOLE, Event(lambda t, m: m.sin(20 * t)))
+    assert np.allclose(zeros.t, np.pi / 20 * np.arange(1, 128), rtol=0, atol=1e-12)
+    assert solution.status is Status.FINISHED
+
+
+def test_a_start_at_zero_is_no_event_but_a_return_to_it_is():
+    problem = oscillator(phase=0.3, t_end=10.0)
+    start = math.sin(0.3)
+    _, (exact, rounded) = happened(
+        problem,
+        WHOLE,
+        Event(lambda q: q[0] - start, name="a"),
+        Event(lambda q: (q[0] - start) * 3 + 1e-17, name="b"),
+    )
+    expected = [np.pi - 0.6, 2 * np.pi, 3 * np.pi - 0.6]
+    assert np.allclose(exact.t, expected, rtol=0, atol=1e-11)
+    assert np.allclose(rounded.t, expected, rtol=0, atol=1e-11)
+
+
+def test_a_zero_at_the_end_of_a_step_is_one_event():
+    uniform = Problem(VectorField(lambda y: [1.0 + 0 * y[0]], dim=1, name="clock"), y0=[0.0], t_end=8.0)
+    for method in (Gauss(s=2, h=0.5), HBVM(k=4, s=2, h=0.25)):
+        _, (zeros,) = happened(uniform, method, Event(lambda y: y[0] - 2.5))
+        assert zeros.t.tolist() == [2.5]
+        assert zeros.direction.tolist() == [1]
+
+
+def test_a_function_that_is_never_finite_is_a_status_and_the_trajectory_is_kept():
+    solution, (zeros, good) = happened(
+        oscillator(), WHOLE, Event(lambda q, m: m.log(q[0] - 2), name="hole"), Event(lambda q: q[0], name="q")
+    )
+    assert solution.status is Status.NOT_FINITE
+    assert solution.reason.startswith(
+        "the event function hole was finite at none of the states between t = 0.0"
+    )
+    assert len(zeros) == 0
+    assert len(good) == 6
+    assert solution.t[-1] == 20.0
+    called = integrate(oscillator(), WHOLE, events=lambda y: math.sqrt(-1 - y[0] ** 2))
+    assert called.status is Status.NOT_FINITE
+
+
+def test_a_function_that_is_finite_in_places_is_followed_there():
+    _, (zeros,) = happened(oscillator(), Gauss(s=6, h=0.5), Event(lambda q, m: m.log(q[0]) + 1))
+    level = math.exp(-1)
+    expected = np.sort(
+        [2 * np.pi * i + x for i in range(4) for x in (math.asin(level), np.pi - math.asin(level))]
+    )
+    assert np.allclose(zeros.t, expected[expected < 20.0], rtol=0, atol=1e-13)  # measured 1.8e-15
+
+
+def test_a_failure_keeps_the_events_before_it():
+    fall = Problem(VectorField(lambda y: [1 + y[0] ** 2], dim=1, name="tangent"), y0=[0.0], t_end=3.0)
+    solution, (zeros,) = happened(fall, Gauss(s=4, h=0.05), lambda y: y[0] - 1)
+    assert solution.status.failed
+    assert solution.t_stop < np.pi / 2 + 0.1
+    assert np.allclose(zeros.t, [np.pi / 4], rtol=0, atol=1e-13)  # measured 5.6e-16
+
+
+def test_methods_without_states_inside_their_steps_refuse():
+    with pytest.raises(InputError, match=r"cannot find events: .* use HBVM, Gauss or LineIntegral"):
+        integrate(oscillator(), integrators.DOP853(rtol=1e-9, atol=1e-9), events=lambda q: q[0])
+
+
+@pytest.mark.parametrize(
+    ("events", "options", "message"),
+    [
+        ([3], {}, "an event needs a function g, not 3"),
+        ([lambda q: q[7]], {}, "q.7. does not exist"),
+        ([lambda state: state[0]], {}, "asks for an argument 'state'"),
+        ([lambda q: q], {}, "returns 1 values, not one number"),
+        ([Event(len, name="a"), Event(abs, name="a")], {}, "two events have the name 'a'"),
+        ([lambda q: q[0]], {"sample": "land"}, "sample='land' changes; use 'side'"),
+        ([lambda q: q[0]], {"times": [1.0, 0.5]}, "strictly monotone"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(events, options, message):
+    with pytest.raises(InputError, match=message):
+        integrate(oscillator(), WHOLE, events=events, **options)
+    for bad in ({"direction": 2}, {"terminal": -1}, {"terminal": "yes"}):
+        with pytest.raises(InputError, match="of an event must be"):
+            Event(lambda q: q[0], **bad)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    phase=st.floats(0.01, 6.2),
+    level=st.floats(-1.2, 1.2).filter(lambda x: abs(abs(x) - 1) > 1e-6),
+    h=st.sampled_from([0.3, 1.0, 2.0]),
+)
+def test_the_number_of_events_is_that_of_the_solution(phase, level, h):
+    problem = oscillator(phase=phase, t_end=12.0, parameters={"level": level})
+    _, (zeros,) = happened(problem, Gauss(s=10, h=h), Event(lambda q, par: q[0] - par.level))
+    angles = [] if abs(level) > 1 else [math.asin(level), np.pi - math.asin(level)]
+    expected = np.sort([2 * np.pi * i + a - phase for a in angles for i in range(-1, 5)])
+    expected = expected[(expected > 1e-9) & (expected < 12.0)]
+    assert len(zeros) == len(expected)
+    # Measured 1.8e-15 / sqrt(1 - level^2).
+    assert np.all(np.abs(zeros.t - expected) < 5e-14 / math.sqrt(max(1 - level * level, 1e-6)))
