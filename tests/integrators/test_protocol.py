@@ -16,7 +16,7 @@ from problems import Hamiltonian, Problem
 from problems.errors import InputError, UnknownNameError
 
 
-@pytest.mark.parametrize("h", [0, 0.0, -0.5, float("nan"), float("inf"), "0.1", None, True])
+@pytest.mark.parametrize("h", [0, 0.0, -0.5, float("nan"), float("inf"), "0.1", True])
 @pytest.mark.parametrize(
     "make", [lambda h: HBVM(k=4, s=2, h=h), lambda h: Gauss(s=2, h=h)], ids=["HBVM", "Gauss"]
 )
@@ -25,7 +25,7 @@ def test_a_step_that_is_not_positive_and_finite_is_refused_by_name_and_value(mak
         make(h)
 
 
-@pytest.mark.parametrize("bad", [0, -1, 2.0, 1.5, "2", None, True])
+@pytest.mark.parametrize("bad", [0, -1, 2.0, 1.5, "2", True])
 def test_s_and_k_must_be_whole_numbers_from_one_on(bad):
     with pytest.raises(InputError, match=r"HBVM needs a whole number s >= 1, not s="):
         HBVM(k=4, s=bad, h=0.1)
@@ -67,8 +67,8 @@ def test_unknown_names_come_with_the_nearest():
         registry.get("hbmv")
     with pytest.raises(UnknownNameError, match=r"unknown option of HBVM 'kk'; did you mean 'k'"):
         registry.create("HBVM", kk=4, s=2, h=0.1)
-    with pytest.raises(InputError, match=r"HBVM needs k, h; give a value as in HBVM\(k=...\)"):
-        registry.create("HBVM", s=2)
+    with pytest.raises(InputError, match=r"LineIntegral needs k, s; give a value as in LineIntegral\(k=...\)"):
+        registry.create("LineIntegral", invariants=["energy"])
 
 
 def test_integrate_says_what_is_wrong_with_its_arguments():
