@@ -135,7 +135,10 @@ def run_accuracy(
                     if attempts[resolved.id] < ATTEMPTS:
                         waiting.append(resolved)
                     else:
-                        failures.append(f"{type(error).__name__}: {error}".rstrip(": "))
+                        known = isinstance(error, UnfinishedRunError)
+                        failures.append(
+                            str(error) if known else f"{type(error).__name__}: {error}".rstrip(": ")
+                        )
                     continue
                 yield record
     finally:
@@ -143,7 +146,14 @@ def run_accuracy(
             future.cancel()
     if failures:
         reasons = "; ".join(dict.fromkeys(failures))
-        raise UnfinishedRunError(f"{len(failures)} cases could not be run: {reasons}")
+        count = "1 case" if len(failures) == 1 else f"{len(failures)} cases"
+        raise UnfinishedRunError(f"{count} could not be run: {reasons}")
+
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, UnfinishedRunError):
+        return str(error)
+    return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:

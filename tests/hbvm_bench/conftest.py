@@ -9,6 +9,8 @@ import integrators.registry
 HERE = Path(__file__).parent
 TOYS = (
     "Steady",
+    "Waving",
+    "Pinned",
     "Straying",
     "Stalling",
     "Endless",

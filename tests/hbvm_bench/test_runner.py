@@ -63,6 +63,8 @@ def test_a_case_that_works_has_metrics_and_series(toys, store):
         ("Garbage(what='times')", "crashed", "not asked for"),
         ("Garbage(what='few')", "crashed", "2 of 5"),
         ("Garbage(what='nan')", "crashed", "not finite from t = 1"),
+        ("Garbage(what='result')", "crashed", "no readable result"),
+        ("Garbage(what='series')", "crashed", "no readable result"),
         ("Refusing()", "refused", "it accepts nothing"),
         ("Missing()", "refused", "pip install nowhere"),
     ],

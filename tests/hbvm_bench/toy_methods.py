@@ -5,6 +5,7 @@ import signal
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from problems.errors import MissingLibraryError
 
 
 class ToyStepper:
-    def __init__(self, method, y0, t0):
+    def __init__(self, method, y0, t0, steps=1):
         self.method, self.y, self.t = method, np.array(y0), t0
-        self.status, self.reason, self.stats = Status.RUNNING, "", Stats(steps=1, evaluations=2)
+        self.status, self.reason, self.stats = Status.RUNNING, "", Stats(steps=steps, evaluations=2)
 
     def step(self):
         return self.status
@@ -37,9 +38,10 @@ class ToyProgram:
     method: "ToyBase"
     compile_seconds: float = 0.25
     from_cache: bool | None = False
+    cores: int = 1
 
     def start(self, y0, par=None, t0=0.0):
-        return ToyStepper(self.method, y0, t0)
+        return ToyStepper(self.method, y0, t0, self.cores)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +74,27 @@ class Steady(ToyBase):
     def samples(self, times, states):
         time.sleep(self.wait)
         return super().samples(times, states)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waving(ToyBase):
+    """Has numbers with all their digits in its states."""
+
+    h: float = 0.1
+    wait: float = 0.0
+
+    def samples(self, times, states):
+        time.sleep(self.wait)
+        states[1:] += 1e-6 * np.sin(self.h * times[1:, None] + np.arange(states.shape[1]))
+        return super().samples(times, states)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pinned(ToyBase):
+    """Counts as steps the cores it may use."""
+
+    def compile(self, system):
+        return ToyProgram(self, cores=len(os.sched_getaffinity(0)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,13 +155,22 @@ class Exiting(ToyBase):
 
 @dataclass(frozen=True, kw_only=True)
 class Hungry(ToyBase):
-    """Eats memory."""
+    """Eats memory, 32 MB at a time or all at once."""
+
+    gigabytes: float = 0.0
 
     def samples(self, times, states):
-        eaten = []
+        eaten = [np.ones(int(self.gigabytes * 1.25e8))]
         while True:
             eaten.append(np.ones(4_000_000))
             time.sleep(0.01)
+
+
+def _write_and_leave(result, series=b""):
+    folder = Path(sys.argv[1]).parent  # of the request
+    (folder / "result.json").write_bytes(result)
+    (folder / "series.npz").write_bytes(series)
+    os._exit(0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +192,10 @@ class Garbage(ToyBase):
             case "noise":
                 sys.stdout.buffer.write(os.urandom(1 << 20))
                 sys.stdout.flush()
+            case "result":
+                _write_and_leave(result=os.urandom(1000))
+            case "series":
+                _write_and_leave(result=b'{"outcome": "ok"}', series=os.urandom(1000))
         return super().samples(times, states)
 
 
