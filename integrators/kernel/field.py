@@ -13,6 +13,8 @@ from problems import emit
 from problems.system import System
 
 ON_LANES, ONE_BY_ONE = "L", "S"
+Arguments = list[tuple[Any, str]]
+
 SOURCES = ("lanes", "lane_functions", "native", "field")
 
 
@@ -54,18 +56,43 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
         return ONE_BY_ONE, build_one_by_one(function, lanes)
 
 
+def assembly(system: System, what: str, lanes: int) -> str:
+    """Return the machine code of a field, as text; the arguments are those of `compile_field`.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If it cannot be compiled.
+    """
+    from numba.core.errors import NumbaError
+
+    function = emit.numba(system, what).py_func
+    try:
+        return native.assembly(*_on_lanes(function, lanes))
+    except NumbaError:
+        return native.assembly(*_one_by_one(function, lanes))
+
+
 def build_on_lanes(function: Any, lanes: int) -> bytes:
     """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
+    return native.build(*_on_lanes(function, lanes))
+
+
+def build_one_by_one(function: Any, lanes: int) -> bytes:
+    """Compile a loop over stages that calls ``function`` with scalars."""
+    return native.build(*_one_by_one(function, lanes))
+
+
+def _on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
     from integrators.kernel import lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.lanes import Lanes, Rows, Strided
 
     stages = Rows(lanes)
     arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (Strided(1), "ptr"), (stages, "ptr")]
-    return native.build(_jit(function), arguments)
+    return _jit(function), arguments
 
 
-def build_one_by_one(function: Any, lanes: int) -> bytes:
-    """Compile a loop over stages that calls ``function`` with scalars."""
+def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
     from numba import types
 
     from integrators.kernel.lanes import strided
@@ -79,7 +106,7 @@ def build_one_by_one(function: Any, lanes: int) -> bytes:
                 time, strided(stages + 8 * stage, lanes), strided(par, 1), strided(values + 8 * stage, lanes)
             )
 
-    return native.build(_jit(loop), [(types.int64, "i64")] * 4)
+    return _jit(loop), [(types.int64, "i64")] * 4
 
 
 def _jit(function: Any) -> Any:

@@ -16,7 +16,7 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -24,6 +24,8 @@ import llvmlite.binding as llvm
 from integrators.kernel import store
 
 ENTRY = "hbvm_entry"
+
+Made = TypeVar("Made", bytes, str)
 
 _lock = threading.RLock()
 _loaded: dict[str, "Native"] = {}
@@ -122,6 +124,20 @@ def build(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "v
     numba.core.errors.NumbaError
         If it cannot be compiled for these types.
     """
+    return _compiled(function, arguments, returns, lambda machine, module: machine.emit_object(module))
+
+
+def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
+    """Return the machine code that `build` makes, as text."""
+    return _compiled(function, arguments, returns, lambda machine, module: machine.emit_assembly(module))
+
+
+def _compiled(
+    function: Any,
+    arguments: Sequence[tuple[Any, str]],
+    returns: str,
+    emit: Callable[[Any, Any], Made],
+) -> Made:
     with _lock:
         kinds = tuple(kind for kind, _ in arguments)
         function.compile(kinds)
@@ -134,7 +150,12 @@ def build(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "v
         machine = _machine()
         builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
         builder.getModulePassManager().run(module, builder)
-        return machine.emit_object(module)
+        return emit(machine, module)
+
+
+def processor() -> str:
+    """Return LLVM's name of the processor that code is made for."""
+    return os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name()
 
 
 def load(code: bytes) -> int:
@@ -160,7 +181,7 @@ def _initialize() -> None:
 def _machine() -> Any:
     _initialize()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
-        cpu=os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name(),
+        cpu=processor(),
         features=os.environ.get("NUMBA_CPU_FEATURES") or llvm.get_host_cpu_features().flatten(),
         opt=3,
         reloc="static",
