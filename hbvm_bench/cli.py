@@ -33,6 +33,7 @@ SEPARATE = {
     "engines": "hbvm_bench.commands.engines",
     "gallery": "hbvm_bench.commands.gallery",
     "inspect": "hbvm_bench.commands.inspect",
+    "report": "hbvm_bench.commands.report",
     "run": "hbvm_bench.commands.run",
 }
 
@@ -96,19 +97,6 @@ def list_(
     terminal_ = terminal.console()
     for table in listing.tables(what):
         terminal_.print(table)
-
-
-@app.command()
-def report(
-    directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="Default: DIRECTORY/report.")] = None,
-) -> None:
-    """Write the report of a run: report.md, index.html and figures; nothing is run again."""
-    store = Store(directory)
-    store.index()
-    target = out or directory / "report"
-    ensure_writable(target)
-    _write_report(store, target)
 
 
 @app.command()
@@ -178,13 +166,6 @@ def reference(
         print(f"largest difference from the stored reference: {references.difference(stored, fresh):.1e}")
     if out is not None:
         out.write_text(references.encode(fresh), encoding="ascii")
-
-
-def _write_report(store: Store, directory: Path) -> None:
-    from hbvm_bench.report.write import write_report
-
-    for path in write_report(store, directory):
-        print(path)
 
 
 if __name__ == "__main__":

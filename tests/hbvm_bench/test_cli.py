@@ -112,7 +112,7 @@ def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
     assert "Steady()" in first.out
     assert "something <b>broke</b>" in first.out
     assert "measuring: 2" in first.err
-    assert {path.name for path in (here / "rep").iterdir()} == {"report.md", "index.html", "figures"}
+    assert {path.name for path in (here / "rep").iterdir()} == {"report.md", "index.html", "figures", "data"}
     records = {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()}
     assert cli.main(arguments) == 0
     assert "2 already there" in capsys.readouterr().err
