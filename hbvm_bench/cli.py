@@ -30,10 +30,13 @@ SEPARATE = {
     "race": "hbvm_bench.race.command",
     "endure": "hbvm_bench.endure.command",
     "paper": "hbvm_bench.paper.command",
+    "compare": "hbvm_bench.commands.compare",
     "engines": "hbvm_bench.commands.engines",
+    "export": "hbvm_bench.commands.export",
     "gallery": "hbvm_bench.commands.gallery",
     "inspect": "hbvm_bench.commands.inspect",
     "report": "hbvm_bench.commands.report",
+    "merge": "hbvm_bench.commands.merge",
     "run": "hbvm_bench.commands.run",
 }
 

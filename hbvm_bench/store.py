@@ -130,10 +130,14 @@ class Store:
 
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
         """Return the series of a case by name; empty where it has none."""
+        return decode_series(self.series_file(case_id))
+
+    def series_file(self, case_id: str) -> bytes:
+        """Return the ``.npz`` file of a case as it is; empty where it has none."""
         try:
-            return decode_series(self._series_path(case_id).read_bytes())
+            return self._series_path(case_id).read_bytes()
         except FileNotFoundError:
-            return {}
+            return b""
 
     def write_index(self, index: Index) -> None:
         """Store what the run was asked to do."""

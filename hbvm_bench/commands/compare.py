@@ -1,0 +1,78 @@
+"""The command ``hbvm-bench compare``."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from hbvm_bench import compare as comparing
+from hbvm_bench import terminal
+from hbvm_bench.store import Store
+
+CHANGED = 1
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
+    second: Annotated[Path, typer.Argument(help="Another run of the same campaign.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+) -> None:
+    """Say what changed from one run to another beyond noise.
+
+    Exit code 0 when nothing did, 1 when something did or a case is missing in one of them.
+    """
+    found = comparing.compare(Store(first), Store(second))
+    if as_json:
+        print(msgspec.json.format(msgspec.json.encode(asdict(found)), indent=1).decode())
+    else:
+        _print(found, terminal.console(), str(first), str(second))
+    if not found.unchanged:
+        raise typer.Exit(CHANGED)
+
+
+def _print(found: comparing.Comparison, console: Console, first: str, second: str) -> None:
+    for where, names in ((first, found.only_first), (second, found.only_second)):
+        for name in names:
+            console.print(Text(f"only in {where}: {name}"))
+    if found.behind:
+        console.print(Text(f"behind it: {'; '.join(found.behind)}"))
+    numbers = found.equal + found.rounded
+    changed = sum(change.what != "outcome" for change in found.changed)
+    endings = len(found.changed) - changed
+    console.print(
+        f"numerical metrics of {found.cases} cases: {numbers + changed} compared, {found.equal} equal, "
+        f"{found.rounded} within rounding, {changed} changed; {endings} outcomes changed"
+    )
+    _table(console, found.changed, first, second)
+    if found.noise is not None:
+        within = found.timed - len(found.slower) - len(found.faster)
+        console.print(
+            f"times, each divided by the calibration beside it: {found.timed} compared, {within} within "
+            f"noise (a factor of {found.noise:.2f} in a typical case), {len(found.slower)} slower, "
+            f"{len(found.faster)} faster"
+        )
+    _table(console, [*found.slower, *found.faster], first, second)
+    for sentence in found.untimed:
+        console.print(Text(f"time not compared: {sentence}"))
+    if found.unchanged:
+        console.print("nothing changed beyond noise.")
+
+
+def _table(console: Console, changes: Sequence[comparing.Change], first: str, second: str) -> None:
+    if not changes:
+        return
+    made = Table("problem", "method", "what", first, second, box=box.SIMPLE_HEAD, pad_edge=False)
+    for change in changes:
+        cells = (change.problem, change.method, change.what, change.before, change.after)
+        made.add_row(*(Text(cell) for cell in cells))
+    console.print(made)
+
+
+__all__ = ["compare"]

@@ -1,0 +1,21 @@
+"""The command ``hbvm-bench merge``."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hbvm_bench import merge as merging
+from hbvm_bench.store import Store
+
+
+def merge(
+    runs: Annotated[list[Path], typer.Argument(help="Two runs or more.")],
+    out: Annotated[Path, typer.Option("--out", help="A new directory.")],
+) -> None:
+    """Put several runs together in a new one; of a case in several, the one that got further."""
+    cases, records = merging.merge(merging.stores(runs), Store(out))
+    print(f"{records} of {cases} cases in {out}")
+
+
+__all__ = ["merge"]
