@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_times
 from problems.errors import InputError
+from problems.foreign import Foreign
 from problems.problem import Problem
 
 if TYPE_CHECKING:
@@ -132,13 +133,16 @@ def integrate(
     if grid.size:
         samples = stepper.advance(grid, sample=sample)
     finished = samples.status is Status.FINISHED
+    stats = replace(stepper.stats)
+    if isinstance(problem.system, Foreign):
+        stats.extra = {**stats.extra, "field": problem.system.written}
     solution = Solution(
         t=samples.t,
         y=samples.y,
         status=samples.status,
         reason=samples.reason,
         t_stop=float(samples.t[-1]) if finished and samples.t.size else stepper.t,
-        stats=replace(stepper.stats),
+        stats=stats,
         compile_seconds=program.compile_seconds,
         from_cache=program.from_cache,
         problem=problem,

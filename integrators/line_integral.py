@@ -126,7 +126,11 @@ class LineIntegral(MethodBase):
         return 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system that has the invariants."""
+        """Accept every traced system that has the invariants."""
+        if not problem.system.traced:
+            return (
+                "it needs the field as a formula, beside those of its invariants; write it as a VectorField."
+            )
         from integrators.kernel.line.program import components
 
         try:

@@ -1,6 +1,7 @@
 """Hamiltonian and other systems, written down once and given to every engine alike."""
 
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
+from problems.foreign import Foreign
 from problems.hamiltonian import Bodies, Hamiltonian, System, VectorField
 from problems.poisson import Poisson
 from problems.problem import Problem
@@ -8,6 +9,7 @@ from problems.registry import load, names
 
 __all__ = [
     "Bodies",
+    "Foreign",
     "Hamiltonian",
     "InputError",
     "MissingLibraryError",

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 from integrators.kernel import native, store
+from integrators.kernel.foreign import raise_error
 
 # The modules whose code is in the kernel: an edit of any of them makes another kernel.
 SOURCES = (
@@ -41,5 +42,10 @@ def _function() -> Any:
 
 
 def call(what: int, *arguments: int) -> int:
-    """Call the kernel; missing arguments are 0. The interpreter's lock is released meanwhile."""
-    return _function()(what, *arguments, *[0] * (10 - len(arguments)))
+    """Call the kernel; missing arguments are 0. The interpreter's lock is released meanwhile.
+
+    What a field in Python raised is raised here.
+    """
+    outcome = _function()(what, *arguments, *[0] * (10 - len(arguments)))
+    raise_error()
+    return outcome

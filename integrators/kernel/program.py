@@ -9,6 +9,7 @@ from integrators.grid import Counts
 from integrators.kernel import engine, layout, tables
 from integrators.kernel import field as fields
 from integrators.kernel.batch import Batch, run_batch
+from integrators.kernel.foreign import field_of
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
 from integrators.kernel.implicit.workspace import solver as implicit_solver
 from integrators.kernel.stepper import HBVMStepper
@@ -52,7 +53,7 @@ class HBVMProgram:
             raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
         lanes = tables.lanes_for(k)
         self.constants = tables.constants(k, s, self.second, lanes)
-        self.field = fields.compile_field(system, "force" if self.second else "field", lanes)
+        self.field = field_of(system, "force" if self.second else "field", lanes)
         kernel = engine.kernel()
         block, group = blocks(system)
         rows = system.dim

@@ -4,7 +4,7 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from integrators.peers.options import number
+from integrators.peers.options import UNTRACED, number
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -39,7 +39,7 @@ class DiffraxMethod(MethodBase):
 
     def accepts(self, problem: Problem) -> str | None:
         """Return None, or why not."""
-        return self.refuses(problem.system)
+        return self.refuses(problem.system) if problem.system.traced else UNTRACED
 
     def refuses(self, system: System) -> str | None:
         """Return why the method cannot integrate ``system``, or None."""

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.peers.options import flag, load, number
+from integrators.peers.heyoka_batch import Lanes, TaylorBatch
+from integrators.peers.options import UNTRACED, flag, load, number
 from integrators.peers.stepper import CRAWL_STEPS, Crawl, PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
 from problems.problem import Problem, System
@@ -87,8 +88,8 @@ class Taylor(MethodBase):
         return None
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system."""
-        return None
+        """Accept every system that is traced."""
+        return None if problem.system.traced else UNTRACED
 
     def compile(self, system: System) -> "TaylorProgram":
         """Have heyoka compile the integrator for ``system``."""
@@ -123,6 +124,37 @@ class TaylorProgram(PeerProgram):
             after = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
         self.from_cache = use and (after[0] == before[0] or after[1] == before[1])
         self.compile_seconds = perf_counter() - started
+        self._options = method.options(defaults=True)
+        self._lanes: Lanes | None = None
+
+    def batch(
+        self,
+        Y0: ArrayLike,
+        par: ArrayLike | None = None,
+        *,
+        times: ArrayLike,
+        t0: float = 0.0,
+    ) -> TaylorBatch:
+        """Integrate many starts to the same times by heyoka's batch integrator.
+
+        It is compiled when this is first called. Every lane has steps of its own; the
+        last one to each time is shortened onto it.
+
+        Parameters
+        ----------
+        Y0 : array_like, shape (n, dim)
+            Starts.
+        par : array_like, shape (n_par,) or (n, n_par), optional
+            Parameters, for all or for each; the system's own by default.
+        times : array_like, shape (m,)
+            Times asked for, strictly monotone from ``t0``.
+        t0 : float
+            Time of the starts.
+        """
+        if self._lanes is None:
+            self._lanes = Lanes(self.system, self._options)
+            self.compile_seconds += self._lanes.compile_seconds
+        return self._lanes.run(Y0, par, times, t0)
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "TaylorStepper":
         """Return a stepper at ``t0``; see the protocol."""

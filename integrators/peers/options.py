@@ -8,6 +8,9 @@ from types import ModuleType
 
 from problems.errors import InputError, MissingLibraryError, unknown
 
+UNTRACED = "it needs the field as a formula, not as a function; write it as a VectorField or Hamiltonian."
+"""Why libraries that take expressions refuse a `problems.Foreign`."""
+
 
 def load(library: str, *modules: str) -> ModuleType:
     """Import an optional library, or say how to install it.

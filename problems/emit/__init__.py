@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -15,6 +16,7 @@ from problems.emit.plan import SMALL, make_plan
 from problems.emit.scalar import numba_text
 from problems.emit.symbolic import heyoka_text
 from problems.errors import MissingLibraryError, unknown
+from problems.foreign import Foreign
 from problems.functions import Function
 from problems.hamiltonian import System
 
@@ -109,6 +111,8 @@ def numpy(system: System, what: str, *, limit: int | None = SMALL) -> Callable[.
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
     the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
+    if isinstance(system, Foreign) and what == "field":
+        return partial(_foreign_on_arrays, system)
     made = source(system, what, "numpy", limit=limit)
     return _on_arrays(made, len(system.function(what).outputs))
 
@@ -118,6 +122,16 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
     text = numpy_text(make_plan(function, limit=limit), name)
     made = Source(text, name, hashlib.sha256(text.encode()).hexdigest())
     return _on_arrays(made, len(function.outputs))
+
+
+def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
+    states = np.asarray(y, dtype=np.float64)
+    columns = np.ascontiguousarray(np.atleast_2d(states.T))
+    out = np.empty_like(columns)
+    times = np.broadcast_to(np.asarray(t, dtype=np.float64), len(columns))
+    for time, state, row in zip(times.tolist(), columns, out, strict=True):
+        system.evaluate(time, state, np.asarray(par, dtype=np.float64), row)
+    return out[0] if states.ndim == 1 else np.ascontiguousarray(out.T)
 
 
 def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
@@ -144,8 +158,11 @@ def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
-    overlap. ``limit`` as in `source`.
+    overlap. ``limit`` as in `source`. The field of a `Foreign` system is a plain Python
+    function.
     """
+    if isinstance(system, Foreign) and what == "field":
+        return system.evaluate
     made = source(system, what, "numba", limit=limit)
     key = ("numba", made.sha256)
     if key not in _compiled:

@@ -1,0 +1,198 @@
+"""Fields that are not traced: numba functions and any Python functions."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+
+import integrators
+from integrators import HBVM, Gauss, LineIntegral, integrate
+from integrators.protocol import Status
+from problems import Foreign, InputError, Problem, VectorField, emit
+
+MU = 5.0
+METHODS = [HBVM(k=6, s=4, h=0.05), Gauss(s=4, h=0.05, solver="newton"), Gauss(s=3, h=0.05, solver="blended")]
+
+
+def van_der_pol(t, y):
+    return [y[1], 5.0 * (1 - y[0] * y[0]) * y[1] - y[0]]
+
+
+def in_place(t, y, dy):
+    dy[0] = y[1]
+    dy[1] = 5.0 * (1 - y[0] * y[0]) * y[1] - y[0]
+
+
+def parametric(t, y, par, dy):
+    dy[0] = y[1]
+    dy[1] = par[0] * (1 - y[0] * y[0]) * y[1] - y[0]
+
+
+TRACED = VectorField(lambda y: van_der_pol(0, y), dim=2, name="van_der_pol")
+WRITTEN = {
+    "python": Foreign(van_der_pol, dim=2),
+    "python in place": Foreign(in_place, dim=2),
+    "python with parameters": Foreign(parametric, dim=2, parameters={"mu": MU}),
+    "numba": Foreign(numba.njit(in_place), dim=2),
+    "numba with parameters": Foreign(numba.njit(parametric), dim=2, parameters={"mu": MU}),
+}
+
+
+def started(system, **options):
+    return Problem(system, **({"y0": [2.0, 0.0], "t_end": 4.0} | options))
+
+
+@pytest.mark.parametrize("written", WRITTEN)
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+def test_every_way_of_writing_gives_the_traced_solution(written, method):
+    times = np.linspace(0.0, 4.0, 14)
+    traced = integrate(started(TRACED), method, times)
+    foreign = integrate(started(WRITTEN[written]), method, times)
+    assert foreign.status is Status.FINISHED
+    # Bit for bit with the fixed-point iteration; Jacobians by differences change the last bit.
+    assert np.abs(foreign.y - traced.y).max() <= (
+        0.0 if isinstance(method, HBVM) else 2e-14
+    )  # measured 4.4e-16
+    assert foreign.stats.extra["field"] == (
+        "numba function" if "numba" in written else "Python function, slow"
+    )
+    assert foreign.stats.evaluations == traced.stats.evaluations or not isinstance(method, HBVM)
+
+
+def test_jacobians_are_taken_by_differences():
+    made = integrate(started(WRITTEN["python"]), METHODS[1], [4.0])
+    assert made.stats.solver == "Newton"
+    assert made.stats.extra["implicit"]["jacobian"] == "differences"
+
+
+@pytest.mark.parametrize("peer", ["DOP853", "Radau"])
+def test_scipys_methods_take_them_too(peer):
+    method = integrators.registry.create(peer, rtol=1e-9, atol=1e-9)
+    traced = integrate(started(TRACED), method, [4.0])
+    for system in WRITTEN.values():
+        assert np.abs(integrate(started(system), method, [4.0]).y - traced.y).max() < 1e-12  # measured 0
+
+
+def test_an_ordinary_function_may_do_anything():
+    calls = []
+
+    def pendulum(t, y):
+        calls.append(t)
+        table = {"length": 1.0}
+        if abs(y[0]) > 100:
+            return np.zeros(2)
+        return np.array([y[1], -math.sin(y[0]) / table["length"]])
+
+    system = Foreign(
+        pendulum, dim=2, invariants={"energy": lambda y, m: y[1] ** 2 / 2 - m.cos(y[0])}, name="pendulum"
+    )
+    made = integrate(
+        Problem(system, y0=[1.0, 0.0], t_end=20.0), HBVM(k=12, s=4, h=0.25), np.linspace(0, 20, 81)
+    )
+    assert made.errors()["energy"].max() < 1e-14  # measured 1.8e-16
+    assert len(calls) >= 80 * 12
+
+
+def test_parameters_are_run_time_values_and_arrays_may_be_given_back():
+    @numba.njit
+    def decay(t, y, par):
+        return -par[1] * y + par[0]
+
+    system = Foreign(decay, dim=1, parameters={"source": 0.0, "rate": 1.0})
+    method = Gauss(s=8, h=0.5)
+    for rate in (0.5, 2.0):
+        made = integrate(Problem(system, y0=[1.0], parameters={"rate": rate}, t_end=2.0), method, [2.0])
+        assert made.y[0, 0] == pytest.approx(math.exp(-2 * rate), rel=1e-12)  # measured 4.4e-16
+
+
+def test_the_time_is_the_stages_own():
+    system = Foreign(lambda t, y: [math.cos(t)], dim=1, name="cosine")
+    made = integrate(Problem(system, y0=[math.sin(2.0)], t0=2.0, t_end=-3.0), Gauss(s=8, h=0.5), [-3.0])
+    assert abs(made.y[0, 0] - math.sin(-3.0)) < 1e-14  # measured 2.8e-17
+
+
+@pytest.mark.parametrize("field", [lambda t, y: [math.sqrt(1 - y[0])], lambda t, y: [1 / (y[0] < 0.5)]])
+def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
+    problem = Problem(Foreign(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
+    made = integrate(problem, HBVM(k=4, s=2, h=0.01), sample="steps")
+    assert made.status is Status.NOT_FINITE
+    assert made.reason == f"the vector field is not finite in the step from t = {made.t_stop!r}."
+    assert 0.4 < made.t_stop < 2.1
+    assert np.isfinite(made.y).all()
+    assert made.t[-1] == made.t_stop
+
+
+def test_any_other_error_is_the_users_to_see():
+    def broken(t, y):
+        if t > 1.0:
+            raise LookupError("no such table")
+        return [1.0]
+
+    problem = Problem(Foreign(broken, dim=1), y0=[0.0], t_end=9.0)
+    for method in (HBVM(k=4, s=2, h=0.1), Gauss(s=2, h=0.1, solver="newton")):
+        with pytest.raises(LookupError, match="no such table"):
+            integrate(problem, method)
+
+
+def test_a_result_of_a_wrong_length_is_refused():
+    problem = Problem(Foreign(lambda t, y: [1.0, 2.0, 3.0], dim=2, name="three"), y0=[0.0, 0.0], t_end=1.0)
+    with pytest.raises(InputError, match=r"three returns an array of shape \(3,\), not \(2,\)"):
+        integrate(problem, HBVM(k=4, s=2, h=0.1))
+    problem = Problem(Foreign(lambda t, y: "text", dim=2, name="text"), y0=[0.0, 0.0], t_end=1.0)
+    with pytest.raises(InputError, match="text returns 'text', not 2 numbers"):
+        integrate(problem, HBVM(k=4, s=2, h=0.1))
+
+
+def test_other_arguments_are_refused():
+    with pytest.raises(InputError, match="a field has the arguments"):
+        Foreign(lambda t: [t], dim=1)
+    with pytest.raises(InputError, match="must be a function, not 3"):
+        Foreign(3, dim=1)
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        LineIntegral(k=4, s=2, h=0.1, invariants=["energy"]),
+        integrators.Taylor(tol=1e-9),
+        integrators.Dopri8(h=0.1),
+        integrators.Leapfrog(h=0.1),
+    ],
+    ids=repr,
+)
+def test_methods_that_need_formulas_refuse_with_the_reason(method):
+    with pytest.raises(InputError, match=r"cannot integrate .*needs (the field as a formula|a separable)"):
+        integrate(started(WRITTEN["python"]), method)
+    with pytest.raises(InputError, match="van_der_pol is not traced: its field is a Python function"):
+        emit.source(WRITTEN["python"], "field", "numba")
+
+
+def test_events_and_checkpoints_work_as_ever():
+    problem = started(WRITTEN["numba"], t_end=20.0)
+    made = integrate(problem, METHODS[0], events=lambda y: y[0])
+    assert len(made.events["event"]) == 3
+    stepper = METHODS[0].compile(problem.system).start(problem.y0)
+    stepper.advance([3.0])
+    kept = stepper.checkpoint()
+    first = stepper.advance([5.0, 7.0]).y
+    stepper.restore(kept)
+    assert np.array_equal(stepper.advance([5.0, 7.0]).y, first)
+
+
+def test_a_fingerprint_follows_from_the_code_and_what_it_takes_from_around_it():
+    def made(a):
+        return Foreign(lambda t, y: [a * y[0]], dim=1, name="same").fingerprint
+
+    assert made(1.0) == made(1.0)
+    assert made(1.0) != made(2.0)
+    assert Foreign(numba.njit(in_place), dim=2).fingerprint == Foreign(in_place, dim=2).fingerprint
+    assert Foreign(in_place, dim=2).fingerprint != Foreign(parametric, dim=2).fingerprint
+
+
+def test_the_field_on_arrays_is_the_function_state_by_state():
+    states = np.arange(6.0).reshape(2, 3)
+    field = emit.numpy(WRITTEN["python with parameters"], "field")
+    expected = emit.numpy(TRACED, "field")(0.0, states, np.empty(0))
+    assert np.array_equal(field(0.0, states, np.array([MU])), expected)
+    assert np.array_equal(field(0.0, states[:, 0], np.array([MU])), expected[:, 0])
