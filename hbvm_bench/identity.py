@@ -27,7 +27,10 @@ from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators")
 # The modules of this package whose change changes a measured number.
-MEASURING_MODULES = ("worker.py", "measure.py", "metrics.py", "quantities.py", "timing.py")
+MEASURING_MODULES = (
+    *("worker.py", "measure.py", "metrics.py", "quantities.py", "timing.py"),
+    *("checks.py", "drift.py", "ensemble.py", "laws.py", "solve.py", "starts.py"),
+)
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),

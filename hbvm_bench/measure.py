@@ -44,6 +44,9 @@ class Measured:
         Where the method stopped.
     counters, compile, timing
         Work and time.
+    trajectories : int
+        More than one for an ensemble: ``y`` then has the end state of each, and the errors
+        are those of each against its own start.
     peak_gib : float or None
         Largest resident memory of the process.
     laws : dict of Law
@@ -70,6 +73,7 @@ class Measured:
     counters: Counters = field(default_factory=Counters)
     compile: Compile | None = None
     timing: Timing | None = None
+    trajectories: int = 1
     peak_gib: float | None = None
     laws: dict[str, Law] = field(default_factory=dict)
     drift: dict[str, Array] = field(default_factory=dict)
@@ -167,6 +171,7 @@ def restore(
         counters=result.counters,
         compile=result.compile,
         timing=timing,
+        trajectories=result.trajectories,
         laws=result.laws,
         drift=named("drift."),
         extra=named("extra."),
@@ -207,10 +212,10 @@ def _position_error(
     # the reference is a pair of doubles, so that its own rounding does not enter the difference
     difference = (y[ours] - reference.high[theirs]) - reference.low[theirs]
     distance = largest_distance(problem, positions(problem, difference))
-    return t[ours], distance, _ahead(problem, t[ours], reference.high[theirs], difference)
+    return t[ours], distance, ahead(problem, t[ours], reference.high[theirs], difference)
 
 
-def _ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
+def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
     """Return how far in time a run is ahead: its difference from the reference along the field there.
 
     Positions and momenta are each measured in units of their largest value, so that turning

@@ -300,6 +300,17 @@ _TABLE = [
         same_trajectory=True,
     ),
     Metric(
+        key="throughput",
+        label="trajectories per second",
+        short="per second",
+        unit="1/s",
+        better=None,
+        scale="log",
+        function=quantities.throughput,
+        description="Trajectories of an ensemble per second, on one core.",
+        same_trajectory=True,
+    ),
+    Metric(
         key="compile_seconds",
         label="compile time",
         short="compile",
@@ -346,4 +357,4 @@ _TABLE = [
 ]
 
 METRICS: dict[str, Metric] = {metric.key: metric for metric in _TABLE}
-TIMING_KEYS = ("warm_seconds", "compile_seconds", "compile_cold", "compile_cached")
+TIMING_KEYS = ("warm_seconds", "throughput", "compile_seconds", "compile_cold", "compile_cached")

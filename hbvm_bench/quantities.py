@@ -148,6 +148,14 @@ def warm_seconds(m: Measured) -> float | str:
     return m.timing.summary.get("median", m.timing.why or "not timed")
 
 
+def throughput(m: Measured) -> float | str:
+    """Return the trajectories of an ensemble per second."""
+    if m.trajectories == 1:
+        return "one trajectory, no ensemble"
+    seconds = warm_seconds(m)
+    return seconds if isinstance(seconds, str) else m.trajectories / seconds
+
+
 def compile_seconds(m: Measured) -> float | str:
     """Return the seconds of compilation: the median of the timing pass where there was one."""
     compiled = m.timing.compile if m.timing is not None and m.timing.compile else m.compile

@@ -152,6 +152,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         What was measured.
     laws : dict of Law
         By invariant, where the campaign asks for them.
+    trajectories : int
+        More than one for an ensemble.
     """
 
     outcome: Outcome
@@ -163,6 +165,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     metrics: dict[str, Value] = {}
     compile: Compile | None = None
     laws: dict[str, Law] = {}
+    trajectories: int = 1
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):

@@ -19,6 +19,7 @@ HEADLINE = (
     "steps",
     "evaluations",
     "warm_seconds",
+    "throughput",
     "compile_seconds",
 )
 RANKED_BY = "position_end"
@@ -134,7 +135,7 @@ def format_value(metric: Metric, value: Value) -> Cell:
     number = value.value
     if metric.unit == "s":
         text = seconds(number)
-    elif metric.key in ("steps", "evaluations"):
+    elif metric.key in ("steps", "evaluations", "throughput"):
         text = f"{int(number):,}".replace(",", "\u202f")
     elif metric.scale == "linear":
         text = f"{number:.6f}" if 1e-3 < abs(number) < 10 else f"{number:.4g}"

@@ -5,7 +5,7 @@ import math
 import time
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +96,19 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
     program = method.compile(problem.system)
     run = Run(program, problem.y0, problem.par, problem.t0, problem.t_end)
     run.until(WARM_UP).seconds()
+    return sampled(run, program, plan)
+
+
+class Timeable(Protocol):
+    """What can be timed: a `Run`, or an ensemble."""
+
+    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+        """Return the mean seconds of some runs, and what the last returned."""
+        ...
+
+
+def sampled(run: Timeable, program: Program, plan: TimingPlan) -> TimingRound | str:
+    """Take the samples of one round of a run that is warm; see `time_round`."""
     wall, busy = time.perf_counter(), time.process_time()
     calibration = [calibrate()]
     first, reached = run.seconds()

@@ -19,17 +19,17 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from hbvm_bench import reference, timing
+from hbvm_bench import ensemble, reference, timing
 from hbvm_bench.campaign import Case, TimingPlan
 from hbvm_bench.checks import check
 from hbvm_bench.identity import Resolved, resolve
-from hbvm_bench.measure import measure
+from hbvm_bench.measure import Measured, measure
 from hbvm_bench.metrics import evaluate, guard_violation
 from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.solve import solve
 from hbvm_bench.store import atomic, encode_series
 from integrators.integrate import Solution
-from integrators.protocol import Status
+from integrators.protocol import Program, Status
 from problems.errors import InputError
 
 LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
@@ -111,6 +111,8 @@ def _measure(request: Request, directory: Path) -> Result:
             return Result(outcome="refused", reason=reason)
         grid = resolved.case.grid.times(resolved.problem)
         program = resolved.method.compile(resolved.problem.system)
+        if resolved.case.ensemble is not None:
+            return _measure_ensemble(resolved, program, directory)
         solution = solve(resolved.problem, resolved.method, program, grid)
     except InputError as error:  # a missing library among them
         return Result(outcome="refused", reason=str(error))
@@ -130,27 +132,42 @@ def _measure(request: Request, directory: Path) -> Result:
         laws=checked.laws,
         drift={"t": checked.t, **checked.errors} if checked.errors else {},
         reversal=checked.reversal,
-        peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20,
     )
+    return _stored(measured, solution.status, solution.reason, directory)
+
+
+def _measure_ensemble(resolved: Resolved, program: Program, directory: Path) -> Result:
+    asked = resolved.case.ensemble
+    assert asked is not None
+    return _stored(*ensemble.measure(resolved.problem, program, asked), directory)
+
+
+def _stored(measured: Measured, status: Status, reason: str, directory: Path) -> Result:
+    measured = replace(measured, peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
     with atomic(directory / "series.npz") as temporary:
         temporary.write_bytes(encode_series(measured.series()))
     return Result(
-        outcome="stalled" if solution.status is Status.STALLED else "ok",
-        status=solution.status.value,
-        reason=solution.reason,
+        outcome="stalled" if status is Status.STALLED else "ok",
+        status=status.value,
+        reason=reason,
         t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
         violation=guard_violation(measured),
         counters=measured.counters,
         metrics=evaluate(measured),
         compile=measured.compile,
         laws=measured.laws,
+        trajectories=measured.trajectories,
     )
 
 
 def _time(request: Request, directory: Path) -> TimingReply:
     del directory
     resolved = _resolved(request)
-    answer = timing.time_round(resolved.problem, resolved.method, request.plan)
+    asked = resolved.case.ensemble
+    if asked is None:
+        answer = timing.time_round(resolved.problem, resolved.method, request.plan)
+    else:
+        answer = ensemble.time_round(resolved.problem, resolved.method, asked, request.plan)
     return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
 
 

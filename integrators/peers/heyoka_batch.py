@@ -1,0 +1,131 @@
+"""Many trajectories by heyoka's batch integrator: one trajectory in each lane of the vector unit."""
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from integrators.peers.options import load
+from integrators.protocol import Array, Status, check_state, check_times
+from problems import emit
+from problems.errors import InputError
+from problems.system import System
+
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class TaylorBatch:
+    """Trajectories of one system.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Times.
+    y : ndarray, shape (n, m, dim)
+        States; NaN where a trajectory did not arrive.
+    status, reason : list, length n
+        How each trajectory ended, and one sentence where it failed.
+    t_stop : ndarray, shape (n,)
+        The last time, or that of the last step before a failure.
+    steps : ndarray of int, shape (n,)
+        Accepted steps.
+    """
+
+    t: Array
+    y: Array
+    status: list[Status]
+    reason: list[str]
+    t_stop: Array
+    steps: Counts
+
+
+class Lanes:
+    """heyoka's batch integrator, compiled for one system and as many lanes as it recommends here.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    options : dict
+        Those of `integrators.peers.heyoka.Taylor`.
+    """
+
+    def __init__(self, system: System, options: dict[str, Any]):
+        hy = load("heyoka")
+        self.system = system
+        self.size = int(hy.recommended_simd_size())
+        self._success = hy.taylor_outcome.time_limit
+        started = perf_counter()
+        self._ta = hy.taylor_adaptive_batch(
+            emit.heyoka(system),
+            np.zeros((system.dim, self.size)),
+            pars=np.tile(system.pack({})[:, None], (1, self.size)),
+            **options,
+        )
+        self.compile_seconds = perf_counter() - started
+
+    def run(self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float) -> TaylorBatch:
+        """Integrate every start to all times; see `integrators.peers.heyoka.TaylorProgram.batch`."""
+        given, parameters = self._given(starts, par)
+        grid = check_times(times, t0)
+        n = len(given)
+        result = TaylorBatch(
+            t=grid,
+            y=np.full((n, grid.size, self.system.dim), np.nan),
+            status=[Status.FINISHED] * n,
+            reason=[""] * n,
+            t_stop=np.full(n, grid[-1]),
+            steps=np.zeros(n, dtype=np.int64),
+        )
+        for first in range(0, n, self.size):
+            # the last lanes repeat a trajectory, so that all have something to do
+            members = np.minimum(np.arange(first, first + self.size), n - 1)
+            self._group(result, members[: min(self.size, n - first)], given[members], parameters[members], t0)
+        return result
+
+    def _group(self, result: TaylorBatch, members: Counts, starts: Array, par: Array, t0: float) -> None:
+        ta, lanes = self._ta, range(len(members))
+        ta.set_time(t0)
+        ta.state[:] = starts.T
+        if par.shape[1]:
+            ta.pars[:] = par.T
+        ended = [False for _ in lanes]
+        for place, time in enumerate(result.t.tolist()):
+            if time == t0:
+                result.y[members, place] = starts[: len(members)]
+                continue
+            ta.propagate_until(np.full(self.size, time))
+            for lane in lanes:
+                outcome, _, _, steps = ta.propagate_res[lane]
+                i = members[lane]
+                if ended[lane]:
+                    continue
+                result.steps[i] += steps
+                if outcome == self._success and np.isfinite(ta.state[:, lane]).all():
+                    result.y[i, place] = ta.state[:, lane]
+                    continue
+                ended[lane] = True
+                result.status[i] = Status.NOT_FINITE
+                result.t_stop[i] = ta.time[lane]
+                result.reason[i] = f"the state is not finite after t = {ta.time[lane]:.6g}"
+            if all(ended):
+                return
+
+    def _given(self, starts: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
+        rows = np.atleast_2d(np.asarray(starts, dtype=np.float64))
+        if rows.ndim != 2 or rows.shape[0] == 0:
+            raise InputError(f"Y0 must have shape (n, {self.system.dim}) with n >= 1, not {rows.shape}.")
+        checked = np.array([check_state(row, self.system.dim) for row in rows])
+        default = self.system.pack({})
+        values = np.asarray(default if par is None else par, dtype=np.float64)
+        if values.shape == default.shape:
+            return checked, np.tile(values, (len(checked), 1))
+        if values.shape != (len(checked), default.size):
+            raise InputError(
+                f"par must have shape {default.shape} or ({len(checked)}, {default.size}), "
+                f"not {values.shape}."
+            )
+        return checked, values
