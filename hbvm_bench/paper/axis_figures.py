@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hbvm_bench.paper.axis_motion import START, Growth
-from hbvm_bench.paper.document import GAUSS, HBVM, SEQUENTIAL, WIDTH, sheet
+from hbvm_bench.paper.document import MOTION, SEQUENTIAL, WIDTH, sheet
 from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
 from hbvm_bench.report.style import INK, MUTED, PAPER
 from integrators.protocol import Array
@@ -21,15 +21,13 @@ def chaos(
         left, right = figure.subplots(1, 2)
         spans = sorted({turn for row in rows for turn, _ in row.along if row.left is None})
         es = [row.e for row in rows]
-        left.plot(
-            es, [row.across for row in rows], color=GAUSS, marker="D", markersize=4, label="off the axis"
-        )
-        for span, face in zip(spans, (PAPER, HBVM), strict=False):
+        left.plot(es, [row.across for row in rows], color=INK, marker="D", markersize=4, label="off the axis")
+        for span, face in zip(spans, (PAPER, MOTION), strict=False):
             values = [abs(dict(row.along).get(span, math.nan)) for row in rows]
             left.plot(
                 es,
                 values,
-                color=HBVM,
+                color=MOTION,
                 marker="o",
                 markersize=4.5,
                 mfc=face,
@@ -64,7 +62,7 @@ def chaos(
             ours[:, 0],
             ours[:, 1],
             ".",
-            color=HBVM,
+            color=MOTION,
             markersize=3.0,
             rasterized=True,
             label="the paper's orbit",
@@ -114,7 +112,7 @@ def territory(
         ticks = [value for value in (1, 3, 10, 30, 100, 300) if value <= turns]
         bar.set_ticks([math.log10(value) for value in ticks], labels=[str(value) for value in ticks])
         bar.set_label(f"revolutions until |z| > 100; blank: stays for {turns}")
-        axes.plot(e, START[1], "o", color=HBVM, markersize=8, mec=PAPER, mew=1.5, zorder=5)
+        axes.plot(e, START[1], "o", color=MOTION, markersize=8, mec=PAPER, mew=1.5, zorder=5)
         axes.annotate(
             "the paper's run",
             (e, START[1]),

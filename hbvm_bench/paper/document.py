@@ -7,7 +7,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.canvas import Picture, new
-from hbvm_bench.report.style import base_colours
+from hbvm_bench.report.style import OTHERS, base_colours
 
 VERDICTS = {
     "holds": "confirmed",
@@ -18,8 +18,9 @@ VERDICTS = {
 # Colours of the figures' families: light, dark. The true motion has the neutral colour of D's figures.
 GAUSS, GAUSS_DARK = base_colours("Gauss")
 HBVM, HBVM_DARK = base_colours("HBVM")
+MOTION, MOTION_DARK = OTHERS[0]  # of what is a property of the motion, not of a method
 SEQUENTIAL = LinearSegmentedColormap.from_list(
-    "dusk", ["#f2d9b8", "#d98f4e", "#9c4a3c", "#4b2545", "#1b1a35"]
+    "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
 WIDTH = 10.4  # inches, of a whole line
 

@@ -27,6 +27,11 @@ DIRECTIONS = tuple((np.arange(36) * 2 * math.pi / 36).tolist())
 GAPS = tuple((10.0 ** np.linspace(-5.0, -2.0, 19)).tolist())
 MAP_END = 2e4
 
+STEPS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
+STEP_STARTS = 8
+TRUTH = HBVM(k=15, s=10, h=0.25)
+AGREES = 1e-2  # distance at which two orbits have parted
+
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
@@ -53,6 +58,25 @@ class Orbit:
     error: float
     left: float | None
     outside: int
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """What a method does with a step.
+
+    Attributes
+    ----------
+    h : float
+        The step.
+    left : list of (float or None)
+        When the orbits from neighbouring starts have left.
+    agrees : float
+        Time up to which the orbit is within `AGREES` of the true one.
+    """
+
+    h: float
+    left: list[float | None]
+    agrees: float
 
 
 def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END, every: int = 1) -> Orbit:
@@ -93,6 +117,24 @@ def escapes(
         departure(program.start(neighbour(problem.y0, i), problem.par, 0.0), t_end, _gone, stretch=256 * H)
         for i in offsets
     ]
+
+
+def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STARTS) -> list[StepRow]:
+    """Return what ``gauss``, s = 2, or ``hbvm``, HBVM(4, 2), does with each step."""
+    rows = []
+    for h in steps:
+        method = Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h)
+        rows.append(StepRow(h, escapes(method, range(starts)), agreement(method)))
+    return rows
+
+
+def agreement(method: MethodBase, t_end: float = 100.0) -> float:
+    """Return the time of the first own step at which the orbit is `AGREES` away from the true one."""
+    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    found = integrate(problem, method, times=[t_end], sample="steps")
+    truth = integrate(problem, TRUTH, times=found.t)
+    parted = np.flatnonzero(~(np.hypot(*(found.y[:, :2] - truth.y[:, :2]).T) < AGREES))
+    return float(found.t[parted[0]] if parted.size else found.t[-1])
 
 
 def escape_map(

@@ -16,18 +16,22 @@ from integrators.protocol import Array
 from problems.henon_heiles import ESCAPE, SADDLES
 
 LEVELS = (0.02, 0.05, 0.08, 0.11, 0.14, ESCAPE)
+LABELLED = (math.radians(162), math.radians(34))  # directions from the origin, alternating
 
 
 def level_curves(trace: Array) -> Picture:
     """henon_fig1: level curves of U with a traced orbit."""
     with drawing():
-        figure = sheet(WIDTH * 0.66, 5.0)
+        figure = sheet(WIDTH * 0.6, 5.0)
         axes = figure.subplots()
         x, y = np.meshgrid(np.linspace(-1.25, 1.25, 301), np.linspace(-0.75, 1.25, 301))
         axes.plot(*trace.T, color=HBVM, linewidth=0.6, alpha=0.6)
         lines = axes.contour(x, y, potential(x, y), levels=LEVELS, colors=INK, linewidths=0.9)
         for text in axes.clabel(
-            lines, fmt=lambda value: "1/6" if abs(value - ESCAPE) < 1e-9 else f"{value:g}", fontsize=7.5
+            lines,
+            fmt=lambda value: "1/6" if abs(value - ESCAPE) < 1e-9 else f"{value:g}",
+            fontsize=7.5,
+            manual=[_on_level(level, LABELLED[i % 2]) for i, level in enumerate(LEVELS)],
         ):
             text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
         _saddles(axes)
@@ -49,7 +53,7 @@ def plane(run: Orbit, family: str, figure_number: int, caption: str) -> Picture:
     """henon_fig2, henon_fig3: every step in the (q1, q2) plane."""
     colour = GAUSS if family == "gauss" else HBVM
     with drawing():
-        figure = sheet(WIDTH * 0.66, 5.0)
+        figure = sheet(WIDTH * (0.6 if run.left is None else 0.66), 5.0)
         axes = figure.subplots()
         corners = np.array([*SADDLES, SADDLES[0]])
         axes.plot(*corners.T, color=INK, linewidth=0.9)
@@ -189,7 +193,7 @@ def maps(
                 gaps,
                 shown,
                 cmap=SEQUENTIAL.reversed(),
-                vmin=1,
+                vmin=2,
                 vmax=math.log10(t_end),
                 shading="nearest",
                 rasterized=True,
@@ -200,6 +204,9 @@ def maps(
             axes.grid(visible=False)
             left = int(np.count_nonzero(~np.isnan(times)))
             axes.set_title(f"{name}: {left} of {times.size} leave", color=INK)
+            if left == 0:
+                middle = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+                axes.text(0.5, 0.5, "every orbit stays inside", color=MUTED, fontsize=9, **middle)
         powers = range(math.ceil(math.log10(min(gaps))), math.floor(math.log10(max(gaps))) + 1)
         panels[0].yaxis.set_major_locator(FixedLocator([10.0**p for p in powers]))
         panels[0].yaxis.set_major_formatter(lambda value, _: power_label(value))
@@ -207,7 +214,7 @@ def maps(
         panels[0].invert_yaxis()
         assert mesh is not None
         bar = figure.colorbar(mesh, ax=panels, pad=0.01, aspect=28)
-        ticks = [p for p in range(1, 6) if 10**p <= t_end]
+        ticks = [p for p in range(2, 6) if 10**p <= t_end]
         bar.set_ticks(ticks, labels=[power_label(10.0**p) for p in ticks])
         bar.set_label("escape time; blank: inside throughout")
         inside = gauss[np.asarray(gaps) >= 4e-3]
@@ -224,6 +231,13 @@ def maps(
             f"{int(np.count_nonzero(~np.isnan(inside)))} of {inside.size} of those with 1/6 − H₀ ≥ 4e-3; "
             f"under HBVM {int(np.count_nonzero(~np.isnan(hbvm)))}.",
         )
+
+
+def _on_level(level: float, angle: float) -> tuple[float, float]:
+    """Return the point of U = level in a direction, by U = r^2/2 + r^3 sin(3 angle)/3."""
+    roots = np.roots([math.sin(3 * angle) / 3, 0.5, 0.0, -level])
+    radius = min(root.real for root in roots if abs(root.imag) < 1e-9 and root.real > 0)
+    return radius * math.cos(angle), radius * math.sin(angle)
 
 
 def _saddles(axes: Axes) -> None:

@@ -8,7 +8,17 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from hbvm_bench.paper.document import GAUSS, GAUSS_DARK, HBVM, HBVM_DARK, VERDICTS, Part, Table
+from hbvm_bench.paper.document import (
+    GAUSS,
+    GAUSS_DARK,
+    HBVM,
+    HBVM_DARK,
+    MOTION,
+    MOTION_DARK,
+    VERDICTS,
+    Part,
+    Table,
+)
 from hbvm_bench.report.canvas import Picture, inline_svg
 from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS
@@ -23,7 +33,7 @@ LEAD = (
     "the two differ, the difference is explained; where the paper is silent, it is measured."
 )
 ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
-COLOURS = {GAUSS: "--gauss", HBVM: "--hbvm"}
+COLOURS = {GAUSS: "--gauss", HBVM: "--hbvm", MOTION: "--motion"}
 
 
 def markdown(parts: Sequence[Part], command: str) -> str:
@@ -48,10 +58,10 @@ def page(parts: Sequence[Part], command: str) -> str:
         **_values(parts, command),
         css=Markup(_style("hbvm_bench.report", "style.css") + _style("hbvm_bench.paper", "paper.css")),
         script=Markup(_style("hbvm_bench.report", "script.js")),
-        light=_variables(
-            {name: colour for colour, name in NEUTRALS.items()} | {"--gauss": GAUSS, "--hbvm": HBVM}
+        light=_variables({name: colour for colour, name in (NEUTRALS | COLOURS).items()}),
+        dark=_variables(
+            DARK_NEUTRALS | {"--gauss": GAUSS_DARK, "--hbvm": HBVM_DARK, "--motion": MOTION_DARK}
         ),
-        dark=_variables(DARK_NEUTRALS | {"--gauss": GAUSS_DARK, "--hbvm": HBVM_DARK}),
     )
 
 

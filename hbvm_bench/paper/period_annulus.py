@@ -112,6 +112,14 @@ def cell(s: int, h: float) -> dict[str, Edge]:
     return made
 
 
+def limit(s: int, h: float, span: float = SPAN) -> tuple[float, float]:
+    """Return when the first start beyond the edge by HBVM departs, and how far H/H* rises until then."""
+    method = HBVM(k=NODES[s], s=s, h=h)
+    t, y = orbit(method, edge(method, span).high, span)
+    values = energy(y)
+    return float(t[-1]), float((values - values[0]).max() / H_STAR)
+
+
 def spread(s: int, h: float, ends: Sequence[float] = ENDS) -> list[float]:
     """Return the errors in H of Gauss(s) over the paper's span, from bisections with other ends."""
     method = Gauss(s=s, h=h)
@@ -150,9 +158,9 @@ def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
     The period ends at the return to the positive p axis; the root is found by secants, and
     every state between steps is a partial step.
     """
-    method = HBVM(k=15, s=6, h=1 / 16)
-    program = method.compile(PROBLEM.system)
-    return [(error_of(C_STAR * (1 - gap)), _period(program, C_STAR * (1 - gap), method.h)) for gap in gaps]
+    h = 1 / 16
+    program = HBVM(k=15, s=6, h=h).compile(PROBLEM.system)
+    return [(error_of(C_STAR * (1 - gap)), _period(program, C_STAR * (1 - gap), h)) for gap in gaps]
 
 
 def eigenvalues(point: Sequence[float]) -> NDArray[np.complex128]:

@@ -18,18 +18,18 @@ Path = tuple[Array, Array]
 def level_curves() -> Picture:
     """poinc_fig1: level curves around the centre P0 and the saddle P1."""
     with drawing():
-        figure = sheet(WIDTH * 0.66, 4.6)
+        figure = sheet(WIDTH * 0.56, 5.0)
         axes = figure.subplots()
         q, p, values = _levels((-1.0, 0.6), (-0.8, 0.6), 241)
         others = [level for level in LEVELS if level != H_STAR]
         lines = axes.contour(q, p, values, levels=others, colors=MUTED, linewidths=0.8)
         axes.clabel(lines, fmt="%g", fontsize=7.5)
         edge = axes.contour(q, p, values, levels=[H_STAR], colors=INK, linewidths=1.6)
-        axes.clabel(edge, fmt="H*", fontsize=8.5)
+        axes.clabel(edge, fmt="H*", fontsize=8.5, manual=[(0.36, 0.2)])
         axes.plot(0, 0, "o", color=INK, markersize=5)
-        axes.annotate("P₀, centre", (0, 0), xytext=(7, 4), textcoords="offset points", fontsize=9)
+        axes.annotate("P₀", (0, 0), xytext=(4, 4), textcoords="offset points", fontsize=9)
         axes.plot(*P1, "s", color=INK, markersize=5)
-        axes.annotate("P₁, saddle", P1, xytext=(-4, -14), textcoords="offset points", fontsize=9)
+        axes.annotate("P₁", P1, xytext=(-17, 5), textcoords="offset points", fontsize=9)
         axes.set_xlabel("q")
         axes.set_ylabel("p")
         axes.set_aspect("equal")
@@ -37,8 +37,8 @@ def level_curves() -> Picture:
             figure,
             "period-annulus-1",
             "Figure 1 · level curves",
-            f"The edge of the period annulus is the loop of H* = {H_STAR:.10f} that leaves the saddle P₁ "
-            "and returns to it.",
+            f"The edge of the annulus of the centre P₀ is the loop of H* = {H_STAR:.10f} that leaves the "
+            "saddle P₁ and returns to it.",
             "Closed curves around P0 up to the loop through P1; open ones beyond.",
         )
 

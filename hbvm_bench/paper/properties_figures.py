@@ -27,8 +27,8 @@ def order(rows: Sequence[Order]) -> Picture:
                     row.error,
                     color=HBVM,
                     marker=MARKERS[s],
-                    mfc=HBVM if row.k == s else PAPER,
-                    markersize=5,
+                    mfc=HBVM if row.k == s else "none",
+                    markersize=3 if row.k == s else 7,
                     linewidth=0.8,
                 )
             axes.annotate(
@@ -41,7 +41,7 @@ def order(rows: Sequence[Order]) -> Picture:
                 annotation_clip=False,
             )
         axes.set_xscale("log")
-        log_axis(axes, "y", -15, -2, most=8)
+        log_axis(axes, "y", -16, -2, most=8)
         axes.set_xticks([0.01, 0.03, 0.1, 0.3, 1], labels=["0.01", "0.03", "0.1", "0.3", "1"])
         axes.set_xlim(0.008, 2.5)
         axes.minorticks_off()
@@ -51,7 +51,7 @@ def order(rows: Sequence[Order]) -> Picture:
             figure,
             "properties-order",
             "The order is 2s for every k",
-            "HBVM(k,s) on Hénon–Heiles for k = s (filled), s + 1, 2s and 3s (open), which lie on one "
+            "HBVM(k,s) on Hénon–Heiles for k = s (small, filled), s + 1, 2s and 3s (open), which lie on one "
             "another: the silent stages do not change the order. The numbers are the fitted slopes.",
             f"{len(rows)} pairs (k, s); the largest distance of a fitted order from 2s is "
             f"{max(abs(row.slope - 2 * row.s) for row in rows):.2f}.",

@@ -156,8 +156,13 @@ def orbit(method: MethodBase, every: int = 1) -> Orbit:
 
 
 def orbits() -> dict[str, Orbit]:
-    """Return the paper's two runs and the true motion, all on the grid of step 1/2."""
-    made = {"gauss": orbit(GAUSS), "hbvm": orbit(HBVM_18), "truth": orbit(TRUTH, every=4)}
+    """Return the paper's two runs and the true motion on the grid of step 1/2, and that on its own grid."""
+    made = {
+        "gauss": orbit(GAUSS),
+        "hbvm": orbit(HBVM_18),
+        "truth": orbit(TRUTH, every=4),
+        "fine": orbit(TRUTH),
+    }
     method = both_laws()
     if method is not None:
         made["both"] = orbit(method)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, sheet
-from hbvm_bench.paper.sitnikov import REVOLUTIONS, T_END, D, E, H, Orbit
+from hbvm_bench.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
 from hbvm_bench.report.figures import envelope
 from hbvm_bench.report.style import INK, MUTED, TRUTH
@@ -31,7 +31,7 @@ def configuration(truth: Orbit) -> Picture:
             axes.set_xlim(0, end)
             axes.set_ylim(-2, 2)
             axes.set_ylabel("z")
-            axes.set_title(f"true height of the planetoid, t ≤ {end:g}", color=INK)
+            axes.set_title(f"the planetoid's true height, t ≤ {end:g}", color=INK)
         panels[1].set_xlabel("time")
         return picture(
             figure,
@@ -82,28 +82,21 @@ def trajectories(
         left.set_xlabel("x")
         left.set_ylabel("y")
         left.set_title(f"primaries, every step to t = {run.t[-1]:g}", color=INK)
-        if run.lost is None:
-            shown = truth.t <= end
-            right.plot(truth.t[shown], truth.z[shown], color=TRUTH, linewidth=2.2, label="true")
-            right.set_ylim(-2, 2)
         shown = run.t <= end
+        if run.lost is None:
+            past = truth.t <= end
+            right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="true motion")
+            right.set_ylim(-2, 2)
+            right.set_title("the planetoid on the axis", color=INK)
+        else:
+            right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
+            _before(right, run, colour)
         right.plot(run.t[shown], run.z[shown], color=colour, linewidth=0.9, label=run.method)
-        if run.lost is not None:
-            right.axvline(run.lost, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
-            right.annotate(
-                f"|z| > 10 at t = {run.lost:g}",
-                (run.lost, 0.04),
-                xycoords=("data", "axes fraction"),
-                xytext=(6, 0),
-                textcoords="offset points",
-                color=INK,
-                fontsize=8,
-            )
         right.set_xlim(0, end)
         right.set_xlabel("time")
         right.set_ylabel("z")
-        right.set_title("the planetoid on the axis", color=INK)
-        right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.08), ncols=2)
+        if run.lost is None:
+            right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
         name = {"gauss": "Gauss of order four", "hbvm": "HBVM(18,2)"}[family]
         return picture(
             figure,
@@ -192,6 +185,19 @@ def errors(runs: Mapping[str, Orbit]) -> Picture:
         )
 
 
+def _before(axes: Axes, run: Orbit, colour: str) -> None:
+    """Show the oscillations up to the planetoid's loss in an inset, on the empty side."""
+    assert run.lost is not None
+    until = run.t <= run.lost
+    falls = run.z[-1] < 0
+    inset = axes.inset_axes((0.09, 0.12 if falls else 0.5, 0.42, 0.36), zorder=5)
+    inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
+    inset.set_xlim(0, run.lost)
+    inset.set_ylim(-LOST, LOST)
+    inset.tick_params(labelsize=7)
+    inset.set_title(f"until |z| > {LOST:g}, at t = {run.lost:g}", color=INK, fontsize=8)
+
+
 def _configuration(axes: Axes, truth: Orbit) -> None:
     def place(x: float, y: float, z: float) -> tuple[float, float]:
         return x + 0.5 * y, TILT * y + z
@@ -207,7 +213,7 @@ def _configuration(axes: Axes, truth: Orbit) -> None:
         x, y = sign * a * (np.cos(angle) + E), sign * a * np.sqrt(1 - E * E) * np.sin(angle)
         axes.plot(x + 0.5 * y, TILT * y, color=INK, linewidth=1.0)
         axes.plot(*place(sign * D / 2, 0, 0), "o", color=INK, markersize=12)
-        say("m = 1", sign * D / 2, 0, 0, (0, 12), ha="center")
+        say("m = 1", sign * D / 2, 0, 0, (0, 12 if sign < 0 else -19), ha="center")
     low, high = place(0, 0, -2.2), place(0, 0, 2.2)
     axes.plot([low[0], high[0]], [low[1], high[1]], color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     top = float(truth.z.max())

@@ -14,6 +14,7 @@ from hbvm_bench.paper.tasks import Results, Task
 NODE_STEPS = (0.5, 0.25)
 SCANS = 3  # tasks of the scan over eccentricities
 CHUNKS = 4  # tasks of the map of who stays
+BLOWN = 1e3  # relative error of H of a run that has no meaning
 
 
 def tasks() -> list[Task]:
@@ -50,7 +51,7 @@ def part(results: Results) -> Part:
     steps: list[StepRow] = [*results["sitnikov/steps 2"], *results["sitnikov/steps 3"][1:]]
     growth = [row for i in range(SCANS) for row in results[f"sitnikov/growth {i}"]]
     stays = np.vstack([results[f"sitnikov/stays {i}"] for i in range(CHUNKS)])
-    gauss, hbvm, truth = runs["gauss"], runs["hbvm"], runs["truth"]
+    gauss, hbvm, truth = runs["gauss"], runs["hbvm"], runs["fine"]
     return Part(
         key="sitnikov",
         title="Sitnikov's problem",
@@ -90,7 +91,7 @@ def part(results: Results) -> Part:
             sitnikov_beyond.by_step(steps),
             sitnikov_beyond.step_table(steps),
             sitnikov_beyond.truth_compared(results["sitnikov/truth"]),
-            _plainly(steps),
+            _plainly(steps, results),
             axis_figures.chaos(growth, results["sitnikov/section"], sitnikov.E, claims.CRITICAL),
             axis_figures.territory(
                 axis_motion.MAP_ECCENTRICITIES,
@@ -119,16 +120,21 @@ def _both(runs: dict[str, Orbit]) -> list[str]:
     ]
 
 
-def _plainly(steps: list[StepRow]) -> str:
+def _plainly(steps: list[StepRow], results: Results) -> str:
     found = claims.row(steps, "hbvm", sitnikov.H)
+    paper, ours = (
+        results[f"sitnikov/other {text}"].numbers
+        for text in ("HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)")
+    )
+    share = ours["evaluations"] / paper["evaluations"]
     return (
         "What HBVM(18,2) with h = 1/2 gets right: the energy, the length of the primaries' axis and with "
         f"it their period (to {number(found.slow)}), a planetoid that stays. What it gets wrong: the "
         f"direction of the ellipses, which turn by {found.turn:.1f} degrees per revolution, the angular "
         "momentum, and the planetoid's phase: after a few hundred units of time its height has nothing to "
-        "do with the true one. Nor is the method symplectic. A higher order with a smaller step costs "
-        "little more and gets all of it right, as the table of the libraries shows for HBVM(16,8) with h = "
-        "1/8."
+        "do with the true one. Nor is the method symplectic. A higher order with a smaller step gets all "
+        f"of it right: HBVM(16,8) with h = 1/8 has z at t = 1500 to {number(ours['z'])}, for {share:.2f} "
+        "times the field evaluations of the paper's run (table of the libraries below)."
     )
 
 
@@ -137,23 +143,35 @@ def _others(results: Results) -> Table:
     return Table(
         key="sitnikov-others",
         title="The same run with other integrators",
-        head=("method", "energy", "angular momentum", "off the axis", "z at 1500 off by", "remark"),
+        head=(
+            "method",
+            "energy",
+            "angular momentum",
+            "off the axis",
+            "z at 1500 off by",
+            "evaluations",
+            "remark",
+        ),
         rows=tuple(
             (
                 row.method,
                 *(number(row.numbers.get(key)) for key in ("energy", "momentum", "off_axis", "z")),
+                f"{row.numbers['evaluations']:,.0f}" if "evaluations" in row.numbers else "–",
                 row.remark or _remark(row),
             )
             for row in rows
         ),
-        numbers=frozenset(range(1, 5)),
-        caption="One setting per method, as its authors advise for accuracy. `hbvm-bench run sitnikov` has "
+        numbers=frozenset(range(1, 6)),
+        caption="One setting per method, as its authors advise for accuracy. Evaluations: of the vector "
+        "field, where the library counts them. `hbvm-bench run sitnikov` has "
         "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
         "nothing.",
     )
 
 
 def _remark(row: others.Row) -> str:
+    if row.numbers.get("energy", 0.0) > BLOWN:
+        return "blows up"
     if row.numbers.get("off_axis", 0.0) > 1e-6:
         return "thrown off the axis by asymmetric rounding"
     if row.numbers.get("z", 0.0) > sitnikov.LOST:

@@ -1,5 +1,6 @@
 """The report's machinery: departure, tasks, documents, the command."""
 
+import io
 import re
 from functools import partial
 
@@ -94,6 +95,18 @@ def test_the_same_figure_gives_the_same_bytes():
     times = {"Gauss(s=2, h=1.0)": [100.0, None], "HBVM(k=4, s=2, h=1.0)": [None, None]}
     first, second = fates(times, 7000.0), fates(times, 7000.0)
     assert (first.svg, first.png) == (second.svg, second.png)
+
+
+def test_pictures_are_kept_small_without_a_visible_difference():
+    from PIL import Image
+
+    drawn = fates({"Gauss(s=2, h=1.0)": [100.0, None], "HBVM(k=4, s=2, h=1.0)": [None]}, 7000.0).png
+    small = command.small(drawn)
+    assert len(small) < 0.6 * len(drawn)  # 0.4
+    before, after = (
+        np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float) for png in (drawn, small)
+    )
+    assert np.abs(before - after).mean() < 0.5  # 0.02 of 255
 
 
 def test_a_figure_s_size_in_the_page_follows_its_width():
