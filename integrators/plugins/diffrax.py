@@ -20,7 +20,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from integrators.legendre import tables, xi
+from integrators import legendre
+from integrators.legendre import tables
 from integrators.peers.options import load
 from problems.errors import InputError
 
@@ -141,8 +142,9 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         ratio = jax.lax.stop_gradient(h / length)
         guessed = (ratio > 0.0) & (ratio <= FARTHEST) & ~jnp.asarray(made_jump)
         ratio = jnp.where(guessed, ratio, 0.0)
-        beyond = jnp.stack(_basis(1.0 + ratio * table.nodes.hi, modes), axis=1)
-        matrix = jnp.where(guessed, ratio * (table.projection.hi @ beyond), 0.0)
+        nodes, projection = (jnp.asarray(x.hi, ratio.dtype) for x in (table.nodes, table.projection))
+        beyond = jnp.stack(_basis(1.0 + ratio * nodes, modes), axis=1)
+        matrix = jnp.where(guessed, ratio * (projection @ beyond), 0.0)
         guess = jax.tree.map(lambda G: _apply(matrix, G[:modes]), before.coefficients)
         return jax.lax.stop_gradient(guess), guessed
 
@@ -296,18 +298,23 @@ def _real(dtype: Any) -> Any:
     return jnp.finfo(dtype).dtype
 
 
+def _xi(j: int) -> float:
+    """Return xi_j as a number without a type of its own, which single precision stays single with."""
+    return float(legendre.xi(j))
+
+
 def _basis(c: Any, n: int) -> list[Any]:
     """Return P_0 .. P_{n-1} at c."""
-    P = [jnp.ones_like(c), (c - 0.5) / xi(1)]
+    P = [jnp.ones_like(c), (c - 0.5) / _xi(1)]
     for j in range(1, n - 1):
-        P.append(((c - 0.5) * P[j] - j * xi(j) * P[j - 1]) / ((j + 1) * xi(j + 1)))
+        P.append(((c - 0.5) * P[j] - j * _xi(j) * P[j - 1]) / ((j + 1) * _xi(j + 1)))
     return P[:n]
 
 
 def _integrals(c: Any, n: int) -> list[Any]:
     """Return the integrals of P_0 .. P_{n-1} from 0 to c."""
     P = _basis(jnp.asarray(c), n + 1)
-    return [c] + [xi(j + 1) * P[j + 1] - xi(j) * P[j - 1] for j in range(1, n)]
+    return [c] + [_xi(j + 1) * P[j + 1] - _xi(j) * P[j - 1] for j in range(1, n)]
 
 
 def _check(k: int, s: int) -> None:
