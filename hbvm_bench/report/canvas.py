@@ -3,15 +3,17 @@
 import io
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
 
 from hbvm_bench.report.plots import Plot
 from hbvm_bench.report.style import GRID, INK, MUTED, NEUTRALS, PAPER
@@ -193,6 +195,17 @@ def log_axis(
     axis.set_major_locator(FixedLocator(sorted(labels)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, power_label(value))))
+
+
+def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:
+    """Return the powers of ten between which positive values lie, within ``low`` and ``high``."""
+    logs = [np.log10(v[(v > 0) & np.isfinite(v)]) for v in values]
+    logs = [one for one in logs if one.size]
+    if not logs:
+        return low, high
+    bottom = max(low, math.floor(min(float(one.min()) for one in logs)))
+    top = min(high, math.ceil(max(float(one.max()) for one in logs)))
+    return min(bottom, high - 1), max(top, min(bottom, high - 1) + 1)
 
 
 def power_label(value: float) -> str:

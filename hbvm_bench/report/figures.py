@@ -1,8 +1,9 @@
 """The figures that every problem has: work and precision, and errors over time."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -87,7 +88,16 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
         for case in members:
             _draw_error(axes, case, what)
         panel_legend(axes, members, markers=not what.joined)
-    plot = Plot([Panel("", Axis("time", both=True), Axis(what.label, log=True), _curves(shown, what))])
+    plot = Plot(
+        [
+            Panel(
+                "",
+                Axis("time", both=True),
+                Axis(what.label, log=True, low=what.low, high=what.high),
+                _curves(shown, what),
+            )
+        ]
+    )
     return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what), plot)
 
 
@@ -153,8 +163,14 @@ def family_panels(
     return figure, made
 
 
-def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -> None:
-    """Put the legend under its panel, where it covers no data."""
+def panel_legend(
+    axes: Axes,
+    cases: Sequence[Drawn],
+    *,
+    markers: bool = False,
+    notes: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
     named = len({method_name(case.record) for case in cases}) > 1
     handles = [
         Line2D(
@@ -164,11 +180,19 @@ def panel_legend(axes: Axes, cases: Sequence[Drawn], *, markers: bool = False) -
             dashes=case.look.dash or (None, None),
             marker=case.look.marker if markers else "",
             markersize=4,
-            label=case.legend(named=named),
+            label=shortened(case.legend(named=named), notes.get(case.record.id, "")),
         )
         for case in cases
     ]
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.03, -0.23), borderaxespad=0.0)
+
+
+def shortened(name: str, note: str, most: int = 52) -> str:
+    """Return a name and its note in one line of a legend; the name gives way."""
+    if not note:
+        return name
+    room = max(most - len(note) - 3, 8)
+    return f"{name if len(name) <= room else name[: room - 1] + '…'}   {note}"
 
 
 def work_precision(cases: Sequence[Drawn]) -> Picture | None:

@@ -21,6 +21,8 @@ DIGITS = 16  # of a double: a bar of this many digits is full
 # Paths of the markers in a box of 12 by 12, as the figures draw them.
 MARKERS = {
     "o": '<circle cx="6" cy="6" r="4.2"/>',
+    "d": '<path d="M6 1 9.2 6 6 11 2.8 6z"/>',
+    "8": '<path d="M4.1 1.4h3.8l2.7 2.7v3.8l-2.7 2.7H4.1L1.4 7.9V4.1z"/>',
     "D": '<path d="M6 1 11 6 6 11 1 6z"/>',
     "s": '<path d="M2 2h8v8H2z"/>',
     "^": '<path d="M6 1.5 10.8 10H1.2z"/>',
@@ -64,7 +66,7 @@ def page(content: Content) -> str:
         symbols=symbols(_looks(content)),
         libraries=libraries,
         css=Markup(_text("style.css")),
-        script=Markup(_text("script.js") + _text("table.js") + _text("explore.js")),
+        script=Markup(_text("script.js") + _text("table.js") + _text("motion.js") + _text("explore.js")),
         data=Markup(pack.page_data(content)),
         library=Markup(pack.library()),
         light=_variables(
@@ -106,7 +108,7 @@ def symbols(looks: Sequence[Look]) -> Markup:
 
 
 def _marker(look: Look) -> int:
-    return list(MARKERS).index(look.marker if look.marker in MARKERS else "*")
+    return list(MARKERS).index(look.marker)
 
 
 def call(text: str) -> Markup:

@@ -17,6 +17,7 @@ from plotly.offline import get_plotlyjs
 
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
+from hbvm_bench.report import motion
 from hbvm_bench.report.content import Content
 from hbvm_bench.report.plots import as_csv, as_json, numbers
 from hbvm_bench.report.style import Look
@@ -26,6 +27,8 @@ from hbvm_bench.table import group_of, status_of
 SYMBOLS = {
     "o": "circle",
     "D": "diamond",
+    "d": "diamond-tall",
+    "8": "octagon",
     "s": "square",
     "^": "triangle-up",
     "v": "triangle-down",
@@ -67,6 +70,7 @@ def page_data(content: Content) -> str:
     data = {
         "looks": looks_json(content.looks.values()),
         "plots": plots,
+        "motions": {s.motion.key: motion.as_json(s.motion) for s in content.sections if s.motion is not None},
         "csv": results_csv(content.records),
         "json": results_json(content),
     }
@@ -79,7 +83,7 @@ def looks_json(looks: Any) -> dict[str, dict[str, Any]]:
     return {
         str(number): {
             "dash": ",".join(f"{1.3 * length:.3g}px" for length in look.dash) or "solid",
-            "symbol": SYMBOLS.get(look.marker, "star"),
+            "symbol": SYMBOLS[look.marker],
         }
         for number, look in unique.items()
     }

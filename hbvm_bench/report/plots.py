@@ -18,11 +18,16 @@ TABLE_COLUMNS = 6  # places on the horizontal axis that the table of a curve sho
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: its label, whether it is logarithmic, and whether the page offers to change that."""
+    """One axis: its label, whether it is logarithmic, and whether the page offers to change that.
+
+    What lies beyond ``low`` or ``high`` (powers of ten) is out of the first view.
+    """
 
     label: str
     log: bool = False
     both: bool = False
+    low: int | None = None
+    high: int | None = None
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,7 @@ def as_json(plot: Plot) -> dict[str, Any]:
                         "y": [short(value) for value in trace.y.tolist()],
                     }
                     for trace in panel.traces
+                    if trace.x.size
                 ],
             }
             for panel in plot.panels

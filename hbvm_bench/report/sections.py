@@ -12,9 +12,11 @@ from hbvm_bench.identity import make_problem
 from hbvm_bench.quantities import PLANETOID_Z
 from hbvm_bench.records import Record
 from hbvm_bench.reference import Reference
-from hbvm_bench.report import figures, views, words
+from hbvm_bench.report import figures, motion, portraits, views, words
 from hbvm_bench.report.canvas import Picture, drawing
+from hbvm_bench.report.drift_figure import drift_figure
 from hbvm_bench.report.figures import Drawn, OverTime
+from hbvm_bench.report.motion import Motion
 from hbvm_bench.report.style import Look
 from hbvm_bench.store import Store
 from hbvm_bench.table import GROUPS, Row, rows
@@ -43,6 +45,8 @@ class Section:
         The trusted solution.
     truth : list of (str, str)
         Its values that the table's readers want beside it.
+    motion : Motion or None
+        What the page can move.
     """
 
     problem: Problem
@@ -53,6 +57,7 @@ class Section:
     pictures: list[Picture]
     reference: Reference | None
     truth: list[tuple[str, str]]
+    motion: Motion | None
 
 
 def section(
@@ -83,6 +88,8 @@ def section(
     cases = [Drawn(record, look[record.id], store.series(record.id)) for record, store in found]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
+    pictures = _pictures(problem, drawn, known, number)
+    moving = [picture.key for picture in pictures if picture.key.partition("-")[0] == "motion"]
     return Section(
         problem=problem,
         summary=words.summary(records),
@@ -93,7 +100,8 @@ def section(
             if any(row.group == key for row in table)
         ],
         missing=missing,
-        pictures=_pictures(problem, drawn, known, number),
+        pictures=pictures,
+        motion=Motion(moving[0], motion.chosen(drawn)) if moving else None,
         reference=known,
         truth=_truth(problem, known),
     )
@@ -103,8 +111,12 @@ def _pictures(
     problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int
 ) -> list[Picture]:
     with drawing():
-        made = [figures.work_precision(cases)]
+        made = [figures.work_precision(cases), drift_figure(cases)]
         made += [figures.over_time(cases, what) for what in OVER_TIME]
+        made += [figures.over_time(cases, what) for what in _other_invariants(cases)]
+        made += [portraits.portrait(problem, cases), portraits.section(problem, cases)]
+        if problem.name == "sitnikov":
+            made.insert(2, motion.still(cases, "The system in space"))
         made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
         made.append(views.step_sizes(cases))
     suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
@@ -162,6 +174,31 @@ OVER_TIME = (
         high=5,
     ),
 )
+
+
+def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
+    """Return a figure for every invariant that has none of its own."""
+    drawn = {"error.energy", "error.angular_momentum"}
+    names = dict.fromkeys(
+        n for case in cases for n in case.series if n.startswith("error.") and n not in drawn
+    )
+    made = []
+    for name in names:
+        if not any(np.any(case.series[name] != 0.0) for case in cases if name in case.series):
+            continue
+        words_ = name.removeprefix("error.").replace("_", " ")
+        made.append(
+            OverTime(
+                key=f"invariant-{words_.replace(' ', '-')}",
+                title=f"{words_.capitalize()}: error over time",
+                caption="Relative error, or absolute where the value at the start is 0; a vector's 2-norm.",
+                label=f"error of {words_}",
+                get=lambda series, name=name: _pair(series, "t", name),
+                low=-17,
+                high=2,
+            )
+        )
+    return made
 
 
 def _pair(series: dict[str, Array], t: str, values: str) -> tuple[Array, Array] | None:

@@ -18,10 +18,12 @@ from hbvm_bench.table import numbers
 FAMILIES = {
     "HBVM": ("#0a58b5", "#62b0ff"),
     "Gauss": ("#0a8f9c", "#4fd3de"),
+    "LineIntegral": ("#7a4a1e", "#e0a46a"),
     "Taylor": ("#c8500a", "#ff9a57"),
     "IAS15": ("#17753a", "#5fcf86"),
     "Leapfrog": ("#86720c", "#dcc44a"),
     "WHFast": ("#8a2160", "#ec86bf"),
+    "WHFast512": ("#8a2160", "#ec86bf"),
     "SemiImplicitEuler": ("#6b4bb8", "#b79cff"),
     "LeapfrogMidpoint": ("#6b4bb8", "#b79cff"),
     "ReversibleHeun": ("#6b4bb8", "#b79cff"),
@@ -39,7 +41,23 @@ DASHES: tuple[tuple[float, ...], ...] = (
     (5, 1.5, 1.5, 1.5, 1.5, 1.5),
     (12, 3),
 )
-MARKERS = dict(zip(FAMILIES, "oDs^vPX<>phH", strict=True))
+MARKERS = {
+    "HBVM": "o",
+    "Gauss": "D",
+    "LineIntegral": "d",
+    "Taylor": "s",
+    "IAS15": "^",
+    "Leapfrog": "v",
+    "WHFast": "P",
+    "WHFast512": "*",
+    "SemiImplicitEuler": "X",
+    "LeapfrogMidpoint": "<",
+    "ReversibleHeun": ">",
+    "Dopri8": "p",
+    "DOP853": "h",
+    "Radau": "H",
+}
+UNKNOWN_MARKER = "8"  # of a method that is not in the table
 
 # Neutral colours of the figures; each is unique so that it can be themed in the page.
 INK = "#1d2430"
@@ -98,7 +116,7 @@ def looks(records: Sequence[Record]) -> dict[str, Look]:
             light=_unique(_shade(light, index, towards=0.0), taken),
             dark=_shade(dark, index, towards=1.0),
             dash=DASHES[index % len(DASHES)],
-            marker=MARKERS.get(name, "*"),
+            marker=MARKERS.get(name, UNKNOWN_MARKER),
         )
     return {record.id: by_method[record.case.method] for record in records}
 

@@ -80,6 +80,16 @@
   const drawn = new Map();
   const FONT = "ui-sans-serif,system-ui,sans-serif";
 
+  // the first view: within the axis's own bounds, and no wider than what is shown
+  const range = (spec, isLog, panel, side) => {
+    if (!isLog || spec.low === null) return {};
+    const logs = panel.traces.filter((t) => !off.has(t.case)).flatMap((t) => t[side]).filter((v) => v > 0).map(Math.log10);
+    if (!logs.length) return { range: [spec.low, spec.high] };
+    const [a, b] = logs.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
+    const bottom = Math.max(spec.low, a), top = Math.min(spec.high, b);
+    return bottom < top ? { range: [bottom - 0.04 * (top - bottom) - 0.1, top + 0.04 * (top - bottom) + 0.1] } : { range: [spec.low, spec.high] };
+  };
+
   const build = (plot, looks, figure) => {
     const wide = figure.clientWidth > 760;
     const across = wide ? plot.panels.length : 1;
@@ -112,7 +122,7 @@
         ticks: "outside",
         automargin: true,
         nticks: 9,
-        ...(isLog ? { dtick: undefined, minor: { showgrid: false } } : {}),
+        ...range(spec, isLog, panel, spec === panel.x ? "x" : "y"),
       });
       layout["xaxis" + tail] = axis(panel.x, panel.x.both ? log : panel.x.log);
       layout["yaxis" + tail] = axis(panel.y, panel.y.log);
@@ -126,7 +136,7 @@
         const lines = (plot.kind === "lines" || plot.kind === "paths") && t.role !== "truth";
         traces.push({
           type: "scatter",
-          mode: lines ? (t.x.length < 80 && t.role === "case" ? "lines+markers" : "lines") : "markers",
+          mode: plot.dotted && t.role === "case" ? "markers" : lines ? (t.x.length < 80 && t.role === "case" ? "lines+markers" : "lines") : "markers",
           name: safe(t.case ? `${t.case}  ${t.name}` : t.name),
           x: t.x,
           y: zeros,
