@@ -31,6 +31,7 @@ SEPARATE = {
     "endure": "hbvm_bench.endure.command",
     "paper": "hbvm_bench.paper.command",
     "compare": "hbvm_bench.commands.compare",
+    "doctor": "hbvm_bench.commands.doctor",
     "engines": "hbvm_bench.commands.engines",
     "export": "hbvm_bench.commands.export",
     "gallery": "hbvm_bench.commands.gallery",

@@ -41,6 +41,22 @@ def leaving_a_core() -> Iterator[int | None]:
         os.sched_setaffinity(0, mine)
 
 
+@contextmanager
+def staying_on_a_core() -> Iterator[None]:
+    """Keep this process on one core, the last one it may use."""
+    mine = cores()
+    os.sched_setaffinity(0, {mine[-1]})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, mine)
+
+
+def flags() -> set[str]:
+    """Return what the processor says that it can do, in the words of ``/proc/cpuinfo``."""
+    return set(_cpuinfo("flags").split())
+
+
 def _cpuinfo(field: str) -> str:
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
@@ -58,8 +74,8 @@ def _processor() -> str:
 
 
 def _vector_instructions() -> str:
-    flags = set(_cpuinfo("flags").split())
+    has = flags()
     for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX")):
-        if flag in flags:
+        if flag in has:
             return name
-    return "SSE2" if "sse2" in flags else "none known"
+    return "SSE2" if "sse2" in has else "none known"
