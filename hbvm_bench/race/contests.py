@@ -21,7 +21,7 @@ _CONTESTS = (
             Goal(family="whfast", ratio=3.0, energy=1e-10, position=None),
         ),
         note="The home ground of WHFast: symplectic correctors of order 17, its plain and its lazy kernel, "
-        "safe mode off. WHFast512 does not take part: there is no adapter for it.",
+        "safe mode off. WHFast512 has a row of its own: it needs a processor with AVX-512.",
     ),
     Contest(
         key="sitnikov",

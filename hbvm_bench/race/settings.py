@@ -74,6 +74,14 @@ FAMILIES: dict[str, Family] = {
         "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
     ),
     "whfast": Family("REBOUND, WHFast", "WHFast", "WHFast", True, None, "the wheel's, for any x86-64"),
+    "whfast512": Family(
+        "REBOUND, WHFast512",
+        "WHFast512",
+        "WHFast512",
+        True,
+        None,
+        "the wheel's, in AVX-512 instructions; on other processors it does not run",
+    ),
     "leapfrog": Family(
         "REBOUND, leapfrog",
         "leapfrog",
@@ -201,6 +209,11 @@ _WHFAST = [
     for h in (1.0, 0.5, 0.3, 0.2, 0.125, 0.1, 0.05, 0.025)
 ]
 
+_WHFAST512 = [
+    f"WHFast512(h={h}, corrector=17)"
+    for h in (1.0, 0.75, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.125, 0.1, 0.075, 0.05, 0.035, 0.025, 0.02)
+]
+
 # Multiples of the step at which order 8 begins to resolve the motion.
 _LEAPFROG = {
     2: (0.25,),
@@ -218,7 +231,7 @@ _DOP853 = (
 # Momenta of light bodies are small numbers that the tolerance must still resolve.
 _ATOL_OVER_RTOL = {"outer_solar_system": 1e-4, "sitnikov": 1e-4}
 
-_ONLY_AT_HOME = {"whfast": ("outer_solar_system",)}
+_ONLY_AT_HOME = {"whfast": ("outer_solar_system",), "whfast512": ("outer_solar_system",)}
 
 
 def settings(contest: str, *, quick: bool = False) -> list[Setting]:
@@ -236,6 +249,7 @@ def settings(contest: str, *, quick: bool = False) -> list[Setting]:
         "heyoka": _LARGE_TAYLOR if contest == "fput100" else _STANDARD_TAYLOR,
         "ias15": _IAS15_PLANETS if contest in ("outer_solar_system", "kepler") else _IAS15_ZEROS,
         "whfast": _WHFAST,
+        "whfast512": _WHFAST512,
         "leapfrog": [
             f"Leapfrog(h={factor * _LEAPFROG_STEP.get(contest, _LEAPFROG_STEP_ELSEWHERE):.6g}, order={order})"
             for order, factors in _LEAPFROG.items()
@@ -261,6 +275,7 @@ def _quick(family: str, contest: str) -> tuple[int, ...]:
         OURS: (3, 8, 14),
         "ias15": (6, 8, 9),
         "whfast": (9, 11, 13),
+        "whfast512": (3, 7, 12),
         "leapfrog": (12, 14, 15),
         "dop853": (11, 13, 15),
     }[family]

@@ -117,6 +117,11 @@ class ReboundProgram(PeerProgram):
 
     def simulation(self, layout: "Layout", t: float, y: Array) -> Any:
         """Return a simulation at ``t`` in the state ``y``, without callbacks."""
+        simulation = self._bodies(layout, t, y)
+        self.method.set_up(simulation)
+        return simulation
+
+    def _bodies(self, layout: "Layout", t: float, y: Array) -> Any:
         simulation = self.rebound.Simulation()
         simulation.G, simulation.t = layout.G, t
         x, v = layout.vectors(y)
@@ -124,7 +129,6 @@ class ReboundProgram(PeerProgram):
             simulation.add(m=m, x=px, y=py, z=pz, vx=vx, vy=vy, vz=vz)
         if layout.bodies is None:
             simulation.gravity = "none"
-        self.method.set_up(simulation)
         return simulation
 
     def state(self, layout: "Layout", simulation: Any) -> Array:
@@ -140,7 +144,7 @@ class ReboundProgram(PeerProgram):
     def _check_gravity(self, layout: "Layout", t: float, y: Array) -> None:
         from problems import emit
 
-        simulation = self.simulation(layout, t, y)
+        simulation = self._bodies(layout, t, y)
         choose(simulation, "leapfrog")
         simulation.dt = 0.0
         simulation.steps(1)

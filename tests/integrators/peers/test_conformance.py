@@ -1,10 +1,13 @@
 import pytest
+import rebound
 
 import integrators.testing as testing
 from integrators.peers.diffrax import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka import Taylor
-from integrators.peers.rebound import IAS15, Leapfrog, WHFast
+from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
 from integrators.peers.scipy import DOP853, Radau
+
+AVX512 = pytest.mark.skipif(not rebound.avx512_available, reason="this processor has no AVX-512")
 
 CASES = [
     (Taylor(), testing.two_bodies),
@@ -14,6 +17,7 @@ CASES = [
     (WHFast(h=0.05), testing.two_bodies),
     (WHFast(h=0.05, corrector=17, kernel="lazy"), testing.two_bodies),
     (WHFast(h=0.05, coordinates="whds", body_order=(1, 0)), testing.two_bodies),
+    pytest.param(WHFast512(h=0.05, corrector=17), testing.two_bodies, marks=AVX512),
     (Leapfrog(h=0.02, order=8), testing.two_bodies),
     (Leapfrog(h=0.02, order=4), testing.pendulum),
     (SemiImplicitEuler(h=0.001), testing.two_bodies),
@@ -26,7 +30,11 @@ CASES = [
 ]
 
 
+def _name(case):
+    return repr(getattr(case, "values", case)[0])
+
+
 @pytest.mark.parametrize("check", testing.CHECKS, ids=testing.name_of)
-@pytest.mark.parametrize(("method", "problem"), CASES, ids=[repr(method) for method, _ in CASES])
+@pytest.mark.parametrize(("method", "problem"), CASES, ids=map(_name, CASES))
 def test_conforms(method, problem, check):
     check(method, problem())

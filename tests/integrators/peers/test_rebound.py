@@ -9,7 +9,7 @@ import integrators.testing as testing
 import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka import Taylor
-from integrators.peers.rebound import IAS15, Leapfrog, WHFast
+from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
 from integrators.peers.rebound_fixed import COORDINATES, CORRECTORS, EVALUATIONS, KERNELS
 from integrators.peers.rebound_ias15 import MODES
 from integrators.peers.rebound_program import Layout
@@ -290,3 +290,17 @@ def test_own_steps_end_before_the_last_time():
     assert samples.t[0] == 0.0
     assert 9.0 < samples.t[-1] <= 10.0
     assert samples.t.size == stepper.stats.steps + 1
+
+
+@pytest.mark.skipif(not rebound.avx512_available, reason="this processor has no AVX-512")
+def test_whfast512_is_whfast_in_other_units():
+    problem = problems.load("outer_solar_system")
+    times = [25.0, 100.0, 103.07]
+    wide, plain = (
+        integrate(problem, method(h=0.25, corrector=17), times).y for method in (WHFast512, WHFast)
+    )
+    assert np.max(np.abs(wide - plain)[:, :18]) < 1e-8  # 7e-10
+
+
+def test_whfast512_takes_nine_bodies_at_most():
+    assert "2 to 9 bodies" in (WHFast512(h=0.1).accepts(problems.load("cluster", n=10)) or "")
