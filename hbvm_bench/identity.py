@@ -19,6 +19,7 @@ import msgspec
 
 import integrators.registry
 import problems
+from hbvm_bench import reference
 from hbvm_bench.campaign import Case, Checks
 from hbvm_bench.spec import Spec, parse_spec
 from integrators.protocol import MethodBase
@@ -28,8 +29,19 @@ from problems.problem import Problem
 OWN_PACKAGES = ("problems", "integrators")
 # The modules of this package whose change changes a measured number.
 MEASURING_MODULES = (
-    *("worker.py", "measure.py", "metrics.py", "quantities.py", "timing.py"),
+    *("worker.py", "measure.py", "reference.py", "metrics.py", "quantities.py", "timing.py"),
     *("checks.py", "drift.py", "ensemble.py", "laws.py", "solve.py", "starts.py"),
+)
+# The other direction, the conformance kit: no case runs them.
+UNUSED = ("integrators/plugins/", "integrators/testing.py", "integrators/exercises.py")
+# A row of a peer is not stale because our kernel changed, nor ours because of a peer.
+UNUSED_BY_OURS = ("integrators/peers/",)
+UNUSED_BY_PEERS = (
+    "integrators/kernel/",
+    *(
+        f"integrators/{name}.py"
+        for name in ("automatic", "gauss", "hbvm", "legendre", "line_integral", "tableau")
+    ),
 )
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
@@ -114,7 +126,8 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
         "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
         "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
         "versions": versions_of(method),
-        "source": source_digest(),
+        "reference": _reference_digest(problem),
+        "source": source_digest(method),
         "method_source": _module_digest(type(method)),
     } | {
         # a case without them keeps the id it had
@@ -140,19 +153,39 @@ def is_ours(method: MethodBase) -> bool:
     return method.library.lower() == "hbvm-bench"
 
 
+def source_digest(method: MethodBase) -> str:
+    """Return the sha256 of our own sources that decide about the measured numbers of a method."""
+    return _digest_without(UNUSED_BY_PEERS if _is_peer(method) else UNUSED_BY_OURS if is_ours(method) else ())
+
+
+def _is_peer(method: MethodBase) -> bool:
+    return type(method).__module__.startswith("integrators.peers.")
+
+
 @cache
-def source_digest() -> str:
-    """Return the sha256 of our own sources that decide about measured numbers."""
+def _digest_without(unused: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
+    for name, path in sources(unused):
+        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def sources(unused: tuple[str, ...]) -> list[tuple[str, Path]]:
+    """Return the files that decide about measured numbers, by name, without those that begin as given."""
     paths: list[tuple[str, Path]] = []
     for package in OWN_PACKAGES:
         root = Path(str(files(package)))
         paths += [(f"{package}/{p.relative_to(root).as_posix()}", p) for p in root.rglob("*.py")]
     here = Path(str(files("hbvm_bench")))
     paths += [(f"hbvm_bench/{name}", here / name) for name in MEASURING_MODULES]
-    for name, path in sorted(paths):
-        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+    return sorted(item for item in paths if not item[0].startswith((*UNUSED, *unused)))
+
+
+def _reference_digest(problem: Problem) -> str:
+    stored = reference.find_file(problem)
+    if stored is None:
+        return ""
+    return hashlib.sha256(msgspec.json.encode([stored.t, stored.y])).hexdigest()
 
 
 @cache
