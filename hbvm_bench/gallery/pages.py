@@ -19,7 +19,8 @@ HEAD = """<!-- made by: hbvm-bench gallery docs -->
 Each problem is a function that returns a `problems.Problem`: a system written once, a start, parameters and
 a span. On the command line and in campaigns it is written as it prints, `kepler(e=0.9)`. This page is made by
 code (`hbvm-bench gallery docs`) from the problems themselves; formulas are printed from the traced
-expressions, with indices that count from 1.
+expressions, with indices that count from 1. Which engine takes which problem: [engines](engines.md); how long
+large systems take to compile: [compile times](compile_times.md).
 
 """
 

@@ -1,0 +1,70 @@
+"""The pages on problems, engines and compile times are those that the code writes."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+import problems
+from hbvm_bench import cli
+from hbvm_bench.gallery import compile_times, pictures
+from hbvm_bench.spec import parse_spec
+from problems import registry
+from problems.errors import InputError
+
+DOCS = Path(__file__).parents[3] / "docs"
+OWN = [name for name in problems.names() if registry.factory(name).__module__.startswith("problems.")]
+STALE = "it is out of date: run hbvm-bench gallery docs --no-pictures"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("docs")
+    assert cli.main(["gallery", str(directory), "--no-pictures"]) == 0
+    return directory
+
+
+@pytest.mark.parametrize("name", ["problems.md", "engines.md"])
+def test_the_pages_are_those_that_the_code_writes(written, name):
+    assert (DOCS / name).read_text(encoding="utf-8") == (written / name).read_text(encoding="utf-8"), STALE
+
+
+def test_every_problem_has_its_section_with_formula_source_and_picture(written):
+    text = (written / "problems.md").read_text(encoding="utf-8")
+    assert set(pictures.PICTURES) == set(OWN) - {"expression"}
+    for name in pictures.PICTURES:
+        section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
+        for part in ("$$H = ", "Tests ", "- source: ", "nvariant", f"](problems/{name}.svg)"):
+            assert part in section, (name, part)
+
+
+@pytest.mark.parametrize("name", sorted(pictures.PICTURES))
+def test_every_problem_has_a_picture_with_something_in_it(name):
+    path = DOCS / "problems" / f"{name}.svg"
+    root = ET.fromstring(path.read_text(encoding="utf-8"))
+    drawn = [e for e in root.iter() if e.tag.endswith(("path", "image"))]
+    assert len(drawn) >= 10
+    assert path.stat().st_size < 200_000
+
+
+def test_a_picture_is_drawn_from_a_run(tmp_path):
+    for name in ("kepler", "morse"):
+        pictures.draw(name, tmp_path / f"{name}.svg")
+        assert (tmp_path / f"{name}.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
+    with pytest.raises(InputError, match="has no picture"):
+        pictures.draw("expression", tmp_path / "expression.svg")
+
+
+def test_the_page_on_compile_times_has_every_case():
+    rows = [line for line in (DOCS / "compile_times.md").read_text().splitlines() if line.startswith("| `")]
+    assert [parse_spec(row.split("`")[1]).name for row in rows] == [
+        parse_spec(case).name for case in compile_times.CASES
+    ]
+
+
+def test_the_steps_to_machine_code_are_measured():
+    found = compile_times.measure("pendulum()")
+    assert found.problem == "pendulum(q=0.0, p=1.9)"
+    assert found.unknowns == 2
+    assert found.lines > 2
+    assert min(found.trace, found.emit, found.scalar, found.lanes) > 0.0
