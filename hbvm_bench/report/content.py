@@ -7,8 +7,10 @@ from hbvm_bench.campaign import Case
 from hbvm_bench.metrics import METRICS, Metric
 from hbvm_bench.records import Record
 from hbvm_bench.report import provenance, words
+from hbvm_bench.report.canvas import Picture
+from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
-from hbvm_bench.report.style import Look, looks
+from hbvm_bench.report.style import Look, looks, method_name
 from hbvm_bench.store import Store
 from hbvm_bench.table import columns
 
@@ -46,6 +48,8 @@ class Content:
         What it is made of.
     measured : str
         The days on which the cases ran.
+    overview : Overview
+        What they say together.
     sections : list of Section
         Problem by problem.
     columns : list of Metric
@@ -72,6 +76,7 @@ class Content:
     description: str
     runs: list[Run]
     measured: str
+    overview: Overview
     sections: list[Section]
     columns: list[Metric]
     looks: dict[str, Look]
@@ -83,6 +88,11 @@ class Content:
     machine: list[tuple[str, str]]
     metrics: list[Metric]
     references: list[str]
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """Return all figures, in order."""
+        return [*self.overview.pictures, *(p for section in self.sections for p in section.pictures)]
 
 
 def gather(stores: Sequence[Store]) -> Content:
@@ -131,6 +141,7 @@ def gather(stores: Sequence[Store]) -> Content:
         description=" ".join(first.description.split()) if len(runs) == 1 else "",
         runs=runs,
         measured=provenance.days(records),
+        overview=overview(records, _first_numbers(records, look)),
         sections=sections,
         columns=columns(records),
         looks=look,
@@ -143,3 +154,10 @@ def gather(stores: Sequence[Store]) -> Content:
         metrics=list(METRICS.values()),
         references=list(dict.fromkeys(ref for s in sections for ref in s.problem.references)),
     )
+
+
+def _first_numbers(records: Sequence[Record], look: dict[str, Look]) -> dict[str, int]:
+    numbers: dict[str, int] = {}
+    for record in records:
+        numbers.setdefault(method_name(record), look[record.id].number)
+    return numbers

@@ -187,7 +187,7 @@ def panel_legend(
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(-0.03, -0.23), borderaxespad=0.0)
 
 
-def shortened(name: str, note: str, most: int = 52) -> str:
+def shortened(name: str, note: str, most: int = 44) -> str:
     """Return a name and its note in one line of a legend; the name gives way."""
     if not note:
         return name

@@ -24,10 +24,12 @@ def markdown(content: "Content") -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"plain": plain, "code": code, "one_line": one_line}
+    from hbvm_bench.cells import in_markdown  # which itself needs the escapes below
+
+    environment.filters |= {"plain": plain, "code": code, "one_line": one_line, "table": in_markdown}
     environment.globals |= {"row_cells": row_cells}
     text = environment.get_template("report.md.j2").render(c=content)
-    return re.sub(r"\n{3,}", "\n\n", text)
+    return re.sub(r"\n{3,}", "\n\n", text).lstrip("\n")
 
 
 def one_line(text: object) -> str:

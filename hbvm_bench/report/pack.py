@@ -61,7 +61,7 @@ def library() -> str:
 def page_data(content: Content) -> str:
     """Return what the page's figures, tables and downloads are made of, packed."""
     plots: dict[str, Any] = {}
-    for picture in (picture for section in content.sections for picture in section.pictures):
+    for picture in content.pictures:
         if picture.plot is not None:
             table = numbers(picture.plot)
             plots[picture.key] = as_json(picture.plot) | {
@@ -136,7 +136,7 @@ def files(content: Content) -> dict[str, bytes]:
         "data/results.csv": results_csv(content.records).encode(),
         "data/results.json": everything + b"\n",
     }
-    for picture in (picture for section in content.sections for picture in section.pictures):
+    for picture in content.pictures:
         if picture.plot is not None:
             made[f"data/{picture.key}.csv"] = as_csv(picture.plot).encode()
     return made

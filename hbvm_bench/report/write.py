@@ -52,7 +52,7 @@ def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]
 def rendered(content: Content) -> dict[str, bytes]:
     """Return all files of a report by their path in its directory."""
     made: dict[str, bytes] = {}
-    for picture in (picture for section in content.sections for picture in section.pictures):
+    for picture in content.pictures:
         made[f"{FIGURES}/{picture.key}.svg"] = picture.svg.encode()
         made[f"{FIGURES}/{picture.key}.png"] = picture.png
     made |= pack.files(content)

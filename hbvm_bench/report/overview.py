@@ -1,0 +1,182 @@
+"""What a run says over all its problems: needs, performance profiles, outcomes, laws."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.ticker import PercentFormatter
+
+from hbvm_bench.cells import Table
+from hbvm_bench.metrics import find
+from hbvm_bench.records import Record
+from hbvm_bench.report.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures import WIDTH
+from hbvm_bench.report.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
+from hbvm_bench.summaries import laws, needs, outcomes
+from hbvm_bench.summaries.points import work_of
+from hbvm_bench.summaries.profiles import GOALS, Profile, profile
+
+FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
+NEVER = 6.0  # decades: the end of the axis where a family is not within any factor
+SIGNS = {"ok": "●", "off": "◐", "ended": "○", "refused": "–", "absent": ""}
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What stands before the problems.
+
+    Attributes
+    ----------
+    tables : list of Table
+        With words.
+    reasons : list of str
+        Why families failed on problems.
+    pictures : list of Picture
+        Over all problems.
+    """
+
+    tables: list[Table]
+    reasons: list[str]
+    pictures: list[Picture]
+
+
+def overview(records: Sequence[Record], numbers: dict[str, int]) -> Overview:
+    """Gather the overview of a run.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        All cases.
+    numbers : dict of int
+        By family, the number of its first case: its colour in the page.
+    """
+    tables: list[Table] = []
+    answers = needs.answers(records)
+    if answers:
+        tables.append(
+            Table(
+                "Which integrator for which need",
+                ("need", "first choices", "problems"),
+                [(answer.title, answer.text, str(answer.problems)) for answer in answers],
+                "In brackets: on how many problems it is near the best, and its median factor behind it.",
+                words=(1,),
+            )
+        )
+    families, matrix = outcomes.matrix(records)
+    reasons: list[str] = []
+    if len(matrix) > 1:
+        rows = []
+        for problem, found in matrix.items():
+            rows.append(
+                (problem, *(_sign(found[family].state, found[family].reached, found[family].settings)
+                            for family in families))
+            )  # fmt: skip
+            reasons += [
+                f"{problem}, {family}: {reason}"
+                for family in families
+                for reason in found[family].reasons
+                if reason
+            ]
+        tables.append(
+            Table(
+                "Which integrator on which problem",
+                ("problem", *families),
+                rows,
+                "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
+                "Numbers: how many of its settings reached the end, where not all did.",
+            )
+        )
+    counted = laws.counts(records)
+    if counted:
+        kinds = [*laws.SHORT, "none"]
+        tables.append(
+            Table(
+                "The law of the energy's drift",
+                ("method", *(laws.SHORT.get(kind, "not clear") for kind in kinds)),
+                [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
+                "How many cases of each method follow which law.",
+            )
+        )
+    return Overview(tables, reasons, _profiles(records, numbers))
+
+
+def _sign(state: str, reached: int, settings: int) -> str:
+    return SIGNS[state] + (f" {reached}/{settings}" if state == "ok" and reached < settings else "")
+
+
+def _profiles(records: Sequence[Record], numbers: dict[str, int]) -> list[Picture]:
+    work = work_of(records)
+    found = [profile(records, goal, work) for goal in GOALS]
+    found = [one for one in found if len(one.problems) >= FEWEST_PROBLEMS]
+    if not found:
+        return []
+    label = find(work).label
+    with drawing():
+        figure = new(WIDTH, 4.2)
+        figure.subplots_adjust(left=0.06, right=0.86, top=0.92, bottom=0.12, wspace=0.14)
+        grid = figure.subplots(1, len(found), squeeze=False, sharey=True)[0]
+        panels: list[Panel] = []
+        handles = {}
+        for axes, one in zip(grid, found, strict=True):
+            traces = []
+            end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(_worst(one)))))
+            for index, family in enumerate(one.ratios):
+                taus, shares = one.curve(family)
+                if not one.solved(family):
+                    continue
+                x = np.repeat([*taus, end], 2)[1:]
+                y = np.repeat(shares, 2)
+                x, y = x[: y.size], y[: x.size]
+                (line,) = axes.plot(
+                    x,
+                    y,
+                    color=base_colours(family)[0],
+                    marker=MARKERS.get(family, UNKNOWN_MARKER),
+                    markevery=(index % 3, max(3, x.size // 6)),
+                    markersize=4,
+                    linewidth=1.6,
+                    clip_on=False,
+                )
+                dash = DASHES[sum(base_colours(f) == base_colours(family) for f in list(one.ratios)[:index])]
+                if dash:
+                    line.set_dashes(dash)
+                handles.setdefault(family, line)
+                traces.append(Trace(numbers.get(family, 0), family, x, y))
+            log_axis(axes, "x", 0, round(np.log10(end)))
+            axes.set_ylim(-0.02, 1.02)
+            axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+            axes.set_title(one.goal.words, color=INK, fontsize=8)
+            axes.set_xlabel("factor behind the fastest")
+            panels.append(
+                Panel(
+                    one.goal.words,
+                    Axis("factor behind the best", log=True),
+                    Axis("share of problems"),
+                    traces,
+                )
+            )
+        figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
+        said = " ".join(
+            f"{one.goal.words}, {len(one.problems)} problems: "
+            + ", ".join(
+                f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
+            )
+            + "."
+            for one in found
+        )
+        made = picture(
+            figure,
+            "profiles",
+            "Performance profiles",
+            f"The share of the problems on which the best setting of a family needs at most so many times "
+            f"the {label} of the best of all. Where a line ends on the right is the share it solves at all. "
+            "Dolan and Moré, Mathematical Programming 91 (2002).",
+            said,
+            Plot(panels),
+        )
+    return [made]
+
+
+def _worst(one: Profile) -> float:
+    return max((r for ratios in one.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)
