@@ -204,7 +204,7 @@ def _errors(problem: Problem, starts: Array, y: Array) -> dict[str, Array]:
 
 def _truth(problem: Problem, starts: Array) -> Reference | None:
     """Return the 128-bit ends of a few trajectories, one row each; ``None`` without heyoka."""
-    end = np.array([problem.t_end])
+    span = np.array([problem.t0, problem.t_end])
     rows: list[list[Decimal]] = []
     parameters = {
         name: value if isinstance(value, float) else value.tolist()
@@ -213,7 +213,7 @@ def _truth(problem: Problem, starts: Array) -> Reference | None:
     try:
         for start in starts:
             one = Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=problem.t_end)
-            rows += reference.taylor(one, end, reference.TOLERANCE)
+            rows.append(reference.taylor(one, span, reference.TOLERANCE)[-1])
     except InputError:  # heyoka is missing, or it does not arrive
         return None
     high = np.array([[float(value) for value in row] for row in rows])
