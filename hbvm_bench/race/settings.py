@@ -211,7 +211,7 @@ _WHFAST = [
 
 _WHFAST512 = [
     f"WHFast512(h={h}, corrector=17)"
-    for h in (1.0, 0.75, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.125, 0.1, 0.075, 0.05, 0.035, 0.025, 0.02)
+    for h in (1.0, 0.75, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.125, 0.1, 0.075, 0.05, 0.04, 0.025, 0.02)
 ]
 
 # Multiples of the step at which order 8 begins to resolve the motion.
