@@ -27,6 +27,7 @@ app = typer.Typer(
 
 # Commands with an implementation of their own; each is imported only when it is asked for.
 SEPARATE = {
+    "automatic": "hbvm_bench.commands.automatic",
     "race": "hbvm_bench.race.command",
     "endure": "hbvm_bench.endure.command",
     "paper": "hbvm_bench.paper.command",
@@ -38,6 +39,7 @@ SEPARATE = {
     "inspect": "hbvm_bench.commands.inspect",
     "report": "hbvm_bench.commands.report",
     "merge": "hbvm_bench.commands.merge",
+    "plugins": "hbvm_bench.commands.plugins",
     "run": "hbvm_bench.commands.run",
 }
 

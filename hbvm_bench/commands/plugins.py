@@ -1,0 +1,30 @@
+"""The command ``hbvm-bench plugins``."""
+
+from typing import Annotated
+
+import typer
+
+from hbvm_bench import plugin_costs
+from problems.errors import InputError
+
+
+def plugins(
+    host: Annotated[str, typer.Argument(help="scipy, diffrax, rebound, or leak.")],
+    rounds: Annotated[int, typer.Option("--rounds", help="How often each row is timed.")] = 5,
+    span: Annotated[float, typer.Option("--span", help="Time units of the leak.")] = 1e5,
+) -> None:
+    """Measure our methods inside another library beside its own and the native kernel.
+
+    ``leak`` shows the energy of DOP853 and of HBVM in the same call of ``solve_ivp``.
+    """
+    if rounds < 1 or not span > 0.0:
+        raise InputError(f"plugins needs rounds >= 1 and span > 0, not rounds={rounds}, span={span:g}.")
+    if host == "leak":
+        print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
+        for t, errors in plugin_costs.leak(span):
+            print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
+        return
+    print(plugin_costs.markdown(plugin_costs.measure(host, rounds)))
+
+
+__all__ = ["plugins"]

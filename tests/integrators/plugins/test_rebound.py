@@ -1,0 +1,147 @@
+"""HBVM and Gauss inside REBOUND: what they conserve there, and what of REBOUND goes on working."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rebound = pytest.importorskip("rebound")
+
+import integrators  # noqa: E402
+from hbvm_bench import plugin_costs  # noqa: E402
+from integrators import HBVM, Gauss  # noqa: E402
+from integrators.plugins.rebound import NAME, install  # noqa: E402
+from problems.errors import InputError  # noqa: E402
+
+STEPS, H = 3000, 6.0
+
+
+def planets() -> Any:
+    simulation = rebound.Simulation()
+    simulation.add("outer solar system")
+    simulation.move_to_com()
+    return simulation
+
+
+def two_bodies(method: Any) -> Any:
+    simulation = rebound.Simulation()
+    simulation.add(m=1.0)
+    simulation.add(m=1e-3, a=1.0, e=0.3)
+    simulation.move_to_com()
+    install(simulation, method)
+    return simulation
+
+
+def state(simulation: Any) -> np.ndarray:
+    return np.array([[*body.xyz, *body.vxyz] for body in simulation.particles])
+
+
+@pytest.mark.parametrize("method", [Gauss(s=8, h=H), HBVM(k=10, s=8, h=H)])
+def test_energy_and_angular_momentum_are_kept_as_in_the_native_kernel(method: Any) -> None:
+    simulation = planets()
+    masses = np.array([body.m for body in simulation.particles])
+
+    def flat() -> np.ndarray:
+        y = state(simulation)
+        return np.concatenate([y[:, :3].ravel(), (masses[:, None] * y[:, 3:]).ravel()])
+
+    def momentum(y: np.ndarray) -> np.ndarray:
+        q, p = y.reshape(2, -1, 3)
+        return np.cross(q, p).sum(axis=0)
+
+    problem = plugin_costs._planets(masses, flat())
+    install(simulation, method)
+    simulation.steps(STEPS)
+    plugin = flat()
+    solution = integrators.integrate(problem, method, times=np.array([0.0, STEPS * H]))
+    native, start = solution.y[-1], problem.y0
+    energies = [problem.errors(y[None])["energy"][0] for y in (plugin, native)]
+    momenta = [
+        np.linalg.norm(momentum(y) - momentum(start)) / np.linalg.norm(momentum(start))
+        for y in (plugin, native)
+    ]
+    assert max(energies) < 2e-14  # measured 1e-15 to 1e-14 over 1e5 time units, the native kernel's the same
+    assert max(momenta) < 1e-14  # measured 1e-15 to 5e-15
+    assert np.abs(plugin[:18] - native[:18]).max() < 1e-8  # measured up to 7e-10 over 1e5 time units
+
+
+def test_the_order_is_2s() -> None:
+    def error(h: float) -> float:
+        simulation = two_bodies(Gauss(s=2, h=h))
+        simulation.integrate(6.4, exact_finish_time=0)
+        fine = two_bodies(Gauss(s=8, h=0.1))
+        fine.integrate(simulation.t)
+        return float(np.abs(state(simulation)[:, :3] - state(fine)[:, :3]).max())
+
+    assert np.log2(error(0.1) / error(0.05)) == pytest.approx(4.0, abs=0.15)
+
+
+def test_exact_finish_times_outputs_and_the_heartbeat_work() -> None:
+    simulation = two_bodies(HBVM(k=8, s=8, h=0.1))
+    seen: list[float] = []
+    simulation.heartbeat = lambda pointer: seen.append(pointer.contents.t)
+    reference = two_bodies(HBVM(k=8, s=8, h=0.05))
+    for t in (0.33, 1.0, 2.71):
+        simulation.integrate(t)
+        reference.integrate(t)
+        assert simulation.t == t
+        assert np.abs(state(simulation) - state(reference)).max() < 1e-13  # measured 2e-15
+    assert len(seen) >= 28
+    simulation.integrate(0.0)  # and back
+    assert np.abs(state(simulation) - state(two_bodies(HBVM(k=8, s=8, h=0.1)))).max() < 1e-13
+
+
+def test_a_simulation_goes_on_bit_for_bit_from_an_archive_and_from_a_copy(tmp_path: Path) -> None:
+    simulation = two_bodies(HBVM(k=9, s=6, h=0.1))
+    simulation.steps(20)
+    file = str(tmp_path / "archive.bin")
+    simulation.save_to_file(file)
+    others = [rebound.Simulationarchive(file)[0], simulation.copy()]
+    simulation.steps(30)
+    for other in others:
+        assert str(other.integrator) == str(rebound.Simulationarchive(file)[0].integrator)
+        assert (other.integrator.k, other.integrator.s, other.dt) == (9, 6, 0.1)
+        other.steps(30)
+        assert np.array_equal(state(simulation), state(other))
+
+
+def test_additional_forces_that_depend_on_velocities_act() -> None:
+    simulation = rebound.Simulation()
+    simulation.add(m=0.0, x=1.0, vx=1.0)
+    simulation.force_is_velocity_dependent = 1
+
+    def drag(pointer: Any) -> None:
+        body = pointer.contents.particles[0]
+        body.ax -= 0.5 * body.vx
+
+    simulation.additional_forces = drag
+    install(simulation, HBVM(k=6, s=6, h=0.1))
+    simulation.integrate(2.0)
+    assert simulation.particles[0].vx == pytest.approx(np.exp(-1.0), rel=1e-14)  # measured 3e-16
+    assert simulation.particles[0].x == pytest.approx(1.0 + 2.0 * (1.0 - np.exp(-1.0)), rel=1e-14)
+
+
+def test_particles_may_be_added_and_removed_on_the_way() -> None:
+    simulation = two_bodies(Gauss(s=6, h=0.05))
+    simulation.steps(10)
+    simulation.add(m=0.0, a=3.0)
+    simulation.steps(10)
+    simulation.remove(2)
+    simulation.steps(10)
+    other = two_bodies(Gauss(s=6, h=0.05))
+    other.steps(30)
+    assert np.abs(state(simulation) - state(other)).max() < 1e-13  # measured 1e-15: a massless guest
+
+
+def test_what_cannot_be_done_is_said() -> None:
+    simulation = two_bodies(Gauss(s=4, h=0.1))
+    with pytest.raises(InputError, match="install takes HBVM"):
+        install(simulation, "ias15")  # pyright: ignore[reportArgumentType]
+    simulation.integrator.s = 9
+    with pytest.raises(RuntimeError, match="k >= s >= 1"):
+        simulation.steps(1)
+    simulation = two_bodies(Gauss(s=8, h=28.0))
+    with pytest.raises(RuntimeError, match=r"did not converge; take a smaller sim\.dt"):
+        simulation.steps(1)
+    assert str(rebound.Simulation().integrator) != NAME
