@@ -16,10 +16,17 @@ if TYPE_CHECKING:
     from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
     from integrators.hbvm import HBVM as HBVM
+    from integrators.order import order_of as order_of
+    from integrators.order import stability as stability
 
 __all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", "registry"]
 
-_LATER = {"Event": "integrators.events", "section": "integrators.events"}  # imported when first used
+_LATER = {  # imported when first used
+    "Event": "integrators.events",
+    "order_of": "integrators.order",
+    "section": "integrators.events",
+    "stability": "integrators.order",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -6,6 +6,7 @@ from typing import Any
 
 from integrators.kernel import native, store
 from integrators.kernel.engine import SOURCES as KERNEL
+from integrators.kernel.foreign import raise_error
 
 # The modules whose code is in it: an edit of any of them makes another one.
 SOURCES = (
@@ -39,5 +40,7 @@ def call(
     what: int, ctx: int, *, side: int = 0, between: int = 0, count: int = 0, times: int = 0,
     first: int = 0, out: int = 0, budget: int = 0,
 ) -> int:  # fmt: skip
-    """Call the entry; the interpreter's lock is released meanwhile."""
-    return _function()(what, ctx, side, between, count, times, first, out, budget)
+    """Call the entry, as `integrators.kernel.engine.call` does the kernel's."""
+    outcome = _function()(what, ctx, side, between, count, times, first, out, budget)
+    raise_error()
+    return outcome

@@ -34,6 +34,7 @@ def happened(problem, method, *events, **options):
         (WHOLE, 1e-12),  # measured 2.5e-13
         (Gauss(s=16, h=7.0), 1e-12),  # measured 5.3e-15: more than a revolution per step
         (LineIntegral(k=6, s=4, h=0.5, invariants=["energy"]), 5e-9),  # measured 2.8e-9
+        (HBVM(k=10, s=5, tol=1e-12), 5e-11),  # measured 2.2e-12
         (LineIntegral(k=6, s=4, tol=1e-12, invariants=["energy"]), 1e-10),  # measured 1.7e-11
     ],
 )
