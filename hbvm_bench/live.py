@@ -130,6 +130,8 @@ class Live:
             self._console.print(f"  {words}")
 
     def _render(self) -> RenderableType:
+        if not self._title:
+            return ""
         bar = ProgressBar(total=max(self._total, 1), completed=self._count, width=24)
         head = Table.grid(padding=(0, 1))
         minutes, rest = divmod(int(self.elapsed), 60)
