@@ -9,7 +9,7 @@ import inspect
 import json
 import platform
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
@@ -85,7 +85,7 @@ def resolve(case: Case) -> Resolved:
         For an unknown name or option, with the nearest names, or a value that
         the problem or the method refuses.
     """
-    problem = make_problem(case.problem)
+    problem = _problem(case.problem)
     method = make_method(case.method)
     case.grid.times(problem)
     # not repr(method), which is a third party's own
@@ -94,6 +94,12 @@ def resolve(case: Case) -> Resolved:
     key = case_key(canonical, problem, method)
     text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return Resolved(canonical, problem, method, hashlib.sha256(text.encode()).hexdigest(), key)
+
+
+@lru_cache(maxsize=64)
+def _problem(text: str) -> Problem:
+    # a campaign has the same few problems again and again, and tracing one takes a while
+    return make_problem(text)
 
 
 def make_problem(text: str) -> Problem:
