@@ -105,7 +105,8 @@ def run_accuracy(
     InterruptedRunError
         If the run was stopped.
     UnfinishedRunError
-        If the executor is gone; or, after all others, if it could not run some cases.
+        If the executor is gone, or one of its machines has other sources or versions (it would
+        refuse one case after the other); and after all others, if it could not run some cases.
     """
     waiting = deque(cases)
     running: dict[Future[tuple[bytes, bytes]], Resolved] = {}
@@ -128,7 +129,7 @@ def run_accuracy(
                 resolved = running.pop(future)
                 try:
                     record = _stored(store, *future.result())
-                except (InterruptedRunError, InputError):
+                except (InterruptedRunError, InputError, UnfinishedRunError):
                     raise
                 except (Exception, CancelledError) as error:  # of the executor, not of the case
                     attempts[resolved.id] += 1
@@ -151,8 +152,6 @@ def run_accuracy(
 
 
 def _sentence(error: BaseException) -> str:
-    if isinstance(error, UnfinishedRunError):
-        return str(error)
     return f"{type(error).__name__}: {error}".rstrip(": ")
 
 

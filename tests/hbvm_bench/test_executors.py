@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 
 import msgspec
@@ -155,15 +156,37 @@ def test_a_machine_that_would_run_another_case_says_what_differs(toys):
     assert series == b""
 
 
-def test_a_case_that_an_executor_cannot_run_is_named_after_all_others(toys, tmp_path):
+def test_a_machine_that_would_run_another_case_ends_the_run(toys, tmp_path):
+    foreign = replace(cases(1)[0], id="0" * 64)  # as if made from other sources
+    store = store_in(tmp_path / "run")
+    with pytest.raises(runner.UnfinishedRunError, match="it has other sources of hbvm-bench"):
+        run_on("local", [foreign], store)
+    assert list(store.everything()) == []
+
+
+class Losing(ThreadPoolExecutor):
+    """Loses every case of one method."""
+
+    lost = 0
+
+    def submit(self, fn, task):
+        if b"h=0.2" not in task:
+            return super().submit(fn, task)
+        self.lost += 1
+        future = Future()
+        future.set_exception(OSError("the machine is gone"))
+        return future
+
+
+def test_a_case_that_an_executor_loses_is_tried_twice_and_named_after_all_others(toys, tmp_path):
     chosen = cases(2)
     store = store_in(tmp_path / "run")
-    foreign = replace(chosen[0], id="0" * 64)  # as if made from other sources
-    with executors.opened("local", 1) as pool:
-        records = runner.run_accuracy([foreign, *chosen], store, LIMITS, pool)
-        assert [next(records).id, next(records).id] == [case.id for case in chosen]
-        with pytest.raises(runner.UnfinishedRunError, match=r"1 case could not be run: .*other sources"):
+    with Losing(1) as executor:
+        records = runner.run_accuracy(chosen, store, LIMITS, executors.of(executor))
+        assert next(records).id == chosen[0].id
+        with pytest.raises(runner.UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
             next(records)
+        assert executor.lost == 2
 
 
 def test_threads_of_this_machine_keep_their_cases_on_cores_of_their_own(toys, tmp_path):
