@@ -71,7 +71,7 @@ def measure(host: str, rounds: int) -> list[Cost]:
 
 
 def markdown(rows: list[Cost]) -> str:
-    """Return the table: medians, the fastest and the slowest round, and ratios of the fastest to the first row's.
+    """Return the table: medians, fastest and slowest rounds, and ratios of the fastest to the first row's.
 
     What else a machine does only ever adds to a time, so ratios are of the fastest rounds.
     """

@@ -14,7 +14,7 @@ import jax.numpy as jnp  # noqa: E402
 from integrators.plugins.diffrax import HBVM, Gauss  # noqa: E402
 from problems.errors import InputError  # noqa: E402
 
-pytestmark = pytest.mark.filterwarnings("ignore:Complex dtype")
+pytestmark = pytest.mark.filterwarnings("ignore:Complex")
 
 
 @pytest.fixture(autouse=True)
