@@ -14,6 +14,10 @@ from hbvm_bench.report.style import Look, looks, method_name
 from hbvm_bench.store import Store
 from hbvm_bench.table import columns
 
+# A report of more than these draws only its main figures.
+BRIEF_PROBLEMS = 3
+BRIEF_CASES = 150
+
 
 @dataclass(frozen=True)
 class Run:
@@ -131,6 +135,7 @@ def gather(stores: Sequence[Store]) -> Content:
             look,
             [case for run in runs for case in run.missing if case.problem == text],
             number,
+            brief=len(texts) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
         )
         for number, text in enumerate(texts, 1)
     ]

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 BINS = 60  # an error series is drawn as its largest value in each of so many spans
 FINE_BINS = 120  # and in so many in the page's interactive figures
 COLUMNS = 4
+MOST_NAMED = 30  # cases in the legend of work and precision
 # Inches: the panels of all figures over time have one size and stand under each other.
 WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
 TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
@@ -241,8 +242,12 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     side.set_axis_off()
     handles = [
         Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
-        for c in sorted(shown, key=lambda case: case.look.number)
+        for c in sorted(shown, key=lambda case: case.look.number)[:MOST_NAMED]
     ]
+    if len(shown) > MOST_NAMED:
+        handles.append(
+            Line2D([], [], linestyle="", label=f"and {len(shown) - MOST_NAMED} more, see the table")
+        )
     side.legend(
         handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1
     )

@@ -16,6 +16,7 @@ from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.table import Cell, Row, seconds
 
 FEW = 3  # problems whose summaries all stand at the top
+INLINE = 1_000_000  # characters of drawings in a page; what is more would make it slow to open
 DIGITS = 16  # of a double: a bar of this many digits is full
 
 # Paths of the markers in a box of 12 by 12, as the figures draw them.
@@ -62,6 +63,7 @@ def page(content: Content) -> str:
     return environment.get_template("report.html.j2").render(
         c=content,
         few=len(content.sections) <= FEW,
+        inlined=inlined(content),
         keys=_looks(content),
         symbols=symbols(_looks(content)),
         libraries=libraries,
@@ -74,6 +76,16 @@ def page(content: Content) -> str:
         ),
         dark=_variables(DARK_NEUTRALS, {f"--m{x.number}": x.dark for x in _looks(content)}),
     )
+
+
+def inlined(content: Content) -> set[str]:
+    """Return the keys of the figures that stand in the page itself; the others are beside it."""
+    room, kept = INLINE, set()
+    for picture in content.pictures:
+        if len(picture.svg) <= room:
+            room -= len(picture.svg)
+            kept.add(picture.key)
+    return kept
 
 
 def figure(picture: Picture, colours: dict[str, str]) -> Markup:

@@ -17,12 +17,14 @@ from hbvm_bench.report.canvas import Picture, drawing
 from hbvm_bench.report.drift_figure import drift_figure
 from hbvm_bench.report.figures import Drawn, OverTime
 from hbvm_bench.report.motion import Motion
-from hbvm_bench.report.style import Look
+from hbvm_bench.report.style import Look, method_name
 from hbvm_bench.store import Store
-from hbvm_bench.table import GROUPS, Row, rows
+from hbvm_bench.table import GROUPS, Row, group_of, rows
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
+
+MOST_DRAWN = 32  # cases in a figure of a large report
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,8 @@ def section(
     look: dict[str, Look],
     missing: list[Case],
     number: int,
+    *,
+    brief: bool = False,
 ) -> Section:
     """Gather what the report says about one problem.
 
@@ -81,6 +85,8 @@ def section(
         Those that have no result yet.
     number : int
         Of the section, from 1.
+    brief : bool
+        Whether only the main figures are drawn, of the most telling cases.
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
@@ -88,7 +94,7 @@ def section(
     cases = [Drawn(record, look[record.id], store.series(record.id)) for record, store in found]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
-    pictures = _pictures(problem, drawn, known, number)
+    pictures = _pictures(problem, drawn, known, number, brief=brief)
     moving = [picture.key for picture in pictures if picture.key.partition("-")[0] == "motion"]
     return Section(
         problem=problem,
@@ -108,8 +114,28 @@ def section(
 
 
 def _pictures(
-    problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int
+    problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int, *, brief: bool
 ) -> list[Picture]:
+    suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
+    if brief:
+        main = telling(cases)
+        with drawing():
+            made = [
+                figures.work_precision(cases),
+                drift_figure(main),
+                figures.over_time(main, OVER_TIME[0]),
+                portraits.portrait(problem, main),
+                portraits.section(problem, main),
+            ]
+        left = len(cases) - len(main)
+        note = f" Drawn: {len(main)} of {len(cases)} cases, the best and the default of each method." * (
+            left > 0
+        )
+        return [
+            replace(p, key=p.key + suffix, caption=p.caption + ("" if p.key == "work-precision" else note))
+            for p in made
+            if p is not None
+        ]
     with drawing():
         made = [figures.work_precision(cases), drift_figure(cases)]
         made += [figures.over_time(cases, what) for what in OVER_TIME]
@@ -119,8 +145,29 @@ def _pictures(
             made.insert(2, motion.still(cases, "The system in space"))
         made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
         made.append(views.step_sizes(cases))
-    suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
     return [replace(picture, key=picture.key + suffix) for picture in made if picture is not None]
+
+
+def telling(cases: Sequence[Drawn]) -> list[Drawn]:
+    """Return the cases to draw where there are many: of each method the most accurate and the default."""
+    if len(cases) <= MOST_DRAWN:
+        return list(cases)
+    kept: dict[str, Drawn] = {}
+    by_name: dict[str, list[Drawn]] = {}
+    for case in cases:
+        by_name.setdefault(method_name(case.record), []).append(case)
+    for members in by_name.values():
+        best = min(members, key=_rank)
+        default = next((case for case in members if case.record.case.settings == "default"), best)
+        kept |= {case.record.id: case for case in (best, default)}
+    return [case for case in cases if case.record.id in kept][:MOST_DRAWN]
+
+
+def _rank(case: Drawn) -> tuple[str, float]:
+    metrics = case.record.result.metrics
+    values = [metrics[key] for key in ("position_end", "energy_max") if key in metrics]
+    number = next((v.value for v in values if v.counts and v.value is not None), np.inf)
+    return ("a" if group_of(case.record) == "on" else "b", number)
 
 
 OVER_TIME = (

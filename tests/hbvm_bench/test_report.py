@@ -1,6 +1,5 @@
 """The report says what the store says, whatever the names in it, and asks nothing of the network."""
 
-import dataclasses
 import re
 from html.parser import HTMLParser
 
@@ -8,104 +7,24 @@ import msgspec
 import numpy as np
 import pytest
 
-import problems
-from hbvm_bench import reference
-from hbvm_bench.campaign import Campaign, Case, Grid, MethodEntry
-from hbvm_bench.identity import is_ours, resolve
-from hbvm_bench.measure import measure
-from hbvm_bench.metrics import GUARD_TOLERANCE, evaluate, guard_violation
-from hbvm_bench.records import Compile, Record, Result, Timing, TimingRound
+from hbvm_bench.campaign import Campaign, MethodEntry
+from hbvm_bench.metrics import GUARD_TOLERANCE
+from hbvm_bench.records import Timing
 from hbvm_bench.report import words
 from hbvm_bench.report.figures import BINS, envelope
 from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.style import looks, panels
 from hbvm_bench.report.write import write_report
 from hbvm_bench.store import Index, Store
-from integrators.integrate import Solution
-from integrators.protocol import Stats, Status
 from problems.errors import InputError
 
-HOSTILE = '<script>alert("1")</script> | `code` *bold* \\ [x](javascript:1) ' + "very long " * 50 + "\n# head"
-METHODS = (
-    "HBVM(k=16, s=8, h=0.125)",
-    "HBVM(k=18, s=2, h=0.5)",
-    'IAS15(mode="global")',
-    "IAS15()",
-    "Leapfrog(h=0.02, order=8)",
-    "Radau(rtol=1e-6, atol=1e-8)",
-)
-
-
-def made_up(method, number):
-    """Return a record with the reference's own states, spoilt in a way that depends on the method."""
-    problem = problems.load("sitnikov")
-    known = reference.find(problem)
-    assert known is not None
-    resolved = resolve(Case(problem="sitnikov()", method=method))
-    stalled, lost = method == "IAS15()", method.startswith("Radau")
-    t = known.t[:3] if stalled else known.t
-    y = known.high[: t.size].copy()
-    y[1:, 0] += 1e-11 * 10.0**number
-    y[1:, 7] = 3.0 if lost else 0.0
-    status = Status.STALLED if stalled else Status.FINISHED
-    history = np.array([[0.0, 1e-1], [8.0, 1e-9], [8.5, 1e-20]])
-    stats = Stats(steps=100, evaluations=None, extra={"dt_history": history} if stalled else {})
-    solution = Solution(
-        t=t,
-        y=y,
-        status=status,
-        reason="",
-        t_stop=float(t[-1]),
-        stats=stats,
-        compile_seconds=0.1,
-        from_cache=False,
-        problem=problem,
-        method=resolved.method,
-    )
-    measured = measure(solution, known)
-    rounds = [
-        TimingRound(samples=[0.01 * (number + 1), 0.02], repeats=2, compile=Compile(seconds=0.1, cached=True))
-    ]
-    timing = None if stalled else Timing(rounds=rounds)
-    measured = dataclasses.replace(measured, timing=timing)
-    result = Result(
-        outcome="stalled" if stalled else "ok",
-        status=status.value,
-        reason=HOSTILE if stalled else "",
-        t_stop=float(t[-1]),
-        violation=guard_violation(measured),
-        counters=measured.counters,
-        metrics=evaluate(measured),
-        compile=measured.compile,
-    )
-    record = Record(
-        id=resolved.id, case=resolved.case, role="ours" if is_ours(resolved.method) else "peer",
-        library=resolved.method.library, order=None, result=result, timing=timing,
-        versions={"python": "3"}, machine={"cores": 2}, finished="2026-11-21T10:00:00+00:00",
-    )  # fmt: skip
-    return record, measured.series()
+from . import made_up_run
+from .made_up_run import HOSTILE, METHODS
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    store = Store(tmp_path_factory.mktemp("run"))
-    store.prepare()
-    ids = []
-    for number, method in enumerate(METHODS):
-        record, series = made_up(method, number)
-        store.save(record, series)
-        ids.append(record.id)
-    notes = {4: HOSTILE}
-    campaign = Campaign(
-        name="x",
-        title=HOSTILE,
-        description=HOSTILE,
-        problems=["sitnikov()"],
-        methods=[MethodEntry(use=method, note=notes.get(n, "")) for n, method in enumerate(METHODS)],
-        grid=Grid(step=25.0),
-    )
-    store.write_index(Index(campaign=campaign, ids=ids, version="0", command=f"hbvm-bench run {HOSTILE}"))
-    return store
+    return made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run")))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,166 @@
+"""Runs that nobody ran: records and series made up, for the tests of the reports."""
+
+import dataclasses
+
+import numpy as np
+
+import problems
+from hbvm_bench import reference
+from hbvm_bench.campaign import Campaign, Case, Grid, MethodEntry
+from hbvm_bench.identity import is_ours, resolve
+from hbvm_bench.measure import measure
+from hbvm_bench.metrics import evaluate, guard_violation
+from hbvm_bench.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store import Index
+from integrators.integrate import Solution
+from integrators.protocol import Stats, Status
+
+HOSTILE = '<script>alert("1")</script> | `code` *bold* \\ [x](javascript:1) ' + "very long " * 50 + "\n# head"
+METHODS = (
+    "HBVM(k=16, s=8, h=0.125)",
+    "HBVM(k=18, s=2, h=0.5)",
+    'IAS15(mode="global")',
+    "IAS15()",
+    "Leapfrog(h=0.02, order=8)",
+    "Radau(rtol=1e-6, atol=1e-8)",
+)
+
+
+def made_up(method, number):
+    """Return a record with the reference's own states, spoilt in a way that depends on the method."""
+    problem = problems.load("sitnikov")
+    known = reference.find(problem)
+    assert known is not None
+    resolved = resolve(Case(problem="sitnikov()", method=method))
+    stalled, lost = method == "IAS15()", method.startswith("Radau")
+    t = known.t[:3] if stalled else known.t
+    y = known.high[: t.size].copy()
+    y[1:, 0] += 1e-11 * 10.0**number
+    y[1:, 7] = 3.0 if lost else 0.0
+    status = Status.STALLED if stalled else Status.FINISHED
+    history = np.array([[0.0, 1e-1], [8.0, 1e-9], [8.5, 1e-20]])
+    stats = Stats(steps=100, evaluations=None, extra={"dt_history": history} if stalled else {})
+    solution = Solution(
+        t=t,
+        y=y,
+        status=status,
+        reason="",
+        t_stop=float(t[-1]),
+        stats=stats,
+        compile_seconds=0.1,
+        from_cache=False,
+        problem=problem,
+        method=resolved.method,
+    )
+    measured = measure(solution, known)
+    rounds = [
+        TimingRound(samples=[0.01 * (number + 1), 0.02], repeats=2, compile=Compile(seconds=0.1, cached=True))
+    ]
+    timing = None if stalled else Timing(rounds=rounds)
+    measured = dataclasses.replace(measured, timing=timing)
+    result = Result(
+        outcome="stalled" if stalled else "ok",
+        status=status.value,
+        reason=HOSTILE if stalled else "",
+        t_stop=float(t[-1]),
+        violation=guard_violation(measured),
+        counters=measured.counters,
+        metrics=evaluate(measured),
+        compile=measured.compile,
+    )
+    record = Record(
+        id=resolved.id, case=resolved.case, role="ours" if is_ours(resolved.method) else "peer",
+        library=resolved.method.library, order=None, result=result, timing=timing,
+        versions={"python": "3"}, machine={"cores": 2}, finished="2026-11-21T10:00:00+00:00",
+    )  # fmt: skip
+    return record, measured.series()
+
+
+def sitnikov(store):
+    """Put a run on Sitnikov's problem into a store: hostile words, one case stalled, one off the axis."""
+    store.prepare()
+    ids = []
+    for number, method in enumerate(METHODS):
+        record, series = made_up(method, number)
+        store.save(record, series)
+        ids.append(record.id)
+    notes = {4: HOSTILE}
+    campaign = Campaign(
+        name="x",
+        title=HOSTILE,
+        description=HOSTILE,
+        problems=["sitnikov()"],
+        methods=[MethodEntry(use=method, note=notes.get(n, "")) for n, method in enumerate(METHODS)],
+        grid=Grid(step=25.0),
+    )
+    store.write_index(Index(campaign=campaign, ids=ids, version="0", command=f"hbvm-bench run {HOSTILE}"))
+    return store
+
+
+OURS = ("Gauss(s=3, h={:.4g})", "HBVM(k=6, s=3, h={:.4g})")
+ADAPTIVE = ("Taylor(tol={:.3g})", "IAS15(epsilon={:.3g})", "DOP853(rtol={:.3g}, atol=1e-14)")
+
+
+def methods(count):
+    """Return so many different methods of several families."""
+    made = []
+    for number in range(count):
+        step = 1e-3 * (1 + number)
+        for_peers = number % 5 - 2
+        made.append(
+            ADAPTIVE[for_peers].format(step * 1e-9) if for_peers >= 0 else OURS[number % 5].format(step)
+        )
+    return made
+
+
+def write(store, texts, count, *, missing=0):
+    """Put a run of made-up cases into a store: errors that follow a law, some failures."""
+    store.prepare()
+    names, rng = methods(count), np.random.default_rng(1)
+    t = np.linspace(0.0, 100.0, 201)
+    ids = []
+    for problem in texts:
+        for number, method in enumerate(names):
+            resolved = resolve(Case(problem=problem, method=method))
+            ids.append(resolved.id)
+            if len(ids) <= missing:
+                continue
+            size, stalled = 10.0 ** rng.uniform(-16, -4), number % 17 == 16
+            y = np.c_[np.sin(t + size), np.cos(t)]
+            error = size * np.sqrt(t / t[-1]) * (1 + 0.1 * rng.standard_normal(t.size)) ** 2
+            values = {"position_end": 30 * size, "energy_max": size, "warm_seconds": 1e-3 / size**0.1}
+            metrics = {
+                key: Value(value=value, void=stalled, why="only to t = 50" if stalled else "")
+                for key, value in {**values, "distance_max": 1.0, "steps": 100.0 + number}.items()
+            }
+            cold = Compile(seconds=0.1, cached=False)
+            timing = Timing(rounds=[TimingRound(samples=[values["warm_seconds"]], repeats=2, compile=cold)])
+            record = Record(
+                id=resolved.id,
+                case=resolved.case,
+                role="ours" if is_ours(resolved.method) else "peer",
+                library=resolved.method.library,
+                order=None,
+                result=Result(
+                    outcome="stalled" if stalled else "ok",
+                    status="stalled" if stalled else "finished",
+                    reason="its step fell to 1e-20" if stalled else "",
+                    t_stop=50.0 if stalled else 100.0,
+                    counters=Counters(steps=100 + number),
+                    metrics=metrics,
+                ),
+                timing=None if stalled else timing,
+                versions={"python": "3"},
+                machine={"cores": 2},
+                finished="2026-11-21T10:00:00+00:00",
+            )
+            store.save(record, {"t": t, "y": y, "error.energy": error, "distance": np.ones_like(t)})
+    campaign = Campaign(
+        name="large",
+        title="A large campaign",
+        description="Made up.",
+        problems=list(texts),
+        methods=[MethodEntry(use=name) for name in names],
+    )
+    store.write_index(Index(campaign=campaign, ids=ids, version="0", command="hbvm-bench run large"))
+    return store
