@@ -1,0 +1,40 @@
+"""Pieces equal the whole, and so does what follows a checkpoint, bit for bit, whatever the solver."""
+
+import numpy as np
+import pytest
+
+import problems
+from integrators import HBVM, Gauss, LineIntegral
+from integrators.protocol import Status
+
+STIFF = {"stiff_chain": {"omega": 1e3}, "henon_heiles": {}}
+CASES = [
+    ("stiff_chain", HBVM(k=8, s=4, h=0.02, solver="newton")),
+    ("stiff_chain", HBVM(k=8, s=4, h=0.02)),  # Newton takes over on the way
+    ("henon_heiles", Gauss(s=3, h=0.3, solver="blended")),
+    ("henon_heiles", HBVM(tol=1e-10)),
+    ("henon_heiles", HBVM(k=8, s=4, tol=1e-8)),
+    ("henon_heiles", LineIntegral(k=8, s=4, h=0.3, invariants=["energy"])),
+    ("henon_heiles", LineIntegral(k=8, s=4, tol=1e-9, invariants=["energy"])),
+]
+TIMES = np.array([0.31, 0.9, 2.5, 2.6, 7.3])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("name", "method"), CASES, ids=repr)
+def test_pieces_checkpoints_and_the_whole_are_the_same(name, method, sign):
+    problem = problems.load(name, **STIFF[name])
+    program = method.compile(problem.system)
+    times = sign * TIMES
+    whole = program.start(problem.y0, problem.par).advance(times)
+    assert whole.status is Status.FINISHED
+    stepper = program.start(problem.y0, problem.par)
+    pieces = [stepper.advance(times[:2]).y]
+    kept = stepper.checkpoint()
+    pieces += [stepper.advance(times[2:4]).y, stepper.advance(times[4:]).y]
+    assert np.array_equal(np.concatenate(pieces), whole.y)
+    stepper.restore(kept)
+    assert np.array_equal(stepper.advance(times[2:]).y, whole.y[2:])
+    other = program.start(problem.y0, problem.par)
+    other.restore(kept)
+    assert np.array_equal(other.advance(times[2:]).y, whole.y[2:])
