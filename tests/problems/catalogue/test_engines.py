@@ -1,4 +1,10 @@
-"""The same field on every engine."""
+"""The same field on every engine.
+
+Differences are in units in the last place of what is added up in an output: the sum of the sizes of its
+terms. Relative to the largest single term instead, compilers that contract products and sums come to 20
+(lennard_jones: each of six neighbours adds powers up to 14 of a distance, which nearly cancel) and 12
+(cluster), and to at most 6 on every other problem: measured on these states.
+"""
 
 import numpy as np
 import pytest
