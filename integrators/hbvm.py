@@ -16,7 +16,7 @@ CITATION = """\
 }
 """
 
-TOLERANCE = 1e-15
+TOLERANCE = 3e-16
 """Of a method that is given neither a step nor a tolerance."""
 
 SOLVERS = ("auto", "fixed_point", "newton", "blended")
@@ -78,7 +78,7 @@ class HBVM(MethodBase):
     tol : float, optional
         Local error per step, relative to the size of each block of the state (the
         momenta of one body, else each component), as estimated by
-        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 1e-15 where neither
+        ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary. 3e-16 where neither
         ``h`` nor ``tol`` is given: as accurate as double precision allows.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved. The fixed-point iteration contracts while h
@@ -88,7 +88,8 @@ class HBVM(MethodBase):
         system is large. ``"blended"``: blended iteration, one real matrix. ``"auto"``:
         fixed point, and Newton from where that fails or takes a hundred iterations a
         step until it would contract well again. The Jacobian is traced; its factors are
-        kept while they serve. ``stats`` tells which solver did how much.
+        kept while they serve. ``stats`` tells which solver did how much. With ``tol`` always
+        fixed point: steps are short enough for it to contract well.
 
     Raises
     ------
@@ -139,6 +140,11 @@ class HBVM(MethodBase):
             )
         if self.solver not in SOLVERS:
             raise unknown("solver", str(self.solver), SOLVERS)
+        if self.tol is not None and self.solver in ("newton", "blended"):
+            raise InputError(
+                f"{type(self).__name__} solves steps of varying length by fixed-point iteration, with steps "
+                f"short enough for it; leave out solver={self.solver!r}, or give h in place of tol."
+            )
 
     @property
     def order(self) -> int | None:
@@ -174,9 +180,7 @@ class HBVM(MethodBase):
         if self.tol is not None:
             from integrators.kernel.adaptive.program import AdaptiveProgram
 
-            return AdaptiveProgram(
-                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver
-            )
+            return AdaptiveProgram(system, k=k, s=s, tol=self.tol, defect=defect, h=self.h)
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None

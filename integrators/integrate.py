@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_times
 from problems.errors import InputError
 from problems.foreign import Foreign
@@ -79,7 +80,7 @@ class Solution:
 
 def integrate(
     problem: Problem,
-    method: MethodBase,
+    method: MethodBase | None = None,
     times: ArrayLike | None = None,
     sample: str | None = None,
     events: "Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]]" = (),
@@ -90,8 +91,9 @@ def integrate(
     ----------
     problem : Problem
         What to integrate.
-    method : MethodBase
-        How: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ...
+    method : MethodBase, optional
+        How: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ... Default: ``HBVM()``, which
+        chooses everything itself.
     times : array_like, shape (n,), optional
         Strictly monotone times, from the problem's ``t0`` on (or back). Default:
         the problem's own grid, or else 1001 equidistant times to ``t_end``.
@@ -113,6 +115,8 @@ def integrate(
         If the method does not accept the problem, or for times, samplings, events and
         initial states that cannot be used.
     """
+    if method is None:
+        method = HBVM()
     check(problem, method)
     program = method.compile(problem.system)
     grid = _grid(problem, times)

@@ -89,6 +89,10 @@ def run_batch(
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
     work = _Work(program, result, starts, parameters, t0, h, sample or "side", *plan(grid, bases, h))
+    if program.varying:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(work.alone, range(n)))
+        return result
     if program.solver.strategy == layout.ALWAYS_IMPLICIT:
         for i in range(n):
             work.alone(i)
@@ -150,7 +154,7 @@ class _Work:
                     self._report(i, contexts[member])
 
     def alone(self, i: int) -> None:
-        """Integrate one trajectory by a stepper: the implicit solver works on one at a time."""
+        """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
         result = self.result
         stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
         samples = stepper.advance(result.t, sample=self.sample)

@@ -5,6 +5,8 @@ from math import exp, log
 from integrators.kernel.products import compiled
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
+RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
+TRUST = 0.2  # of a trend to longer steps
 LOG_SHRINK = log(SHRINK / SAFETY)
 # Fast modes at rest show neither in the error nor in the first iterations. Where the iteration failed, steps
 # stay this much shorter at first, and then approach that length again by this factor a step.
@@ -23,7 +25,8 @@ def log_factor(aim, estimate, behind, change):
     The length that would have met the tolerance, corrected by how it changed over
     the last step, which foresees an approach (K. Gustafsson, "Control-theoretic
     techniques for stepsize selection in implicit Runge-Kutta methods", ACM TOMS 20
-    (1994) 496-517).
+    (1994) 496-517). A step whose error is too large is shortened by less than that:
+    its end, where most of the error comes from, is then not reached any more.
 
     Parameters
     ----------
@@ -34,8 +37,11 @@ def log_factor(aim, estimate, behind, change):
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
+    if factor < 0.0:
+        return RECOIL * factor
     if behind < INFINITY:
-        factor += min(change + behind - estimate, 0.0)
+        trend = change + behind - estimate
+        factor += trend if trend < 0.0 else TRUST * trend
     return factor
 
 

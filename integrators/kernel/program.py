@@ -41,6 +41,9 @@ class HBVMProgram:
         How the stage equations are solved; see `integrators.hbvm.HBVM`.
     """
 
+    varying = False
+    """Whether steps vary in length."""
+
     def __init__(
         self, system: System, *, k: int, s: int, h: float, form: str | None = None, solver: str = "auto"
     ):

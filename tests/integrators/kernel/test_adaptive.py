@@ -1,0 +1,248 @@
+"""Steps of varying length: energy at round-off whatever they are, errors that follow the tolerance."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import integrators
+import problems
+from integrators import HBVM, Gauss, testing
+from integrators.automatic import choose
+from integrators.protocol import Status
+from problems.errors import InputError
+
+METHODS = [HBVM(), HBVM(tol=1e-8), HBVM(k=6, s=3, tol=1e-6), Gauss(s=4, tol=1e-8, h=0.01)]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+@pytest.mark.parametrize("check", testing.CHECKS, ids=testing.name_of)
+def test_conforms(check, method):
+    assert check(method, testing.two_bodies()) is None
+
+
+def kepler(revolutions, e=0.6):
+    return problems.load("kepler", e=e, t_end=2 * np.pi * revolutions)
+
+
+def position_error(problem, solution):
+    exact = problems.kepler.solution(problem, solution.t[-1:])[0]
+    return np.abs(solution.y[-1] - exact).max()
+
+
+def test_energy_stays_at_round_off_over_1000_revolutions_and_gauss_drifts_at_the_same_steps():
+    problem = kepler(1000)
+    loose = integrators.integrate(problem, HBVM(tol=1e-4), sample="steps")
+    assert loose.status is Status.FINISHED
+    assert loose.errors()["energy"].max() <= 1e-13
+    lengths = np.diff(loose.t)
+    assert lengths.max() > 3 * lengths.min()
+    # Landing on each of these times makes them the steps of Gauss too.
+    s = loose.stats.extra["s"]
+    times = loose.t[: np.searchsorted(loose.t, 50 * 2 * np.pi)]
+    same = integrators.integrate(problem, Gauss(s=s, h=1e6), times, sample="land")
+    assert same.stats.extra["partial_steps"] == times.size - 1
+    assert same.errors()["energy"].max() > 1e-6
+
+
+def test_adaptive_gauss_loses_energy_at_a_tolerance_at_which_hbvm_keeps_it():
+    problem = kepler(100)
+    gauss = integrators.integrate(problem, Gauss(s=4, tol=1e-6), sample="steps")
+    hbvm = integrators.integrate(problem, HBVM(k=16, s=4, tol=1e-6), sample="steps")
+    assert gauss.errors()["energy"].max() > 1e-8
+    assert hbvm.errors()["energy"].max() < 1e-13
+
+
+def test_the_error_follows_the_tolerance():
+    problem = kepler(4)
+    found = [
+        position_error(problem, integrators.integrate(problem, HBVM(k=16, s=5, tol=tol), [problem.t_end]))
+        for tol in (1e-4, 1e-6, 1e-8, 1e-10)
+    ]
+    assert found[0] < 0.1
+    for loose, tight in pairwise(found):
+        assert tight < loose / 8
+
+
+def test_states_between_steps_have_the_energy_of_the_steps_and_the_polynomial_has_not():
+    problem = kepler(10)
+    times = np.linspace(0.0, problem.t_end, 777)
+    side, dense = (
+        integrators.integrate(problem, HBVM(k=20, s=4, tol=1e-6), times, sample=how).errors()["energy"].max()
+        for how in ("side", "dense")
+    )
+    assert side < 1e-14
+    assert dense > 1e-9
+
+
+def test_own_steps_do_not_depend_on_the_times_asked_for():
+    problem = kepler(5)
+    program = HBVM().compile(problem.system)
+    few, many = (program.start(problem.y0, problem.par, 0.0) for _ in range(2))
+    few.advance([problem.t_end])
+    many.advance(np.linspace(0.1, problem.t_end, 333))
+    assert few.t == many.t
+    assert np.array_equal(few.y, many.y)
+
+
+def test_steps_add_up_to_the_times_they_are_at():
+    problem = kepler(20)
+    program = HBVM(tol=1e-10).compile(problem.system)
+    stepper = program.start(problem.y0, problem.par, 0.0)
+    steps = stepper.advance([0.0, problem.t_end], sample="steps")
+    exact = problems.kepler.solution(problem, steps.t)
+    assert np.abs(steps.y - exact).max() < 1e-7
+    assert steps.t[-1] <= problem.t_end
+    assert steps.t.size == stepper.stats.steps + 1
+
+
+def test_backwards_returns_to_the_start():
+    problem = kepler(3)
+    stepper = HBVM().compile(problem.system).start(problem.y0, problem.par, 0.0)
+    end = stepper.advance([problem.t_end], sample="land").y[-1]
+    back = stepper.advance([0.0], sample="land").y[-1]
+    assert np.abs(end - problem.y0).max() < 1e-12
+    assert np.abs(back - problem.y0).max() < 1e-12
+
+
+def test_pieces_equal_the_whole_with_every_sampling():
+    problem = kepler(2)
+    program = HBVM(tol=1e-9).compile(problem.system)
+    times = np.linspace(0.3, problem.t_end, 40)
+    for sample in ("side", "land", "dense"):
+        whole = program.start(problem.y0, problem.par, 0.0).advance(times, sample=sample)
+        stepper = program.start(problem.y0, problem.par, 0.0)
+        parts = [stepper.advance(part, sample=sample).y for part in np.array_split(times, 7)]
+        assert np.array_equal(np.concatenate(parts), whole.y)
+
+
+def test_a_close_approach_needs_no_setting():
+    problem = kepler(10, e=0.99)
+    solution = integrators.integrate(problem, HBVM(), sample="steps")
+    assert solution.status is Status.FINISHED
+    assert solution.errors()["energy"].max() < 1e-12
+    assert position_error(problem, solution) < 1e-7  # at a pericentre, where the velocity is 14
+    lengths = np.diff(solution.t)
+    assert lengths.max() > 100 * lengths.min()
+
+
+def test_the_pythagorean_problem_runs_to_the_end_and_agrees_with_a_taylor_method():
+    problem = problems.load("pythagorean", t_end=70.0)
+    ours = integrators.integrate(problem, HBVM(), [7.0, 35.0, 70.0])
+    assert ours.status is Status.FINISHED
+    assert ours.errors()["energy"].max() < 1e-9
+    pytest.importorskip("heyoka")
+    theirs = integrators.integrate(problem, integrators.Taylor(tol=1e-18), [7.0, 35.0])
+    assert np.abs(ours.y[0] - theirs.y[0]).max() < 1e-7
+    # Close encounters multiply the last bit.
+    assert np.abs(ours.y[1] - theirs.y[1]).max() < 1e-4
+
+
+def test_the_planetoid_stays_on_the_axis():
+    problem = problems.load("sitnikov", t_end=300.0)
+    solution = integrators.integrate(problem, HBVM(), np.linspace(0.0, 300.0, 601))
+    assert solution.guards()["off_axis"].max() == 0.0
+    assert solution.errors()["energy"].max() < 1e-13
+
+
+def test_fast_modes_at_rest_do_not_make_the_iteration_slow():
+    problem = problems.load("fput", n=32, t_end=500.0)  # the lowest mode only
+    stats = integrators.integrate(problem, HBVM(), [500.0]).stats
+    assert stats.iterations / stats.steps < 40
+    assert stats.rejections < stats.steps
+
+
+def test_a_collision_is_a_step_underflow_and_what_was_computed_is_kept():
+    fall = problems.Hamiltonian(lambda q, p: p[0] ** 2 / 2 - 1 / q[0], dof=1, name="fall")
+    problem = problems.Problem(fall, q0=[1.0], p0=[0.0], t_end=2.0)
+    solution = integrators.integrate(problem, HBVM(), np.linspace(0.0, 2.0, 41))
+    assert solution.status is Status.STEP_UNDERFLOW
+    assert "may end or be singular" in solution.reason
+    assert abs(solution.t_stop - np.pi / 8**0.5) < 1e-3
+    assert solution.t.size == 23  # 0, 0.05, .. 1.1
+    assert np.isfinite(solution.y).all()
+
+
+def test_a_field_that_is_not_finite_from_some_place_on_says_so():
+    wall = problems.VectorField(lambda y, m: [1.0 + 0.0 * m.sqrt(1.0 - y[0])], dim=1, name="wall")
+    problem = problems.Problem(wall, y0=[0.0], t_end=2.0)
+    solution = integrators.integrate(problem, HBVM(tol=1e-8), np.linspace(0.0, 2.0, 21))
+    assert solution.status is Status.NOT_FINITE
+    assert "not finite" in solution.reason
+    assert 0.9 < solution.t_stop <= 1.0
+
+
+def test_the_choice_of_k_and_s_follows_tolerance_and_degree():
+    loose, tight = (choose(kepler(1).system, tol) for tol in (1e-4, 1e-15))
+    assert loose[:2] == (16, 4)
+    assert tight[:2] == (16, 13)
+    assert loose[2] == tight[2] < 1e-15
+    cubic = problems.load("henon_heiles").system
+    k, s, defect = choose(cubic, 1e-4)
+    assert (k, defect) == (8, None)
+    assert 2 * k >= 3 * s
+    assert choose(problems.VectorField(lambda y: [-y[0]], dim=1), 1e-8) == (16, 7, None)
+
+
+def test_a_polynomial_energy_is_kept_at_any_tolerance():
+    problem = problems.load("henon_heiles", t_end=1000.0)
+    for tol in (1e-3, 1e-6):
+        solution = integrators.integrate(problem, HBVM(tol=tol), sample="steps")
+        assert solution.errors()["energy"].max() < 2e-14
+
+
+def test_poisson_systems_take_a_tolerance():
+    problem = problems.load("rigid_body")
+    solution = integrators.integrate(problem, HBVM(tol=1e-10), sample="steps")
+    assert solution.status is Status.FINISHED
+    assert solution.errors()["energy"].max() < 1e-13
+
+
+def test_without_options_the_tolerance_is_that_of_round_off():
+    assert HBVM() == HBVM(tol=3e-16)
+    assert repr(HBVM()) == "HBVM(tol=3e-16)"
+    assert HBVM().order is None
+    assert HBVM(k=8, s=4, tol=1e-8).order == 8
+
+
+def test_a_batch_takes_each_trajectory_through_steps_of_its_own():
+    problem = kepler(2)
+    program = HBVM(tol=1e-9).compile(problem.system)
+    starts = np.array([problem.y0, 1.01 * problem.y0])
+    batch = program.batch(starts, times=[3.0, 12.0], threads=2)
+    for i, start in enumerate(starts):
+        alone = program.start(start).advance([3.0, 12.0])
+        assert np.array_equal(batch.y[i], alone.y)
+    assert batch.steps[0] != batch.steps[1]
+
+
+def test_a_problem_alone_is_enough():
+    problem = kepler(1)
+    solution = integrators.integrate(problem)
+    assert solution.method == HBVM()
+    assert position_error(problem, solution) < 1e-13
+
+
+def test_what_cannot_be_done_is_refused_with_the_fix():
+    for bad in (0.0, 1e-17, -1.0, 1.0, np.nan, "1e-8", True):
+        with pytest.raises(InputError, match=r"tolerance 2\.2e-16 <= tol < 1"):
+            HBVM(tol=bad)
+    with pytest.raises(InputError, match="HBVM needs k and s, or neither of them; give k too"):
+        HBVM(s=2, tol=1e-8)
+    with pytest.raises(InputError, match="needs k and s with a fixed step"):
+        HBVM(h=0.1)
+    with pytest.raises(InputError, match="one stage tells nothing about its error"):
+        HBVM(k=1, s=1, tol=1e-8)
+    with pytest.raises(InputError, match="HBVM solves steps of varying length by fixed-point iteration"):
+        HBVM(tol=1e-8, solver="newton")
+    with pytest.raises(InputError, match="Gauss needs a step h, or a tolerance tol"):
+        Gauss(s=2)
+    with pytest.raises(InputError, match="Gauss needs k > 1"):
+        Gauss(s=1, tol=1e-3)
+
+
+def test_a_checkpoint_of_another_tolerance_is_refused():
+    problem = testing.pendulum()
+    checkpoint = HBVM(tol=1e-8).compile(problem.system).start(problem.y0).checkpoint()
+    with pytest.raises(InputError, match="belongs to another method or system"):
+        HBVM(tol=1e-9).compile(problem.system).start(problem.y0).restore(checkpoint)
