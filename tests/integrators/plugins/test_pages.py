@@ -1,0 +1,53 @@
+"""The examples on the plugins' pages run as they stand there, and print what the pages say."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+from hbvm_bench import plugin_costs
+from problems.errors import InputError
+
+PAGES = Path(__file__).parents[3] / "docs" / "plugins"
+
+
+def example(page: str) -> list[float]:
+    """Run the first code block of a page in the tests' process; return the numbers it printed."""
+    block = re.search(r"```python\n(.*?)```", (PAGES / page).read_text(), re.DOTALL)
+    assert block is not None
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(block[1], page, "exec"), {"__name__": page})  # noqa: S102 -- our own page
+    return [abs(float(line)) for line in printed.getvalue().split()]
+
+
+def test_the_example_for_scipy_shows_the_leak_and_its_absence() -> None:
+    leaking, kept = example("scipy.md")
+    assert leaking > 1e-7  # measured 3.2e-7
+    assert kept < 1e-13  # measured 7e-15
+
+
+def test_the_example_for_diffrax_keeps_the_energy() -> None:
+    pytest.importorskip("diffrax")
+    (error,) = example("diffrax.md")
+    assert error < 1e-12  # measured 1e-14
+
+
+def test_the_example_for_rebound_keeps_the_energy() -> None:
+    pytest.importorskip("rebound")
+    (error,) = example("rebound.md")
+    assert error < 2e-14  # measured 1e-15
+
+
+def test_the_energy_of_dop853_leaks_linearly_and_that_of_hbvm_does_not() -> None:
+    rows = list(plugin_costs.leak(400.0, parts=4))
+    leaks = [errors["DOP853"] for _, errors in rows]
+    assert leaks[-1] / leaks[0] == pytest.approx(4.0, rel=0.2)
+    assert max(errors["HBVM"] for _, errors in rows) < 1e-2 * leaks[0]  # measured 1e-14 beside 1e-7
+
+
+def test_a_host_that_is_none_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(InputError, match="scipy"):
+        plugin_costs.measure("sipy", 1)
