@@ -50,7 +50,7 @@ SETTINGS: Any = {
     "axes.facecolor": PAPER,
     "savefig.facecolor": PAPER,
     "path.simplify": True,
-    "path.simplify_threshold": 0.2,
+    "path.simplify_threshold": 0.4,
 }
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
@@ -128,8 +128,11 @@ def _with_one_style(match: re.Match[str]) -> str:
 
 
 def _rounded(match: re.Match[str]) -> str:
-    value = re.sub(r"-?\d+\.\d+", lambda number: f"{round(float(number[0]), 2):g}", match[2])
-    return f'{match[1]}="{" ".join(value.split())}"'
+    value = re.sub(r"-?\d+\.\d+", lambda number: f"{round(float(number[0]), 2):.4g}", match[2])
+    value = " ".join(value.split())
+    if match[1] == "d" and not re.search("[CQ]", value):
+        value = value.replace(" L ", " ")  # what follows the first point of a path is a line anyway
+    return f'{match[1]}="{value}"'
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:

@@ -82,12 +82,14 @@
 
   // the first view: within the axis's own bounds, and no wider than what is shown
   const range = (spec, isLog, panel, side) => {
-    if (!isLog || spec.low === null) return {};
+    if (!isLog) return {};
+    const edge = { low: spec.low ?? -300, high: spec.high ?? 300 };
     const logs = panel.traces.filter((t) => !off.has(t.case)).flatMap((t) => t[side]).filter((v) => v > 0).map(Math.log10);
-    if (!logs.length) return { range: [spec.low, spec.high] };
+    if (!logs.length) return edge.low > -300 ? { range: [edge.low, edge.high] } : {};
     const [a, b] = logs.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [Infinity, -Infinity]);
-    const bottom = Math.max(spec.low, a), top = Math.min(spec.high, b);
-    return bottom < top ? { range: [bottom - 0.04 * (top - bottom) - 0.1, top + 0.04 * (top - bottom) + 0.1] } : { range: [spec.low, spec.high] };
+    const bottom = Math.max(edge.low, a), top = Math.min(edge.high, b);
+    const [first, end] = bottom < top ? [bottom - 0.04 * (top - bottom) - 0.1, top + 0.04 * (top - bottom) + 0.1] : [Math.min(a, b) - 1, Math.max(a, b) + 1];
+    return { range: [first, end], ...(end - first > 1.5 ? { dtick: Math.ceil((end - first) / 9) } : {}) };
   };
 
   const build = (plot, looks, figure) => {
