@@ -168,7 +168,7 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
 
         def estimate(y: Any, g: Any, b: Any) -> Any:
             if b.size == 0:
-                return jnp.zeros_like(y)
+                return jnp.zeros(y.shape, _real(y.dtype))
             size = jnp.abs(y) + jnp.max(jnp.abs(g), axis=0)
             size = jnp.maximum(size, FLOOR * jnp.max(size) + jnp.finfo(size.dtype).tiny)
             top, bottom = (jnp.sqrt(jnp.sum((jnp.abs(x) / size) ** 2)) for x in (b, g[0]))

@@ -129,16 +129,19 @@ def test_a_controller_chooses_steps_and_the_energy_is_kept_with_them() -> None:
 
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.complex64])
 def test_pytrees_in_single_precision_stay_what_they_are(dtype: Any) -> None:
-    y0 = {"a": jnp.ones((2, 3), dtype), "b": jnp.ones((), dtype)}
+    y0 = {"a": jnp.ones((2, 3), dtype), "b": jnp.ones((), dtype), "c": jnp.ones((0, 2), dtype)}
     with jax.numpy_dtype_promotion("strict"):
         solution = dx.diffeqsolve(
             dx.ODETerm(lambda t, y, args: jax.tree.map(jnp.negative, y)), HBVM(k=4, s=2),
             jnp.float32(0.0), jnp.float32(1.0), jnp.float32(0.1), y0,
+            stepsize_controller=dx.PIDController(rtol=1e-6, atol=1e-6),
         )  # fmt: skip
     for key, start in y0.items():
         assert solution.ys[key].dtype == dtype
         assert solution.ys[key].shape == (1, *start.shape)
-        assert np.abs(np.asarray(solution.ys[key]) - np.exp(-1.0)).max() < 1e-6  # measured 6e-8
+        assert (
+            np.abs(np.asarray(solution.ys[key]) - np.exp(-1.0)).max(initial=0.0) < 1e-5
+        )  # measured below 1e-6 with these tolerances
 
 
 def test_newton_takes_over_where_the_fixed_point_fails_and_the_failure_is_a_result() -> None:
