@@ -67,7 +67,9 @@ def test_unknown_names_come_with_the_nearest():
         registry.get("hbmv")
     with pytest.raises(UnknownNameError, match=r"unknown option of HBVM 'kk'; did you mean 'k'"):
         registry.create("HBVM", kk=4, s=2, h=0.1)
-    with pytest.raises(InputError, match=r"LineIntegral needs k, s; give a value as in LineIntegral\(k=...\)"):
+    with pytest.raises(
+        InputError, match=r"LineIntegral needs k, s; give a value as in LineIntegral\(k=...\)"
+    ):
         registry.create("LineIntegral", invariants=["energy"])
 
 
