@@ -1,5 +1,6 @@
 """HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side."""
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median, quantiles
@@ -10,7 +11,7 @@ from hbvm_bench.identity import make_method, make_problem
 from hbvm_bench.race import truth
 from hbvm_bench.race.accuracy import sample_times
 from hbvm_bench.race.contests import chosen
-from hbvm_bench.timing import Run, repeats_for
+from hbvm_bench.timing import Run
 from integrators.protocol import MethodBase, Status
 from problems.errors import InputError
 from problems.problem import Problem
@@ -22,8 +23,6 @@ INSTEAD = {"sitnikov": "Taylor(tol=1e-15, compact_mode=True)"}
 
 GOALS = {"outer_solar_system": 6.0, "sitnikov": 5.0, "kepler": 2.0, "henon_heiles": 1.5}
 """How many times as long the Taylor method should take, declared before it was measured."""
-
-SHORTEST = 0.002  # seconds of a sample: short ones are seldom interrupted
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Side:
     steps : int
         Of one run.
     seconds : list of float
-        Per run, one entry per round.
+        Of processor time per run, one entry per round.
     """
 
     method: str
@@ -124,16 +123,23 @@ def _duel(key: str, problem: Problem, rounds: int) -> Duel:
         for method, sample in zip(methods, (None, "land"), strict=True)
     ]
     errors = [_errors(problem, method, run, true) for method, run in zip(methods, runs, strict=True)]
-    repeats = [repeats_for(run.seconds()[0], SHORTEST) for run in runs]
     seconds: list[list[float]] = [[], []]
     for _ in range(rounds):
-        for samples, run, n in zip(seconds, runs, repeats, strict=True):
-            samples.append(run.seconds(n)[0])
+        for samples, run in zip(seconds, runs, strict=True):
+            samples.append(_seconds(run))
     ours, theirs = (
         Side(repr(method), *error, seconds=samples)
         for method, error, samples in zip(methods, errors, seconds, strict=True)
     )
     return Duel(key, GOALS[key], ours, theirs)
+
+
+def _seconds(run: Run) -> float:
+    """Return the processor's time for one run; other work on the machine does not count."""
+    stepper = run.program.start(run.y0, run.par, run.t0)
+    start = time.thread_time()
+    stepper.advance(np.array([run.t_end]), sample=run.sample)
+    return time.thread_time() - start
 
 
 def _errors(

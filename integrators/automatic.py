@@ -8,11 +8,11 @@ from problems.system import System
 FEW, MANY = 8, 16
 """Stages that the field takes at a time: fewer cost as much."""
 
-HIGHEST = 13
-"""Beyond this degree the longer steps take so many more iterations that nothing is gained (measured)."""
-
 SPARE = 2
 """Nodes that are left over for the estimates."""
+
+HIGHEST = MANY - SPARE
+"""The highest degree."""
 
 DEFECT = 3e-17
 """Error of a step's quadrature, estimated by the last coefficient that k nodes see; it is much smaller."""
@@ -42,7 +42,7 @@ def choose(system: System, tol: float) -> tuple[int, int, float | None]:
         Bound on the estimated error of a step's quadrature; ``None``: it is 0, or there is no
         energy to keep.
     """
-    s = max(2, min(HIGHEST, math.ceil((MANY - SPARE) * math.log(tol) / math.log(DEFECT))))
+    s = max(2, min(HIGHEST, math.ceil(HIGHEST * math.log(tol) / math.log(DEFECT))))
     if "hamiltonian" not in system.offered():
         return MANY, s, None
     nu = degree(system)

@@ -5,7 +5,7 @@ from time import perf_counter
 
 from numpy.typing import ArrayLike
 
-from integrators.kernel import layout
+from integrators.kernel import layout, tables
 from integrators.kernel.adaptive import engine
 from integrators.kernel.adaptive.stepper import AdaptiveStepper
 from integrators.kernel.program import HBVMProgram
@@ -61,6 +61,12 @@ class AdaptiveProgram(HBVMProgram):
         made = engine.code()
         self.from_cache = self.from_cache and made.from_cache
         c = self.constants
+        if c.route != layout.THROUGH:
+            # What rounding does to a row acts in every step; see `integrators.kernel.tables`.
+            a = c.arrays
+            raw = tables.keep_moments(a["matrix"], a["matrix_low"], a["basis"])
+            columns = c.route if c.route > 1 else None
+            self._fixed["RAW_MATRIX"] = tables.packed(raw, columns=columns, repeat=True)
         # P_s vanishes at the nodes of the rule with s nodes.
         self.degree = s if k > s else s - 1
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]

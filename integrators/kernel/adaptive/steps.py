@@ -78,7 +78,7 @@ def iterate(ctx):
             rate = min(max((log(last) - first) / tries, LEAST_RATE), MOST_RATE)
         elif last == 0.0 and tries > 1:
             rate = max(rate + HOPE, LEAST_RATE)
-        if get_int(ctx, at.OUTCOME) == at.RUNNING and (last < ROUNDING or log(last) + rate < GOAL):
+        if get_int(ctx, at.OUTCOME) == at.RUNNING and log(last) + rate < GOAL:
             evaluate(ctx)
             put_int(ctx, at.TRIED, get_int(ctx, at.TRIED) + 1)
             put_int(ctx, at.OUTCOME, at.DONE)

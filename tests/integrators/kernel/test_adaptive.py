@@ -34,7 +34,7 @@ def test_energy_stays_at_round_off_over_1000_revolutions_and_gauss_drifts_at_the
     problem = kepler(1000)
     loose = integrators.integrate(problem, HBVM(tol=1e-4), sample="steps")
     assert loose.status is Status.FINISHED
-    assert loose.errors()["energy"].max() <= 1e-13
+    assert loose.errors()["energy"].max() <= 1e-13  # measured 2.5e-14
     lengths = np.diff(loose.t)
     assert lengths.max() > 3 * lengths.min()
     # Landing on each of these times makes them the steps of Gauss too.
@@ -42,15 +42,15 @@ def test_energy_stays_at_round_off_over_1000_revolutions_and_gauss_drifts_at_the
     times = loose.t[: np.searchsorted(loose.t, 50 * 2 * np.pi)]
     same = integrators.integrate(problem, Gauss(s=s, h=1e6), times, sample="land")
     assert same.stats.extra["partial_steps"] == times.size - 1
-    assert same.errors()["energy"].max() > 1e-6
+    assert same.errors()["energy"].max() > 1e-6  # measured 6.1e-4
 
 
 def test_adaptive_gauss_loses_energy_at_a_tolerance_at_which_hbvm_keeps_it():
     problem = kepler(100)
     gauss = integrators.integrate(problem, Gauss(s=4, tol=1e-6), sample="steps")
     hbvm = integrators.integrate(problem, HBVM(k=16, s=4, tol=1e-6), sample="steps")
-    assert gauss.errors()["energy"].max() > 1e-8
-    assert hbvm.errors()["energy"].max() < 1e-13
+    assert gauss.errors()["energy"].max() > 1e-8  # measured 1.7e-7
+    assert hbvm.errors()["energy"].max() < 1e-13  # measured 5.4e-15
 
 
 def test_the_error_follows_the_tolerance():
@@ -59,9 +59,9 @@ def test_the_error_follows_the_tolerance():
         position_error(problem, integrators.integrate(problem, HBVM(k=16, s=5, tol=tol), [problem.t_end]))
         for tol in (1e-4, 1e-6, 1e-8, 1e-10)
     ]
-    assert found[0] < 0.1
+    assert found[0] < 0.1  # measured 7.5e-5
     for loose, tight in pairwise(found):
-        assert tight < loose / 8
+        assert tight < loose / 8  # measured factors of 378, 124, 67
 
 
 def test_states_between_steps_have_the_energy_of_the_steps_and_the_polynomial_has_not():
@@ -71,8 +71,8 @@ def test_states_between_steps_have_the_energy_of_the_steps_and_the_polynomial_ha
         integrators.integrate(problem, HBVM(k=20, s=4, tol=1e-6), times, sample=how).errors()["energy"].max()
         for how in ("side", "dense")
     )
-    assert side < 1e-14
-    assert dense > 1e-9
+    assert side < 1e-14  # measured 1.2e-15
+    assert dense > 1e-9  # measured 4.3e-4
 
 
 def test_own_steps_do_not_depend_on_the_times_asked_for():
@@ -91,7 +91,7 @@ def test_steps_add_up_to_the_times_they_are_at():
     stepper = program.start(problem.y0, problem.par, 0.0)
     steps = stepper.advance([0.0, problem.t_end], sample="steps")
     exact = problems.kepler.solution(problem, steps.t)
-    assert np.abs(steps.y - exact).max() < 1e-7
+    assert np.abs(steps.y - exact).max() < 1e-7  # measured 1.6e-10
     assert steps.t[-1] <= problem.t_end
     assert steps.t.size == stepper.stats.steps + 1
 
@@ -101,8 +101,8 @@ def test_backwards_returns_to_the_start():
     stepper = HBVM().compile(problem.system).start(problem.y0, problem.par, 0.0)
     end = stepper.advance([problem.t_end], sample="land").y[-1]
     back = stepper.advance([0.0], sample="land").y[-1]
-    assert np.abs(end - problem.y0).max() < 1e-12
-    assert np.abs(back - problem.y0).max() < 1e-12
+    assert np.abs(end - problem.y0).max() < 1e-12  # measured 2.2e-14
+    assert np.abs(back - problem.y0).max() < 1e-12  # measured 2.5e-14
 
 
 def test_pieces_equal_the_whole_with_every_sampling():
@@ -120,8 +120,10 @@ def test_a_close_approach_needs_no_setting():
     problem = kepler(10, e=0.99)
     solution = integrators.integrate(problem, HBVM(), sample="steps")
     assert solution.status is Status.FINISHED
-    assert solution.errors()["energy"].max() < 1e-12
-    assert position_error(problem, solution) < 1e-7  # at a pericentre, where the velocity is 14
+    assert solution.errors()["energy"].max() < 1e-12  # measured 8.3e-14
+    assert (
+        position_error(problem, solution) < 1e-7
+    )  # measured 9.0e-9, at a pericentre, where the velocity is 14
     lengths = np.diff(solution.t)
     assert lengths.max() > 100 * lengths.min()
 
@@ -130,25 +132,25 @@ def test_the_pythagorean_problem_runs_to_the_end_and_agrees_with_a_taylor_method
     problem = problems.load("pythagorean", t_end=70.0)
     ours = integrators.integrate(problem, HBVM(), [7.0, 35.0, 70.0])
     assert ours.status is Status.FINISHED
-    assert ours.errors()["energy"].max() < 1e-9
+    assert ours.errors()["energy"].max() < 1e-9  # measured 4.0e-11
     pytest.importorskip("heyoka")
     theirs = integrators.integrate(problem, integrators.Taylor(tol=1e-18), [7.0, 35.0])
-    assert np.abs(ours.y[0] - theirs.y[0]).max() < 1e-7
+    assert np.abs(ours.y[0] - theirs.y[0]).max() < 1e-7  # measured 1.4e-9
     # Close encounters multiply the last bit.
-    assert np.abs(ours.y[1] - theirs.y[1]).max() < 1e-4
+    assert np.abs(ours.y[1] - theirs.y[1]).max() < 1e-4  # measured 4.4e-7
 
 
 def test_the_planetoid_stays_on_the_axis():
     problem = problems.load("sitnikov", t_end=300.0)
     solution = integrators.integrate(problem, HBVM(), np.linspace(0.0, 300.0, 601))
     assert solution.guards()["off_axis"].max() == 0.0
-    assert solution.errors()["energy"].max() < 1e-13
+    assert solution.errors()["energy"].max() < 1e-13  # measured 2.9e-15
 
 
 def test_fast_modes_at_rest_do_not_make_the_iteration_slow():
     problem = problems.load("fput", n=32, t_end=500.0)  # the lowest mode only
     stats = integrators.integrate(problem, HBVM(), [500.0]).stats
-    assert stats.iterations / stats.steps < 40
+    assert stats.iterations / stats.steps < 40  # measured 19
     assert stats.rejections < stats.steps
 
 
@@ -158,7 +160,7 @@ def test_a_collision_is_a_step_underflow_and_what_was_computed_is_kept():
     solution = integrators.integrate(problem, HBVM(), np.linspace(0.0, 2.0, 41))
     assert solution.status is Status.STEP_UNDERFLOW
     assert "may end or be singular" in solution.reason
-    assert abs(solution.t_stop - np.pi / 8**0.5) < 1e-3
+    assert abs(solution.t_stop - np.pi / 8**0.5) < 1e-3  # measured 5e-15
     assert solution.t.size == 23  # 0, 0.05, .. 1.1
     assert np.isfinite(solution.y).all()
 
@@ -173,9 +175,9 @@ def test_a_field_that_is_not_finite_from_some_place_on_says_so():
 
 
 def test_the_choice_of_k_and_s_follows_tolerance_and_degree():
-    loose, tight = (choose(kepler(1).system, tol) for tol in (1e-4, 1e-15))
+    loose, tight = (choose(kepler(1).system, tol) for tol in (1e-4, 3e-16))
     assert loose[:2] == (16, 4)
-    assert tight[:2] == (16, 13)
+    assert tight[:2] == (16, 14)
     assert loose[2] == tight[2] < 1e-15
     cubic = problems.load("henon_heiles").system
     k, s, defect = choose(cubic, 1e-4)
@@ -188,14 +190,14 @@ def test_a_polynomial_energy_is_kept_at_any_tolerance():
     problem = problems.load("henon_heiles", t_end=1000.0)
     for tol in (1e-3, 1e-6):
         solution = integrators.integrate(problem, HBVM(tol=tol), sample="steps")
-        assert solution.errors()["energy"].max() < 2e-14
+        assert solution.errors()["energy"].max() < 2e-14  # measured 5.5e-15
 
 
 def test_poisson_systems_take_a_tolerance():
     problem = problems.load("rigid_body")
     solution = integrators.integrate(problem, HBVM(tol=1e-10), sample="steps")
     assert solution.status is Status.FINISHED
-    assert solution.errors()["energy"].max() < 1e-13
+    assert solution.errors()["energy"].max() < 1e-13  # measured 1.2e-15
 
 
 def test_without_options_the_tolerance_is_that_of_round_off():
@@ -220,7 +222,7 @@ def test_a_problem_alone_is_enough():
     problem = kepler(1)
     solution = integrators.integrate(problem)
     assert solution.method == HBVM()
-    assert position_error(problem, solution) < 1e-13
+    assert position_error(problem, solution) < 1e-13  # measured 8e-15
 
 
 def test_what_cannot_be_done_is_refused_with_the_fix():
