@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from hbvm_bench import executors, runner
+from hbvm_bench import cli, executors, runner
 from hbvm_bench.campaign import Case, Grid, Limits
 from hbvm_bench.execute import Reply, execute, task_of
 from hbvm_bench.identity import resolve
@@ -63,7 +63,7 @@ def run_on(name, chosen, store, jobs=None, limits=LIMITS):
 
 
 def test_a_cluster_that_loses_a_worker_in_the_middle_gives_what_this_machine_gives(toys, tmp_path):
-    chosen = [*cases(8, wait=0.2), resolve(Case(problem=SHORT, method="Crashing()"))]
+    chosen = [*cases(6, wait=0.2), resolve(Case(problem=SHORT, method="Crashing()"))]
     here, there = store_in(tmp_path / "here"), store_in(tmp_path / "there")
     run_on("local", chosen, here, jobs=2)
     with Cluster(tmp_path, 3) as cluster, executors.opened(f"dask://{cluster.address}") as pool:
@@ -113,6 +113,14 @@ def test_a_runner_that_is_killed_costs_no_finished_case(toys, tmp_path):
     done = subprocess.run(again, capture_output=True, text=True, timeout=60, check=True)
     assert "measuring on this machine: 3, 2 already there" in done.stderr
     assert kept.items() <= {path: path.stat().st_mtime_ns for path in folder.iterdir()}.items()
+
+
+def test_a_second_run_into_one_directory_is_refused(tmp_path, capsys):
+    store = store_in(tmp_path / "run")
+    with store.locked():
+        command = ["run", "-p", SHORT, "-m", "IAS15()", "--out", str(store.directory)]
+        assert cli.main(command) == 2
+    assert "another run is writing to" in capsys.readouterr().err
 
 
 def test_any_executor_can_be_named(toys, tmp_path):
