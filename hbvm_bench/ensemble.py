@@ -207,7 +207,7 @@ def _truth(problem: Problem, starts: Array) -> Reference | None:
     span = np.array([problem.t0, problem.t_end])
     rows: list[list[Decimal]] = []
     parameters = {
-        name: value if isinstance(value, float) else value.tolist()
+        name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in problem.system.unpack(problem.par).items()
     }
     try:

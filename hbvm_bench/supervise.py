@@ -19,7 +19,8 @@ from typing import IO, Literal
 
 from hbvm_bench.campaign import Limits
 
-POLL = 0.02  # seconds
+POLL = 0.02  # seconds, at first
+LONGEST_POLL = 0.2  # of a case that takes long: the runner needs little of the machine
 KEPT_OUTPUT = 64  # chunks of at most 4 KiB
 
 _children: set[subprocess.Popen[bytes]] = set()
@@ -91,7 +92,7 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
     reader = threading.Thread(target=_drain, args=(child.stdout, kept), daemon=True)
     reader.start()
     cause: Literal["exit", "timeout", "memory", "stopped"] = "exit"
-    peak = 0.0
+    peak, delay = 0.0, POLL
     try:
         while child.poll() is None:
             peak = max(peak, _peak_gib(child.pid))
@@ -103,10 +104,8 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
                 cause = "timeout"
             if cause != "exit":
                 break
-            try:
-                child.wait(POLL)
-            except subprocess.TimeoutExpired:
-                continue
+            _stopping.wait(delay)
+            delay = min(1.25 * delay, LONGEST_POLL)
     finally:
         _kill(child)
         with _lock:
