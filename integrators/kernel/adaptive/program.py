@@ -17,7 +17,7 @@ from problems.problem import System
 
 FIRST_RATE = 0.01
 
-MARGIN = 0.86
+MARGIN = 0.82
 """Part of the length allowed that steps aim at, besides `integrators.kernel.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
