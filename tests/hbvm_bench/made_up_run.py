@@ -37,6 +37,8 @@ def made_up(method, number):
     y = known.high[: t.size].copy()
     y[1:, 0] += 1e-11 * 10.0**number
     y[1:, 7] = 3.0 if lost else 0.0
+    if method.startswith("HBVM(k=18"):
+        y[-1, 8] = -600.0  # far beyond what the view in space can show
     status = Status.STALLED if stalled else Status.FINISHED
     history = np.array([[0.0, 1e-1], [8.0, 1e-9], [8.5, 1e-20]])
     stats = Stats(steps=100, evaluations=None, extra={"dt_history": history} if stalled else {})
@@ -90,7 +92,14 @@ def sitnikov(store):
         title=HOSTILE,
         description=HOSTILE,
         problems=["sitnikov()"],
-        methods=[MethodEntry(use=method, note=notes.get(n, "")) for n, method in enumerate(METHODS)],
+        methods=[
+            MethodEntry(
+                use=method,
+                note=notes.get(n, ""),
+                settings="as published" if "k=18" in method else "recommended",
+            )
+            for n, method in enumerate(METHODS)
+        ],
         grid=Grid(step=25.0),
     )
     store.write_index(Index(campaign=campaign, ids=ids, version="0", command=f"hbvm-bench run {HOSTILE}"))

@@ -184,6 +184,9 @@ def test_the_system_moves_pauses_and_goes_where_it_is_told(browser, folder):
         assert page.evaluate(picture) == still
         page.locator("#motion .scrub").fill("1000")
         expect(page.locator("#motion .time")).to_have_text("t = 1000.0")
+        page.locator("#motion select").first.select_option(index=0)
+        page.locator("#motion .scrub").fill("1500")  # a planetoid that is far away is told, and harms nothing
+        expect(page.locator("#motion .told").first).to_contain_text("far away")
         page.locator("#motion canvas").first.focus()
         turned = page.evaluate(picture)
         page.keyboard.press("ArrowLeft")

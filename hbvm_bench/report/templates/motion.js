@@ -115,7 +115,7 @@ document.addEventListener("data", ({ detail }) => {
       bodies.sort((a, b) => b[0][2] - a[0][2]);
       for (const [p, colour, size] of bodies) {
         pen.beginPath();
-        pen.arc(p[0], p[1], size * (1 - 0.03 * p[2]), 0, 7);
+        pen.arc(p[0], p[1], size * Math.max(0.6, Math.min(1.4, 1 - 0.03 * p[2])), 0, 7);
         pen.fillStyle = colour;
         pen.fill();
       }
