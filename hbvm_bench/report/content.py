@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hbvm_bench.campaign import Case
+from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import METRICS, Metric
 from hbvm_bench.records import Record
 from hbvm_bench.report import provenance, words
@@ -128,12 +129,14 @@ def gather(stores: Sequence[Store]) -> Content:
         )
         for index in indices
     ]
+    planned = {case.problem for run in runs for case in run.missing}
+    printed = {text: repr(make_problem(text)) for text in planned}  # as the records have it
     sections = [
         section(
             text,
             [(record, store) for record, store in latest.values() if record.case.problem == text],
             look,
-            [case for run in runs for case in run.missing if case.problem == text],
+            [case for run in runs for case in run.missing if printed[case.problem] == text],
             number,
             brief=len(texts) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
         )
