@@ -60,7 +60,8 @@ def test_the_table_is_complete():
 
 def test_every_quantity_is_a_metric():
     functions = {f for name, f in inspect.getmembers(quantities, inspect.isfunction)
-                 if not name.startswith("_") and name not in ("error_max", "counter", "law_number", "compiled")}  # fmt: skip
+                 if not name.startswith("_")
+                 and name not in ("error_max", "counter", "law_number", "compiled")}  # fmt: skip
     assert functions <= {metric.function for metric in METRICS.values()}
 
 
