@@ -13,6 +13,7 @@ from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
 from hbvm_bench.report.style import Look, looks, method_name
 from hbvm_bench.store import Store
+from hbvm_bench.summaries import fairness
 from hbvm_bench.table import columns
 
 # A report of more than these draws only its main figures.
@@ -154,7 +155,7 @@ def gather(stores: Sequence[Store]) -> Content:
         columns=columns(records),
         looks=look,
         records=records,
-        rules=words.RULES,
+        rules=(*words.RULES, *fairness.sentences(records)),
         settings=words.settings_count(records),
         excluded=words.excluded(records),
         versions=provenance.versions(records),

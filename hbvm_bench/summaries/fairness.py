@@ -109,6 +109,24 @@ def fairness(index: Index, records: Sequence[Record]) -> Fairness:
     return Fairness(families, equal, excluded, doubts(records))
 
 
+def sentences(records: Sequence[Record]) -> list[str]:
+    """Return what to know of this run beside the rules: how many settings each method had, and doubts."""
+    singles = [record for record in records if record.case.ensemble is None]
+    families = [_settings(family, singles) for family in dict.fromkeys(family_of(r) for r in singles)]
+    counts = {number for family in families for number in family.per_problem}
+    said: list[str] = []
+    if len(counts) == 1:
+        number = counts.pop()
+        said.append(
+            f"In this run every method has {number} {'setting' if number == 1 else 'settings'} on every "
+            "problem that it accepts, declared before the run."
+        )
+    elif counts:
+        listed = ", ".join(f"{family.family} {_range(family.per_problem)}" for family in families)
+        said.append(f"In this run the methods do not have equally many settings on a problem: {listed}.")
+    return said + doubts(records)
+
+
 def doubts(records: Sequence[Record]) -> list[str]:
     """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
     said: list[str] = []
@@ -156,6 +174,10 @@ def _settings(family: str, records: Sequence[Record]) -> FamilySettings:
         texts=[record.case.method for record in fullest],
         per_problem=(min(lengths), max(lengths)),
     )
+
+
+def _range(numbers: tuple[int, int]) -> str:
+    return f"{numbers[0]}" if numbers[0] == numbers[1] else f"{numbers[0]} to {numbers[1]}"
 
 
 def _kind(record: Record) -> str:

@@ -152,7 +152,9 @@ def test_fairness_counts_settings_and_names_what_was_left_out():
     ]
     assert fair.families[1].version == "7.13"
     assert [(e.method, e.kind) for e in fair.excluded] == [("IAS15()", "missing")]
+    assert "every method has 1 setting" in fairness.sentences(run)[0]
     unequal = [*run, record("Gauss(s=4, h=0.1)")]
+    assert "Gauss 2, Taylor 1" in fairness.sentences(unequal)[0]
     assert fairness.fairness(index_of(unequal), unequal).equal is None
 
 
