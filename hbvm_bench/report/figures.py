@@ -235,8 +235,8 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
             Panel(
                 METRICS[key].label,
                 Axis("seconds for the whole span (median)", log=True),
-                Axis(METRICS[key].label, log=True),
-                clouds,
+                Axis(METRICS[key].label, log=True, low=-18, high=3),
+                [*clouds, *_envelopes(axes, shown, spots)],
             )
         )
     side.set_axis_off()
@@ -259,11 +259,30 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         "Work and precision",
         "Lower left is better. The same cases in both panels: energy is never shown without position. "
         f"{left_out} cases that left the trajectory or did not reach the end are not in this picture; "
-        "points beyond the upper edge are drawn on it.",
+        "points beyond the upper edge are drawn on it. Lines join the settings of a method that none of its "
+        "others beats.",
         f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
         f"is that of {best.record.case.method}.",
         Plot(plotted, "points"),
     )
+
+
+def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> list[Trace]:
+    """Join the settings of each method that none of its others beats in both work and error."""
+    made = []
+    for name in dict.fromkeys(method_name(case.record) for case in cases):
+        members = [(s, c) for s, c in zip(spots, cases, strict=True) if method_name(c.record) == name]
+        best: list[tuple[float, float]] = []
+        for spot, _ in sorted(members, key=lambda member: member[0]):
+            if not best or spot[1] < best[-1][1]:
+                best.append(spot)
+        if len(best) < 2:
+            continue
+        x, y = np.array(best).T
+        look = members[0][1].look
+        axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
+        made.append(Trace(look.number, f"best of {name}", x, y, "law", "no setting is better in both"))
+    return made
 
 
 def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
