@@ -32,6 +32,7 @@ HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
 GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
 CALM = 1e-3  # sizes are measured until changes are this small
+SCATTERED = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
 INFINITY = float("inf")
 
 
@@ -111,6 +112,21 @@ def renew(ctx, m, source):
 
 
 @compiled
+def is_scattered(m):
+    """Whether the coefficients of the step's polynomial do not fall off: no solution of the equation has such.
+
+    The stage equations have other roots than the one that tends to the solution with h, some
+    of them beyond a pole; a correction that follows the Jacobian of every stage may find them.
+    """
+    s, components = m.gamma.shape
+    first, last = 0.0, 0.0
+    for d in range(components):
+        first += abs(m.gamma[0, d])
+        last += abs(m.gamma[s - 1, d])
+    return last > SCATTERED * first
+
+
+@compiled
 def solve_step(ctx, m, method, source, factors, started):
     """Solve the step of a context; return the outcome, DONE with F the field's polynomial part.
 
@@ -178,6 +194,8 @@ def solve_step(ctx, m, method, source, factors, started):
     m.count[of.SINCE] += 1
     if which != KEPT:
         m.count[of.STALE] = 1
+        if outcome == at.DONE and is_scattered(m):
+            outcome = at.DIVERGED
     if outcome == at.DONE:
         if not started:
             m.count[of.PREDICT] = 1 if extrapolated == 0 or nearer(ctx, m) else 0
