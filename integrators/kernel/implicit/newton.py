@@ -113,7 +113,7 @@ def renew(ctx, m, source):
 
 @compiled
 def is_scattered(m):
-    """Whether the coefficients of the step's polynomial do not fall off: no solution of the equation has such.
+    """Whether the coefficients of the step's polynomial do not fall off, as those of a solution do.
 
     The stage equations have other roots than the one that tends to the solution with h, some
     of them beyond a pole; a correction that follows the Jacobian of every stage may find them.
