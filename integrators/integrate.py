@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.hbvm import HBVM
+from integrators import registry
 from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_times
 from problems.errors import InputError
 from problems.foreign import Foreign
@@ -116,7 +116,7 @@ def integrate(
         initial states that cannot be used.
     """
     if method is None:
-        method = HBVM()
+        method = registry.create("HBVM")
     check(problem, method)
     program = method.compile(problem.system)
     grid = _grid(problem, times)
