@@ -146,7 +146,10 @@ def doubts(records: Sequence[Record]) -> list[str]:
                 "as long at the slow end as at the fast end, the outermost tenths left out."
             )
     if not rounds and any(group_of(record) == "on" for record in records):
-        said.append("No times were taken; work is counted in steps and evaluations.")
+        said.append(
+            "No times were taken: work is counted in steps and evaluations, and seconds of compilation are "
+            "those of cases that ran side by side."
+        )
     machines = {tuple(sorted((k, str(v)) for k, v in record.machine.items())) for record in records}
     if len(machines) > 1:
         said.append(f"The cases ran on {len(machines)} different machines; times do not compare.")

@@ -89,7 +89,7 @@ def test_who_does_not_reach_the_goal_has_an_infinite_ratio():
 
 
 def test_needs_name_the_families_near_the_best_most_often():
-    cheap = next(a for a in needs.answers(RUN) if a.title == "a position right to 1e-8, cheaply")
+    cheap = next(a for a in needs.answers(RUN) if a.title == "a position right to 1e-8, in little time")
     assert cheap.problems == 2
     assert [c.family for c in cheap.candidates] == ["Gauss", "Taylor"]
     assert (cheap.candidates[0].near, cheap.candidates[1].near) == (2, 1)
