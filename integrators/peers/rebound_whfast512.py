@@ -1,7 +1,12 @@
 """REBOUND's WHFast512: WHFast for up to nine bodies, written for AVX-512 registers."""
 
+import ctypes
+import ctypes.util
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from integrators.peers.options import load, number, whole_choice
@@ -13,6 +18,9 @@ from problems.problem import Problem, System
 MOST_BODIES = 9
 LONGEST = 1_000_000
 """Steps that are taken at a time, REBOUND's own default."""
+
+ROOM = 64
+"""Bytes for the processor's modes; C's ``fenv_t`` has 32 on x86-64."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -120,4 +128,21 @@ class Stepper512(ReboundStepper):
         """Take ``count`` steps from ``t``, as one of REBOUND's."""
         simulation.t = t * math.sqrt(self._layout.G)
         simulation.integrator.concatenate_steps = count
-        simulation.integrate(simulation.t + (count - 0.5) * simulation.dt, exact_finish_time=0)
+        with _same_arithmetic():
+            simulation.integrate(simulation.t + (count - 0.5) * simulation.dt, exact_finish_time=0)
+
+
+@contextmanager
+def _same_arithmetic() -> Iterator[None]:
+    """Restore the processor's modes: WHFast512 leaves it flushing subnormal numbers to zero."""
+    library, kept = _mathematics(), ctypes.create_string_buffer(ROOM)
+    library.fegetenv(kept)
+    try:
+        yield
+    finally:
+        library.fesetenv(kept)
+
+
+@cache
+def _mathematics() -> ctypes.CDLL:
+    return ctypes.CDLL(ctypes.util.find_library("m"))

@@ -302,5 +302,18 @@ def test_whfast512_is_whfast_in_other_units():
     assert np.max(np.abs(wide - plain)[:, :18]) < 1e-8  # 7e-10
 
 
+@pytest.mark.skipif(not rebound.avx512_available, reason="this processor has no AVX-512")
+def test_whfast512_leaves_subnormal_numbers_to_others():
+    problem = problems.load("outer_solar_system")
+    integrate(problem, WHFast512(h=0.25), [10.0])
+    assert np.float64(2.0**-1000) * np.float64(2.0**-60) == 2.0**-1060
+
+
 def test_whfast512_takes_nine_bodies_at_most():
-    assert "2 to 9 bodies" in (WHFast512(h=0.1).accepts(problems.load("cluster", n=10)) or "")
+    def H(q, p, par, m):
+        kinetic = sum(p[i] * p[i] for i in range(30)) / 2
+        return kinetic - par.G / m.sqrt(sum((q[i] - q[i + 27]) * (q[i] - q[i + 27]) for i in range(3)))
+
+    many = Hamiltonian(H, dof=30, parameters={"G": 1.0, "m": [1.0] * 10}, bodies=Bodies(masses="m", G="G"))
+    problem = Problem(many, q0=np.arange(30.0), p0=np.zeros(30), t_end=1.0)
+    assert "2 to 9 bodies" in (WHFast512(h=0.1).accepts(problem) or "")
