@@ -10,7 +10,7 @@ from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -81,6 +81,18 @@ class HBVMStepper:
         self._context.reals[layout.H] = self._program.h
         self._context.reals[layout.T0] = t0
         engine.call(engine.RESET, self._context.address, y.ctypes.data)
+
+    def restart(self, y: ArrayLike, t0: float) -> None:
+        """Begin anew at another state and time, in the memory that there is; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If ``y`` is not finite or not of the system's length.
+        """
+        self._set_step(self._program.h)
+        self._begin(check_state(y, self._dim), t0)
+        self._status, self._reason = Status.RUNNING, ""
 
     @property
     def t(self) -> float:

@@ -1,5 +1,6 @@
 """One trajectory of HBVM(k, s) with steps of varying length."""
 
+import math
 import sys
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -70,7 +71,7 @@ class AdaptiveStepper(HBVMStepper):
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
             ahead = self._context.reals[layout.NEXT_LENGTH] > 0.0
-            self._walk(sys.float_info.max if ahead else -sys.float_info.max, limit=1)
+            self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=1)
         return self._status
 
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
@@ -80,10 +81,9 @@ class AdaptiveStepper(HBVMStepper):
         grid = check_times(times, self.t)
         if self._status.failed:
             return Samples(grid[:0], np.empty((0, self._dim)), self._status, self._reason)
-        if (grid[-1] - self.t) * self._context.reals[layout.NEXT_LENGTH] < 0.0:
-            self._turn_back()
         if sample == "steps":
-            return self._walk(float(grid[-1]), present=bool(grid[0] == self.t))
+            return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
+        self._face(float(grid[-1]))
         between = {"land": layout.LAND, "dense": layout.DENSE}.get(sample or "side", layout.SIDE)
         return self._to(grid, between)
 
@@ -112,9 +112,11 @@ class AdaptiveStepper(HBVMStepper):
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)
 
-    def _turn_back(self) -> None:
-        """Reverse the direction, here; what lay ahead lies behind and is forgotten."""
+    def _face(self, end: float) -> None:
+        """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         words, reals = self._context.words, self._context.reals
+        if not (end - self.t) * reals[layout.NEXT_LENGTH] < 0.0:
+            return
         reals[layout.NEXT_LENGTH] *= -1.0
         if words[layout.SOLVED]:
             words[layout.SOLVED], reals[layout.LENGTH] = 0, 0.0
@@ -131,12 +133,30 @@ class AdaptiveStepper(HBVMStepper):
             made = int(self._context.words[layout.MADE])
         return self._samples(grid[:made], out[:made], outcome)
 
-    def _walk(self, end: float, *, limit: int | None = None, present: bool = False) -> Samples:
-        """Take own steps up to a time, or a number of them."""
+    def walk(
+        self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
+    ) -> Samples:
+        """Take own steps, none beyond the time ``end``, and return them.
+
+        Parameters
+        ----------
+        end : float
+            The time to walk to; the step that would pass it is solved, kept and not taken.
+        limit : int, optional
+            The largest number of steps.
+        longest : float
+            Length that no step exceeds, > 0. A finite one costs a call of the kernel for each step.
+        present : bool
+            Whether the present state is to come first.
+        """
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
-        outcome, steps = layout.BUDGET, 0
+        self._face(end)
+        outcome, steps, reals = layout.BUDGET, 0, self._context.reals
         while outcome == layout.BUDGET and (limit is None or steps < limit):
             n = limit or CHUNK
+            if longest < math.inf:
+                n = 1
+                reals[layout.NEXT_LENGTH] = np.clip(reals[layout.NEXT_LENGTH], -longest, longest)
             times, out = np.full(n, end), np.empty((n, self._dim))
             outcome = self._call(engine.WALK, times=times.ctypes.data, out=out.ctypes.data, budget=n)
             made = int(self._context.words[layout.MADE])

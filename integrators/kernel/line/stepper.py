@@ -121,7 +121,7 @@ class LineStepper:
         if self._status.failed:
             return self._status
         if self._varying:
-            self._walk(np.inf if self._real[at.NEXT] > 0.0 else -np.inf, limit=1)
+            self.walk(np.inf if self._real[at.NEXT] > 0.0 else -np.inf, limit=1)
         else:
             self._run(at.SIDE, np.zeros(1), np.array([self._count[at.N] + 1]), np.zeros(1))
         return self._status
@@ -135,10 +135,9 @@ class LineStepper:
             return Samples(grid[:0], np.empty((0, self._m["y"].size)), self._status, self._reason)
         between = {"land": at.LAND, "dense": at.DENSE}.get(sample or "side", at.SIDE)
         if self._varying:
-            if (grid[-1] - self.t) * self._real[at.NEXT] < 0.0:
-                self._turn()
             if sample == "steps":
-                return self._walk(float(grid[-1]), present=bool(grid[0] == self.t))
+                return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
+            self._face(float(grid[-1]))
             return self._run(between, grid)
         t0, n, h = self._real[at.T0], int(self._count[at.N]), float(self._real[at.H])
         turn = (grid[-1] - self.t) * h < 0.0
@@ -187,6 +186,11 @@ class LineStepper:
         program = self._program
         return program.system.fingerprint, ", ".join(program.components), program.k, program.s
 
+    def _face(self, end: float) -> None:
+        """Turn steps of varying length towards a time."""
+        if (end - self.t) * self._real[at.NEXT] < 0.0:
+            self._turn()
+
     def _turn(self) -> None:
         """Reverse the direction, here."""
         real, count = self._real, self._count
@@ -209,15 +213,22 @@ class LineStepper:
             made = int(self._count[at.MADE])
         return self._samples(times[:made], out[:made], outcome)
 
-    def _walk(self, end: float, *, limit: int | None = None, present: bool = False) -> Samples:
-        """Take own steps of varying length up to a time, or a number of them."""
+    def walk(
+        self, end: float, *, limit: int | None = None, longest: float = np.inf, present: bool = False
+    ) -> Samples:
+        """Take own steps of varying length; as `integrators.kernel.adaptive.stepper.AdaptiveStepper.walk`."""
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
-        outcome = at.BUDGET
-        while outcome == at.BUDGET and (limit is None or not pieces):
+        self._face(end)
+        outcome, steps = at.BUDGET, 0
+        while outcome == at.BUDGET and (limit is None or steps < limit):
             n = limit or CHUNK
+            if longest < np.inf:
+                n = 1
+                self._real[at.NEXT] = np.clip(self._real[at.NEXT], -longest, longest)
             times, out = np.empty(n), np.empty((n, self._m["y"].size))
             outcome = self._call(at.WALK, at.SIDE, times, None, None, 0, out, n, end)
             made = int(self._count[at.MADE])
+            steps += made
             pieces.append((times[:made], out[:made]))
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome)
