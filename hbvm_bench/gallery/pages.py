@@ -26,6 +26,8 @@ large systems take to compile: [compile times](compile_times.md).
 
 OWN = """## A system of your own
 
+![a quartic oscillator, given as text](problems/expression.svg)
+
 As text, on the command line or in a campaign file. It is parsed by a whitelist and never evaluated:
 
 ```sh
@@ -116,12 +118,13 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     list of Path
         What was written.
     """
-    names = [name for name in problems.names() if name in pictures.PICTURES]
+    drawn = [name for name in problems.names() if name in pictures.PICTURES]
+    names = [name for name in drawn if not pictures.PICTURES[name].arguments]  # the others are whatever text says
     directory.mkdir(parents=True, exist_ok=True)
     written = [directory / "problems.md", directory / "engines.md"]
     for path, page in zip(written, (text(names), ENGINES + engines.markdown(names)), strict=True):
         path.write_text(page, encoding="utf-8")
-    for name in names if with_pictures else ():
+    for name in drawn if with_pictures else ():
         path = directory / "problems" / f"{name}.svg"
         pictures.draw(name, path)
         written.append(path)

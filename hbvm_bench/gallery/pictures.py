@@ -1,7 +1,7 @@
 """One picture of each problem: orbits, a phase portrait, a curve in time or a lattice in space and time."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,14 @@ class Picture:
         How much of the problem's span is shown.
     points : int
         Samples.
+    arguments : mapping
+        Of the problem, where it has no default ones.
     """
 
     draw: Callable[[Any, Problem, Array, Array], None]
     span: float | None = None
     points: int = POINTS
+    arguments: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _bodies(dimension: int, first: int = 0, last: int | None = None) -> Callable[..., None]:
@@ -150,6 +153,9 @@ PICTURES = {
     "cr3bp": Picture(_plane(), None, 4000),
     "diatomic": Picture(_plane(), 60.0),
     "double_pendulum": Picture(_plane(labels=("angle 1", "angle 2"))),
+    "expression": Picture(
+        _phase, 12.0, 600, {"H": "p^2/2 + k*q^4/4", "q0": [1.0], "p0": [0.0], "parameters": "k=2"}
+    ),
     "figure_eight": Picture(_bodies(2), 6.3259140097821386, 600),
     "fput": Picture(_lattice, None, 400),
     "henon_heiles": Picture(_triangle, 400.0, 3000),
@@ -179,7 +185,7 @@ def draw(name: str, path: Path) -> None:
     Parameters
     ----------
     name : str
-        Its name; drawn at its default arguments.
+        Its name; drawn at its default arguments, a system given as text at those of the table.
     path : Path
         Where the file goes.
 
@@ -196,7 +202,7 @@ def draw(name: str, path: Path) -> None:
     if name not in PICTURES:
         raise InputError(f"{name} has no picture; it has to be told how it is drawn.")
     picture = PICTURES[name]
-    problem = problems.load(name)
+    problem = problems.load(name, **picture.arguments)
     end = problem.t_end if picture.span is None else problem.t0 + picture.span
     times = np.linspace(problem.t0, end, picture.points)
     found = integrators.integrate(problem, integrators.DOP853(rtol=1e-9, atol=1e-11), times=times)
