@@ -119,7 +119,7 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
         What was written.
     """
     drawn = [name for name in problems.names() if name in pictures.PICTURES]
-    names = [name for name in drawn if not pictures.PICTURES[name].arguments]  # the others are whatever text says
+    names = [name for name in drawn if not pictures.PICTURES[name].arguments]
     directory.mkdir(parents=True, exist_ok=True)
     written = [directory / "problems.md", directory / "engines.md"]
     for path, page in zip(written, (text(names), ENGINES + engines.markdown(names)), strict=True):
