@@ -17,6 +17,8 @@ from hbvm_bench.table import Cell, Row, seconds
 
 FEW = 3  # problems whose summaries all stand at the top
 INLINE = 1_000_000  # characters of drawings in a page; what is more would make it slow to open
+FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch
+MINOR = ("compile_seconds", "z_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
 
 # Paths of the markers in a box of 12 by 12, as the figures draw them.
@@ -64,6 +66,7 @@ def page(content: Content) -> str:
         c=content,
         few=len(content.sections) <= FEW,
         inlined=inlined(content),
+        minor=minor(content.columns),
         keys=_looks(content),
         symbols=symbols(_looks(content)),
         libraries=libraries,
@@ -76,6 +79,11 @@ def page(content: Content) -> str:
         ),
         dark=_variables(DARK_NEUTRALS, {f"--m{x.number}": x.dark for x in _looks(content)}),
     )
+
+
+def minor(columns: Sequence[Metric]) -> set[str]:
+    """Return the keys of the columns that the page shows on demand only."""
+    return {metric.key for metric in columns} & set(MINOR) if len(columns) > FITTING else set()
 
 
 def inlined(content: Content) -> set[str]:

@@ -246,6 +246,19 @@ def test_nothing_serious_is_found_by_axe(browser, folder, scheme):
         assert [(v["id"], v["nodes"][0]["html"][:200]) for v in serious] == []
 
 
+def test_the_results_fit_a_laptop_and_the_lesser_columns_come_on_demand(browser, folder):
+    with opened(browser, folder) as page:
+        scroll = page.locator(".scroll.table")
+        wider = "e => e.scrollWidth - e.clientWidth"
+        lesser = page.locator("table.results .minor:visible")
+        expect(lesser).to_have_count(0)
+        assert scroll.evaluate(wider) == 0
+        page.check("[name=all]")
+        expect(lesser).not_to_have_count(0)
+        page.get_by_role("button", name="Clear").click()
+        expect(lesser).to_have_count(0)
+
+
 @pytest.mark.parametrize("width", [360, 1280, 1920])
 def test_no_page_is_wider_than_its_window(browser, folder, large, width):
     for target in (folder, large):

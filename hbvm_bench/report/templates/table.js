@@ -1,4 +1,5 @@
-// The table of results: sorting within its groups, filtering by words, problem, library and outcome.
+// The table of results: sorting within its groups, filtering by words, problem, library and outcome,
+// the lesser columns on demand. Without this script all of it is there.
 (() => {
   const table = document.querySelector("table.results");
   if (!table) return;
@@ -50,6 +51,7 @@
       row.hidden = !fits;
       shown += fits;
     }
+    table.classList.toggle("brief", form.elements.all?.checked === false);
     for (const body of table.tBodies) body.hidden = [...body.rows].every((row) => row.hidden || row.classList.contains("group"));
     count.textContent = shown === rows.length ? `${rows.length} cases` : `${shown} of ${rows.length} cases`;
   };
