@@ -82,17 +82,22 @@ class HBVMStepper:
         self._context.reals[layout.T0] = t0
         engine.call(engine.RESET, self._context.address, y.ctypes.data)
 
-    def restart(self, y: ArrayLike, t0: float) -> None:
-        """Begin anew at another state and time, in the memory that there is; the counters keep counting.
+    def single(self, y: ArrayLike, t0: float, t: float) -> Samples:
+        """Begin anew at (t0, y) and return the state at ``t``, made by a single step of that length.
+
+        The counters keep counting.
 
         Raises
         ------
         problems.errors.InputError
             If ``y`` is not finite or not of the system's length.
         """
-        self._set_step(self._program.h)
-        self._begin(check_state(y, self._dim), t0)
+        start = check_state(y, self._dim)
+        if self._context.reals[layout.H] != self._program.h:
+            self._set_step(self._program.h)
+        self._begin(start, t0)
         self._status, self._reason = Status.RUNNING, ""
+        return self._run(layout.LAND, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
 
     @property
     def t(self) -> float:
@@ -179,9 +184,14 @@ class HBVMStepper:
     def step(self) -> Status:
         """Take one step of length h; after a failure, do nothing."""
         if not self._status.failed:
-            n = int(self._context.words[layout.N])
-            self._run(layout.SIDE, np.zeros(1), np.array([n + 1]), np.zeros(1))
+            self.take(1)
         return self._status
+
+    def take(self, count: int) -> Samples:
+        """Take ``count`` own steps and return them."""
+        reals, targets = self._context.reals, int(self._context.words[layout.N]) + np.arange(1, count + 1)
+        times = float(reals[layout.T0]) + targets * float(reals[layout.H])
+        return self._run(layout.SIDE, times, targets, np.zeros(count))
 
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""

@@ -20,7 +20,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from integrators import legendre
 from integrators.legendre import tables
 from integrators.peers.options import load
 from problems.errors import InputError
@@ -34,37 +33,14 @@ import jax.numpy as jnp  # noqa: E402
 import lineax as lx  # noqa: E402
 import optimistix as optx  # noqa: E402
 
+from integrators.plugins.diffrax_interpolation import LegendreInterpolation  # noqa: E402
 from integrators.plugins.jax_fixed_point import FixedPoint  # noqa: E402
+from integrators.plugins.jax_legendre import add, apply, basis, real  # noqa: E402
 
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 FLOOR = 1e-3  # of the largest size in a leaf: smaller components do not lead the estimate
 DENSE = 48  # unknowns up to which derivatives solve by LU; GMRES beyond
-
-
-class LegendreInterpolation(dx.AbstractLocalInterpolation):
-    """The polynomial of a step, ``y0 + sum_j G_j int_0^c P_j`` with G the leading axis of the leaves.
-
-    Its error inside the step is O(h^{s+1}), and it does not keep the energy there;
-    at the end of the step it is the solution of order 2s.
-    """
-
-    t0: Any
-    t1: Any
-    y0: Any
-    coefficients: Any
-
-    def evaluate(self, t0: Any, t1: Any | None = None, left: bool = True) -> Any:
-        """Return the state at ``t0``, or its increment from ``t0`` to ``t1``."""
-        if t1 is not None:
-            return jax.tree.map(lambda b, a: b - a, self.evaluate(t1), self.evaluate(t0))
-        span = self.t1 - self.t0
-        c = (t0 - self.t0) / jnp.where(span == 0.0, 1.0, span)
-
-        def value(y: Any, G: Any) -> Any:
-            return y + _apply(jnp.stack(_integrals(c, G.shape[0]))[None], G)[0]
-
-        return jax.tree.map(value, self.y0, self.coefficients)
 
 
 class _Carried(eqx.Module):
@@ -127,11 +103,13 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
             throw=False,
         )
         G = solved.value
-        y1, rest = _add(y0, rest, jax.tree.map(lambda g: g[0], G))
+        y1, rest = add(y0, rest, jax.tree.map(lambda g: g[0], G))
         result = dx.RESULTS.promote(solved.result)
         good = dx.is_okay(result)
         error = self._estimate(terms, t0, y0, args, control, G, jax.lax.stop_gradient(solved.aux))
         error = jax.tree.map(lambda e: jnp.where(good, e, jnp.inf), error)
+        # Controllers put y0 in the place of what is not a number, but divide by what is infinite.
+        y1 = jax.tree.map(lambda y: jnp.where(good, y, jnp.nan), y1)
         carried = jax.lax.stop_gradient(_Carried(rest, G, h))
         return y1, error, {"y0": y0, "coefficients": G}, carried, result
 
@@ -143,9 +121,9 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         guessed = (ratio > 0.0) & (ratio <= FARTHEST) & ~jnp.asarray(made_jump)
         ratio = jnp.where(guessed, ratio, 0.0)
         nodes, projection = (jnp.asarray(x.hi, ratio.dtype) for x in (table.nodes, table.projection))
-        beyond = jnp.stack(_basis(1.0 + ratio * nodes, modes), axis=1)
+        beyond = jnp.stack(basis(1.0 + ratio * nodes, modes), axis=1)
         matrix = jnp.where(guessed, ratio * (projection @ beyond), 0.0)
-        guess = jax.tree.map(lambda G: _apply(matrix, G[:modes]), before.coefficients)
+        guess = jax.tree.map(lambda G: apply(matrix, G[:modes]), before.coefficients)
         return jax.lax.stop_gradient(guess), guessed
 
     def _estimate(self, terms: Any, t0: Any, y0: Any, args: Any, control: Any, G: Any, values: Any) -> Any:
@@ -158,17 +136,17 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         """
         if self.k > self.s:
             next_row = tables(self.k, self.s + 1).projection.hi[self.s]
-            beyond = jax.tree.map(lambda f: _apply(next_row[None], f)[0], values)
+            beyond = jax.tree.map(lambda f: apply(next_row[None], f)[0], values)
         else:
             start = np.array([(-1.0) ** j * np.sqrt(2.0 * j + 1.0) for j in range(self.s + 1)])
             field = terms.vf_prod(t0, y0, args, control)
             beyond = jax.tree.map(
-                lambda f, g: (f - _apply(start[None, :-1], g)[0]) / float(start[-1]), field, G
+                lambda f, g: (f - apply(start[None, :-1], g)[0]) / float(start[-1]), field, G
             )
 
         def estimate(y: Any, g: Any, b: Any) -> Any:
             if b.size == 0:
-                return jnp.zeros(y.shape, _real(y.dtype))
+                return jnp.zeros(y.shape, real(y.dtype))
             size = jnp.abs(y) + jnp.max(jnp.abs(g), axis=0)
             size = jnp.maximum(size, FLOOR * jnp.max(size) + jnp.finfo(size.dtype).tiny)
             top, bottom = (jnp.sqrt(jnp.sum((jnp.abs(x) / size) ** 2)) for x in (b, g[0]))
@@ -215,7 +193,7 @@ class HBVM(_LineIntegral):
     k: int = eqx.field(static=True, kw_only=True)
     s: int = eqx.field(static=True, kw_only=True)
     root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:
@@ -238,7 +216,7 @@ class Gauss(_LineIntegral):
 
     s: int = eqx.field(static=True, kw_only=True)
     root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
-    root_find_max_steps: int = eqx.field(default=100, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
+    root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:
@@ -259,62 +237,10 @@ class _Equations(eqx.Module):
     def __call__(self, G: Any, given: Any) -> tuple[Any, Any]:
         terms, control, times, y0, rest, args = given
         table = tables(self.k, self.s)
-        stages = jax.tree.map(
-            lambda y, e, g: y[None] + (e[None] + _apply(table.integrals.hi, g)), y0, rest, G
-        )
+        stages = jax.tree.map(lambda y, e, g: y[None] + (e[None] + apply(table.integrals.hi, g)), y0, rest, G)
         values = jax.vmap(lambda t, y: terms.vf_prod(t, y, args, control))(times, stages)
         values = jax.tree.map(lambda f, g: f.astype(g.dtype), values, G)
-        return jax.tree.map(lambda g, f: g - _apply(table.projection.hi, f), G, values), values
-
-
-def _add(y: Any, rest: Any, increment: Any) -> tuple[Any, Any]:
-    """Add ``increment`` to the pair (y, rest), exactly but for the rounding of the increment (two-sum)."""
-
-    def add(y: Any, e: Any, increment: Any) -> tuple[Any, Any]:
-        small = increment + e
-        total = y + small
-        part = total - y
-        return total, (y - (total - part)) + (small - part)
-
-    pairs = jax.tree.map(add, y, rest, increment)
-    return tuple(jax.tree.map(lambda y, pair, i=i: pair[i], y, pairs) for i in range(2))  # pyright: ignore[reportReturnType]
-
-
-def _apply(matrix: Any, x: Any) -> Any:
-    """Multiply along the leading axis, in x's own precision.
-
-    Written out, so that XLA fuses it with what stands around it: a call of its
-    matrix product costs more than the product, for matrices of this size.
-    """
-    columns = jnp.asarray(matrix, _real(x.dtype)).T.reshape(x.shape[0], -1, *[1] * (x.ndim - 1))
-    with jax.numpy_dtype_promotion("standard"):  # real times complex
-        product = columns[0] * x[0][None]
-        for j in range(1, x.shape[0]):
-            product = product + columns[j] * x[j][None]
-    return product
-
-
-def _real(dtype: Any) -> Any:
-    return jnp.finfo(dtype).dtype
-
-
-def _xi(j: int) -> float:
-    """Return xi_j as a number without a type of its own, which single precision stays single with."""
-    return float(legendre.xi(j))
-
-
-def _basis(c: Any, n: int) -> list[Any]:
-    """Return P_0 .. P_{n-1} at c."""
-    P = [jnp.ones_like(c), (c - 0.5) / _xi(1)]
-    for j in range(1, n - 1):
-        P.append(((c - 0.5) * P[j] - j * _xi(j) * P[j - 1]) / ((j + 1) * _xi(j + 1)))
-    return P[:n]
-
-
-def _integrals(c: Any, n: int) -> list[Any]:
-    """Return the integrals of P_0 .. P_{n-1} from 0 to c."""
-    P = _basis(jnp.asarray(c), n + 1)
-    return [c] + [_xi(j + 1) * P[j + 1] - _xi(j) * P[j - 1] for j in range(1, n)]
+        return jax.tree.map(lambda g, f: g - apply(table.projection.hi, f), G, values), values
 
 
 def _check(k: int, s: int) -> None:

@@ -70,9 +70,13 @@ class AdaptiveStepper(HBVMStepper):
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
-            ahead = self._context.reals[layout.NEXT_LENGTH] > 0.0
-            self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=1)
+            self.take(1)
         return self._status
+
+    def take(self, count: int) -> Samples:
+        """Take ``count`` own steps and return them."""
+        ahead = self._context.reals[layout.NEXT_LENGTH] > 0.0
+        return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see `HBVMStepper` for the samplings and the protocol for the rest."""

@@ -118,13 +118,17 @@ class LineStepper:
 
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
-        if self._status.failed:
-            return self._status
-        if self._varying:
-            self.walk(np.inf if self._real[at.NEXT] > 0.0 else -np.inf, limit=1)
-        else:
-            self._run(at.SIDE, np.zeros(1), np.array([self._count[at.N] + 1]), np.zeros(1))
+        if not self._status.failed:
+            self.take(1)
         return self._status
+
+    def take(self, count: int) -> Samples:
+        """Take ``count`` own steps and return them."""
+        if self._varying:
+            return self.walk(np.inf if self._real[at.NEXT] > 0.0 else -np.inf, limit=count)
+        targets = self._count[at.N] + np.arange(1, count + 1)
+        times = self._real[at.T0] + targets * self._real[at.H]
+        return self._run(at.SIDE, times, targets, np.zeros(count))
 
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""

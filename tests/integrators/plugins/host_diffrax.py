@@ -34,6 +34,9 @@ class _StandIn:
     def __call__(self, **options: Any) -> Any:
         return self.ours
 
+    def __instancecheck__(self, instance: Any) -> bool:
+        return isinstance(instance, self.host)
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self.host, name)
 

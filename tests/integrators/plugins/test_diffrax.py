@@ -159,6 +159,16 @@ def test_newton_takes_over_where_the_fixed_point_fails_and_the_failure_is_a_resu
     assert float(jnp.abs(solved.ys[-1, 0] - np.cos(1.0))) < 1e-2  # measured 1e-3
 
 
+@pytest.mark.parametrize("solver", [Gauss(s=1), HBVM(k=4, s=2)])
+def test_a_step_whose_iteration_overflows_is_taken_again_with_a_shorter_one(solver: Any) -> None:
+    steep = dx.ODETerm(lambda t, y, args: -10.0 * y**3)
+    solution = dx.diffeqsolve(
+        steep, solver, 0.0, 1.0, 1.0, 1.0, stepsize_controller=dx.PIDController(rtol=1e-5, atol=1e-5)
+    )
+    assert int(solution.stats["num_rejected_steps"]) > 0
+    assert float(solution.ys[-1]) == pytest.approx(21.0**-0.5, abs=1e-4)  # measured 1e-6
+
+
 def test_numbers_that_make_no_method_are_refused() -> None:
     with pytest.raises(InputError, match="k >= s >= 1"):
         HBVM(k=2, s=3)
