@@ -15,6 +15,9 @@ from problems.system import System
 ON_LANES, ONE_BY_ONE = "L", "S"
 Arguments = list[tuple[Any, str]]
 
+FUSED_ROWS = 4
+"""Components of a stage up to which whole sweeps are compiled with the field."""
+
 SOURCES = ("lanes", "lane_functions", "native", "field")
 
 
@@ -38,6 +41,33 @@ def compile_field(system: System, what: str, lanes: int) -> native.Native:
     source = emit.source(system, what, "numba")
     name = store.key("field", source.text, str(lanes), native.sources(*SOURCES))
     return native.obtain(name, lambda: build(emit.numba(system, what).py_func, lanes))
+
+
+def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> native.Native:
+    """Compile ``void(context, count, tested)``, or load it: for a field on lanes, and factors in the matrix.
+
+    It does ``count`` sweeps. If ``tested`` is not 0, OTHER_Q then holds the stages before
+    the last one, and CHANGE the largest change relative to the size of its block.
+
+    Parameters
+    ----------
+    system, what, lanes
+        As for `compile_field`; ``lanes`` are all stages.
+    rows : int
+        Components of a stage.
+    """
+    source = emit.source(system, what, "numba")
+    modules = native.sources(*SOURCES, "memory", "layout", "fused")
+    name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
+
+    def make() -> tuple[str, bytes]:
+        from integrators.kernel import fused
+
+        function, arguments = on_lanes(emit.numba(system, what).py_func, lanes)
+        code = native.build(function, arguments, around=lambda inner: fused.sweeps(inner, lanes, rows))
+        return ON_LANES, code
+
+    return native.obtain(name, make)
 
 
 def build(function: Any, lanes: int) -> tuple[str, bytes]:
@@ -68,14 +98,14 @@ def assembly(system: System, what: str, lanes: int) -> str:
 
     function = emit.numba(system, what).py_func
     try:
-        return native.assembly(*_on_lanes(function, lanes))
+        return native.assembly(*on_lanes(function, lanes))
     except NumbaError:
         return native.assembly(*_one_by_one(function, lanes))
 
 
 def build_on_lanes(function: Any, lanes: int) -> bytes:
     """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
-    return native.build(*_on_lanes(function, lanes))
+    return native.build(*on_lanes(function, lanes))
 
 
 def build_one_by_one(function: Any, lanes: int) -> bytes:
@@ -83,7 +113,8 @@ def build_one_by_one(function: Any, lanes: int) -> bytes:
     return native.build(*_one_by_one(function, lanes))
 
 
-def _on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
+def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
+    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `native.build`."""
     from integrators.kernel import lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.lanes import Lanes, Rows, Strided
 

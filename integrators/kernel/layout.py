@@ -1,6 +1,6 @@
 """Where things are: the slots of a context, the block of memory a trajectory is integrated in.
 
-A context is 112 words of eight bytes, integers and doubles side by side: the
+A context is 120 words of eight bytes, integers and doubles side by side: the
 addresses of all tables and arrays, and the state of the nonlinear solver.
 Compiled functions take its address and nothing else, so their signature does
 not change with what they do, and a batch is a row of contexts.
@@ -138,7 +138,10 @@ RECURRENCE = (
     111  # by which each mode follows from the two before: pairs a, b for P_{j+1} = a x P_j - b P_{j-1}
 )
 
-CONTEXT = 112
+FUSED = 112  # address of whole sweeps, void(context, count, tested); 0: none, see `integrators.kernel.fused`
+CHANGE = 113  # double: the largest change of the last fused sweep
+
+CONTEXT = 120
 
 BLOCK_ROOM = 4  # numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's
 

@@ -104,8 +104,7 @@ def combine(typing, vectors, base, index, start):
     count = vectors.count
 
     def generate(context, builder, sig, args):
-        chains = _chains(builder, args[0], args[1], args[2], count, args[3])
-        return _pairwise(builder, chains)
+        return _combined(builder, args[0], args[1], args[2], count, args[3])
 
     return signature(EIGHT, vectors, address, types.int64, EIGHT), generate
 
@@ -116,32 +115,54 @@ def combine_only(typing, vectors, base, index):
     count = vectors.count
 
     def generate(context, builder, sig, args):
-        chains = _chains(builder, args[0], args[1], args[2], count, None)
-        return _pairwise(builder, chains)
+        return _combined(builder, args[0], args[1], args[2], count, None)
 
     return signature(EIGHT, vectors, address, types.int64), generate
 
 
-def _chains(builder: Any, vectors: Any, base: Any, index: Any, count: int, start: Any) -> list[Any]:
-    width = 4 if count >= 16 else 2
-    chains: list[Any] = [start] + [None] * (width - 1)
+def _combined(builder: Any, vectors: Any, base: Any, index: Any, count: int, start: Any) -> Any:
+    chains = Chains(builder, count, start)
     for j in range(count):
         offset = builder.add(index, ir.Constant(INTEGER, j))
         factor = splat(builder, builder.load(_at(builder, base, offset, DOUBLE)), WIDTH)
-        column = builder.extract_value(vectors, j)
-        chain = chains[j % width]
-        chains[j % width] = (
-            builder.fmul(column, factor)
+        chains.add(builder.extract_value(vectors, j), factor)
+    return chains.total()
+
+
+class Chains:
+    """A sum of ``count`` products in two chains, four from sixteen on, as `combine` forms it.
+
+    Parameters
+    ----------
+    builder : llvmlite.ir.IRBuilder
+        Where to emit.
+    count : int
+        Products.
+    start : llvmlite.ir.Value or None
+        What they are added to, if anything.
+    """
+
+    def __init__(self, builder: Any, count: int, start: Any):
+        self._builder = builder
+        self._chains: list[Any] = [start] + [None] * (3 if count >= 16 else 1)
+        self._next = 0
+
+    def add(self, column: Any, factor: Any) -> None:
+        """Add the next product."""
+        chain = self._chains[self._next]
+        self._chains[self._next] = (
+            self._builder.fmul(column, factor)
             if chain is None
-            else llvm_call(builder, "fma", column, factor, chain)
+            else llvm_call(self._builder, "fma", column, factor, chain)
         )
-    return chains
+        self._next = (self._next + 1) % len(self._chains)
 
-
-def _pairwise(builder: Any, values: list[Any]) -> Any:
-    while len(values) > 1:
-        values = [builder.fadd(x, y) for x, y in zip(values[::2], values[1::2], strict=True)]
-    return values[0]
+    def total(self) -> Any:
+        """Return the sum, the chains added pairwise."""
+        sums = self._chains
+        while len(sums) > 1:
+            sums = [self._builder.fadd(x, y) for x, y in zip(sums[::2], sums[1::2], strict=True)]
+        return sums[0]
 
 
 def _indices(*lanes: int) -> Any:
@@ -220,7 +241,7 @@ def upper(typing, x):
     return signature(EIGHT, EIGHT), generate
 
 
-def _larger(builder: Any, x: Any, y: Any) -> Any:
+def larger_of(builder: Any, x: Any, y: Any) -> Any:
     """Return the larger of non-negative numbers by their bits: a NaN is larger than all and so is kept."""
     kind = ir.VectorType(INTEGER, WIDTH)
     bits = [builder.bitcast(value, kind) for value in (x, y)]
@@ -232,30 +253,48 @@ def larger(typing, x, y):
     """Lane by lane the larger of two vectors that are not negative; NaN where either is."""
 
     def generate(context, builder, sig, args):
-        return _larger(builder, *args)
+        return larger_of(builder, *args)
 
     return signature(EIGHT, EIGHT, EIGHT), generate
+
+
+def _reduced(builder: Any, pick: Any, value: Any) -> Any:
+    for step in (4, 2, 1):
+        other = builder.shuffle_vector(value, value, _indices(*[(i + step) % WIDTH for i in range(WIDTH)]))
+        value = pick(builder, value, other)
+    return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+
+
+def largest_of(builder: Any, value: Any) -> Any:
+    """Return the largest lane of a vector that is not negative; NaN if any lane is."""
+    return _reduced(builder, larger_of, value)
 
 
 def _reduce(pick: Any) -> Any:
     @intrinsic
     def reduce(typing, x):
         def generate(context, builder, sig, args):
-            value = args[0]
-            for step in (4, 2, 1):
-                other = builder.shuffle_vector(
-                    value, value, _indices(*[(i + step) % WIDTH for i in range(WIDTH)])
-                )
-                value = pick(builder, value, other)
-            return builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+            return _reduced(builder, pick, args[0])
 
         return signature(types.float64, EIGHT), generate
 
     return reduce
 
 
-largest = _reduce(_larger)
+largest = _reduce(larger_of)
 total = _reduce(lambda builder, x, y: builder.fadd(x, y))
+
+
+@intrinsic
+def call_sweeps(typing, function, ctx, count, tested):
+    """Call the fused sweeps at address ``function``; see `integrators.kernel.fused`."""
+
+    def generate(context, builder, sig, args):
+        kind = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), list(args[1:]))
+        return context.get_dummy_value()
+
+    return signature(types.void, address, address, types.int64, types.int64), generate
 
 
 @intrinsic

@@ -106,7 +106,12 @@ def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:
         return native
 
 
-def build(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> bytes:
+def build(
+    function: Any,
+    arguments: Sequence[tuple[Any, str]],
+    returns: str = "void",
+    around: Callable[[str], str] | None = None,
+) -> bytes:
     """Compile a numba function to an object file with the C function `ENTRY`.
 
     Parameters
@@ -118,13 +123,18 @@ def build(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "v
         of its lanes, since its place in a call depends on the processor.
     returns : {"void", "i64"}
         What the function returns.
+    around : callable, optional
+        Given the name of the compiled function, returns LLVM's text of an `ENTRY` that
+        calls it; by default one with the function's own arguments.
 
     Raises
     ------
     numba.core.errors.NumbaError
         If it cannot be compiled for these types.
     """
-    return _compiled(function, arguments, returns, lambda machine, module: machine.emit_object(module))
+    return _compiled(
+        function, arguments, returns, lambda machine, module: machine.emit_object(module), around
+    )
 
 
 def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
@@ -137,13 +147,15 @@ def _compiled(
     arguments: Sequence[tuple[Any, str]],
     returns: str,
     emit: Callable[[Any, Any], Made],
+    around: Callable[[str], str] | None = None,
 ) -> Made:
     with _lock:
         kinds = tuple(kind for kind, _ in arguments)
         function.compile(kinds)
         inner = function.overloads[kinds].fndesc.llvm_func_name
         module = llvm.parse_assembly(function.inspect_llvm(kinds))
-        module.link_in(llvm.parse_assembly(_entry(inner, [text for _, text in arguments], returns)))
+        entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
+        module.link_in(llvm.parse_assembly(entry))
         for value in [*module.functions, *module.global_variables]:
             if not value.is_declaration and value.name != ENTRY:
                 value.linkage = "internal"

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.grid import Counts
-from integrators.kernel import engine, layout, tables
+from integrators.kernel import engine, layout, native, tables
 from integrators.kernel import field as fields
 from integrators.kernel.batch import Batch, run_batch
 from integrators.kernel.foreign import field_of
@@ -67,16 +67,26 @@ class HBVMProgram:
             group = group[: block[-1] + 1]
         self._known_velocity: tuple[bytes, Array] = (b"?", np.empty(0))
         unit = tables.unit(self.constants, self._velocity(np.full(system.n_par, np.nan)))
+        self.fused = self._sweeps(rows, lanes) if unit else None
         self.shape = Shape(
-            rows, self.second, unit, self.field.address, system.n_par, block, group, self.constants
-        )
+            rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
+            system.n_par, block, group, self.constants,
+        )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
         self._scaled: dict[float, dict[str, Array]] = {}
-        self.from_cache = self.field.from_cache and kernel.from_cache
+        self.from_cache = all(
+            made.from_cache for made in (self.field, kernel, self.fused) if made is not None
+        )
         self._linearization: Linearization | None = None
         if self.solver.strategy == layout.ALWAYS_IMPLICIT:
             self.implicit()
         self.compile_seconds = perf_counter() - started
+
+    def _sweeps(self, rows: int, lanes: int) -> native.Native | None:
+        """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
+        if rows > fields.FUSED_ROWS or self.constants.route not in (8, 16) or not self.lanes:
+            return None
+        return fields.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
 
     @property
     def lanes(self) -> bool:

@@ -2,7 +2,7 @@
 
 from integrators.kernel import layout as at
 from integrators.kernel.implicit.external import call_solver
-from integrators.kernel.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.memory import call_sweeps, get_float, get_int, put_float, put_int
 from integrators.kernel.products import change, compiled, evaluate, product, product_tested
 from integrators.kernel.step import prepare, start, start_plain, take_sizes
 
@@ -13,6 +13,9 @@ ROUNDING = 1e-15  # below it, the first change that does not decrease ends the i
 # far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
 # s = 2, h = 1; with five 3e-18).
 PATIENCE = 5
+# A change that is going to be no larger is not waited for, if the last two say so by falling this steeply.
+GOAL = 3e-17
+STEEP = 0.15
 INFINITY = float("inf")
 MANY = 100  # iterations of a step at which the fixed-point iteration is slow
 SLOW_STEPS = 4  # slow steps in a row after which the implicit solver takes over
@@ -47,9 +50,33 @@ def begin(ctx):
 @compiled
 def sweep(ctx):
     """Iterate once, without a test."""
+    sweeps(ctx, 1)
+
+
+@compiled
+def sweeps(ctx, count):
+    """Iterate ``count`` times, without a test."""
+    if count > 0:
+        fused = get_int(ctx, at.FUSED)
+        if fused:
+            call_sweeps(fused, ctx, count, 0)
+        else:
+            for _ in range(count):
+                evaluate(ctx)
+                product(ctx, get_int(ctx, at.MATRIX))
+        put_int(ctx, at.TRIED, get_int(ctx, at.TRIED) + count)
+        put_float(ctx, at.LAST, INFINITY)  # the next change does not follow the last one that was tested
+
+
+@compiled
+def moved(ctx):
+    """Iterate once; return the largest change relative to the size of its block, NaN if any stage is."""
+    fused = get_int(ctx, at.FUSED)
+    if fused:
+        call_sweeps(fused, ctx, 1, 1)
+        return get_float(ctx, at.CHANGE)
     evaluate(ctx)
-    product(ctx, get_int(ctx, at.MATRIX))
-    put_int(ctx, at.TRIED, get_int(ctx, at.TRIED) + 1)
+    return product_tested(ctx, get_int(ctx, at.MATRIX))
 
 
 @compiled
@@ -57,10 +84,11 @@ def sweep_tested(ctx):
     """Iterate once and apply the stopping rule; OUTCOME says what came of it.
 
     The iteration ends when the change, relative to its block, is at most
-    TOLERANCE, or when it has stopped decreasing where rounding accounts for it.
+    TOLERANCE, or when it has stopped decreasing where rounding accounts for it. It also
+    ends when the next change is going to be nothing: then the field is evaluated once
+    more, since its values have the error of the stages before the last change.
     """
-    evaluate(ctx)
-    strict = product_tested(ctx, get_int(ctx, at.MATRIX))
+    strict = moved(ctx)
     tried = get_int(ctx, at.TRIED) + 1
     last = get_float(ctx, at.LAST)
     put_int(ctx, at.TRIED, tried)
@@ -76,7 +104,12 @@ def sweep_tested(ctx):
     elif strict < get_float(ctx, at.BEST):
         put_float(ctx, at.BEST, strict)
         put_int(ctx, at.STALLED, 0)
-        if tried >= MAX_ITERATIONS:
+        # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
+        if last < 1.0 and strict <= STEEP * last and strict * strict <= GOAL * last:
+            evaluate(ctx)
+            put_int(ctx, at.TRIED, tried + 1)
+            put_int(ctx, at.OUTCOME, at.DONE)
+        elif tried >= MAX_ITERATIONS:
             restart(ctx, at.DIVERGED)
     else:
         stalled = get_int(ctx, at.STALLED) + 1
@@ -115,10 +148,11 @@ def close(ctx):
     if get_int(ctx, at.OUTCOME) == at.DONE:
         put_int(ctx, at.SOLVED, 1)
         if get_int(ctx, at.PREDICTED):
-            # Two tests tell that the change does not decrease any more; more mean that
-            # the first came early, and two or less that it may have come late.
+            # Two tests tell how the changes fall, or that they do not any more; more mean that the
+            # first came early. It came late where nothing was left to fall.
             tests = get_int(ctx, at.TESTS)
-            free = get_int(ctx, at.FREE) + (tests - 2 if tests > 2 else -1)
+            late = get_int(ctx, at.STALLED) > 0 or get_float(ctx, at.LAST) <= get_float(ctx, at.TOLERANCE)
+            free = get_int(ctx, at.FREE) + tests - (3 if late and tests <= 2 else 2)
             put_int(ctx, at.FREE, max(free, 0))
     else:
         put_float(ctx, at.LENGTH, 0.0)
@@ -140,8 +174,7 @@ def solve(ctx):
         return at.DONE
     if get_int(ctx, at.IMPLICIT):
         return solve_implicitly(ctx, ctx, 0)
-    for _ in range(begin(ctx)):
-        sweep(ctx)
+    sweeps(ctx, begin(ctx))
     outcome = settle(ctx)
     if get_int(ctx, at.STRATEGY) != at.FIXED_POINT:
         outcome = reconsider(ctx, outcome)

@@ -27,6 +27,8 @@ class Shape:
         Whether the rows' factors are in the matrix.
     field : int
         Address of the vector field.
+    fused : int
+        Address of whole sweeps; 0: none.
     parameters : int
         Length of the parameter vector.
     block, group : ndarray of int
@@ -39,6 +41,7 @@ class Shape:
     second: bool
     unit: bool
     field: int
+    fused: int
     parameters: int
     block: Integers
     group: Integers
@@ -76,7 +79,8 @@ class Context:
         padded = -(-rows // 8) * 8
         blocks, chunks = -(-c.k // lanes), -(-c.k // 8)
         sizes = {
-            "FIELD": shape.field, "ROWS": rows, "PADDED": padded, "LANES": lanes, "BLOCKS": blocks,
+            "FIELD": shape.field, "FUSED": shape.fused, "ROWS": rows, "PADDED": padded, "LANES": lanes,
+            "BLOCKS": blocks,
             "CHUNKS": chunks, "ROUTE": c.route, "SECOND": int(shape.second), "UNIT": int(shape.unit),
             "STAGES": c.k, "DEGREE": c.s, "MODES": c.modes, "MODE_CHUNKS": -(-c.modes // 8),
             "FIRST_COEFFICIENT": c.first, "COEFFICIENT_CHUNKS": -(-(c.s + c.first) // 8),

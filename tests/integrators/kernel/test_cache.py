@@ -77,7 +77,7 @@ def test_another_system_costs_its_field_only(cache):
     before = files(folder)
     other = finish(start(folder, 0.375))
     assert not other["cached"]
-    assert len(files(folder)) == len(before) + 1
+    assert len(files(folder)) == len(before) + 2  # by itself, and in whole sweeps
 
 
 def test_processes_that_start_at_once_agree_and_leave_no_debris(cache):
@@ -86,8 +86,8 @@ def test_processes_that_start_at_once_agree_and_leave_no_debris(cache):
     results = [finish(process) for process in [start(folder, 0.5) for _ in range(4)]]
     assert len({result["q"] for result in results}) == 1
     new = set(files(folder)) - before
-    assert len(new) == 1
-    assert not new.pop().name.startswith(".")
+    assert len(new) == 2
+    assert not any(path.name.startswith(".") for path in new)
     assert finish(start(folder, 0.5))["cached"]
 
 
