@@ -31,7 +31,7 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     sweep = ir.Function(module, SWEEP, native.ENTRY)
     context, count, tested = sweep.args
     sweep.attributes.alignstack = ALIGNMENT
-    b = ir.IRBuilder(sweep.append_basic_block("start"))
+    b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
     def slot(number: int) -> Any:
