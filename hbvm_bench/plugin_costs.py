@@ -100,14 +100,17 @@ def _native(problem: Problem, method: Any) -> tuple[str, Run]:
 
 
 def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
+    import numba
     from scipy.integrate import solve_ivp
 
-    from integrators.plugins.scipy import HBVM
-    from problems import emit
+    from integrators.plugins.scipy import HBVM, field
 
     problem = problems.load("pendulum", t_end=PENDULUM)
-    compiled = emit.numba(problem.system, "field")
-    out, par = np.empty(2), problem.par
+    njit: Any = numba.njit
+
+    @njit
+    def compiled(t, y):
+        return np.array([y[1], -np.sin(y[0])])
 
     def python(t: float, y: Array) -> list[float]:
         return [y[1], -np.sin(y[0])]
@@ -115,27 +118,35 @@ def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     def columns(t: Any, y: Array) -> Array:
         return np.stack([y[1], -np.sin(y[0])])
 
-    def traced(t: float, y: Array) -> Array:
-        compiled(t, y, par, out)
-        return out.copy()
-
     def run(fun: Any, **options: Any) -> Run:
         span = problem.t0, problem.t_end
         return lambda: solve_ivp(fun, span, problem.y0, atol=options["rtol"], **options).y.T
 
     ours = {"method": HBVM, "k": 12, "s": 6, "rtol": 1e-10}
-    steps = len(run(python, **ours)()) - 1
+    native = integrators.HBVM(k=12, s=6, tol=1e-10)
+    traced, times = field(problem), np.linspace(problem.t0, problem.t_end, 1001)
+    untraced = Problem(problems.Foreign(compiled, dim=2), y0=problem.y0, t_end=problem.t_end)
     return (
         problem,
         np.array([float(x) for x in exact_state(problem, problem.t_end)]),
         [
-            _native(problem, integrators.HBVM(k=12, s=6, h=round(problem.t_end / steps, 3))),
+            _native(problem, native),
+            ("native kernel, numba function", _native(untraced, native)[1]),
+            ("plugin, traced field", run(traced, **ours)),
+            ("plugin, traced field, `every=100`", run(traced, every=100, **ours)),
+            ("plugin, traced field, `t_eval` of 1001 times", run(traced, t_eval=times, **ours)),
+            ("plugin, numba function", run(compiled, **ours)),
+            ("plugin, numba function, `every=100`", run(compiled, every=100, **ours)),
             ("plugin, Python function", run(python, **ours)),
-            ("plugin, `vectorized=True`", run(columns, vectorized=True, **ours)),
-            ("plugin, traced field compiled by numba", run(traced, **ours)),
+            ("plugin, Python function, `vectorized=True`", run(columns, vectorized=True, **ours)),
             *(
-                (f"`{method}`, `rtol=atol={rtol:g}`", run(python, method=method, rtol=rtol))
-                for method, rtol in (("DOP853", 1e-10), ("DOP853", 3e-14), ("Radau", 1e-8))
+                (f"`{method}`, {what}, `rtol=atol={rtol:g}`", run(fun, method=method, rtol=rtol))
+                for method, what, fun, rtol in (
+                    ("DOP853", "Python function", python, 1e-10),
+                    ("DOP853", "numba function", compiled, 1e-10),
+                    ("DOP853", "Python function", python, 3e-14),
+                    ("Radau", "Python function", python, 1e-8),
+                )
             ),
         ],
     )

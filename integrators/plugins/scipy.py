@@ -74,7 +74,8 @@ class _LineIntegral(OdeSolver):
                 raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
             if first_step is not None or self.max_step < np.inf:
                 raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
-        if compiled is not None and t0 != t_bound:
+        one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
+        if compiled is not None and t0 != t_bound and not one_stage:
             if interpolant != "step":
                 raise InputError(
                     "interpolant='polynomial' is for functions in Python; with a compiled field states "
@@ -88,8 +89,8 @@ class _LineIntegral(OdeSolver):
                     "them; leave it out, or compile the function with numba."
                 )
             self._steps = PythonSteps(
-                self, fun, k=k, s=self.s, h=h, first_step=first_step, jac=jac, jac_sparsity=jac_sparsity,
-                interpolant=interpolant,
+                self, compiled or fun, k=k, s=self.s, h=h, first_step=first_step, jac=jac,
+                jac_sparsity=jac_sparsity, interpolant=interpolant,
             )  # fmt: skip
 
     def _native(

@@ -224,6 +224,13 @@ def test_compiled_functions_that_the_kernel_cannot_take_are_called_from_python()
     assert abs(complex_state.y[0, -1] - np.exp(1j)) < 1e-9
 
 
+@pytest.mark.parametrize("fun", [TRACED, returning, in_place], ids=["traced", "returning", "in place"])
+def test_one_stage_with_a_tolerance_is_called_from_python(fun: Any) -> None:
+    solution = solve(fun, 1.0, method=Gauss, s=1, rtol=1e-4, atol=1e-4)
+    close = solve(python, 1.0, method="DOP853")
+    assert np.abs(solution.y[:, -1] - close.y[:, -1]).max() < 1e-2  # measured 5e-4
+
+
 def test_a_numba_function_that_gives_no_array_of_numbers_is_called_from_python_with_a_warning() -> None:
     @numba.njit
     def mixed(t, y):
