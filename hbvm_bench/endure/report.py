@@ -1,10 +1,11 @@
-"""The report of `endure`: ``README.md`` and one figure, from the stored result alone."""
+"""The report of `endure`: ``README.md``, ``index.html`` and one figure, from the stored result alone."""
 
 import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import NDArray
 
 from hbvm_bench import drift
 from hbvm_bench.cells import Table, in_markdown
@@ -12,14 +13,22 @@ from hbvm_bench.drift import LAWS
 from hbvm_bench.endure.law import goals, lines
 from hbvm_bench.endure.runs import Endurance, of_method
 from hbvm_bench.race.tables import NONE
+from hbvm_bench.report import shell
 from hbvm_bench.report.canvas import Picture, drawing, log_axis, new, picture
-from hbvm_bench.report.markdown import code, plain
-from hbvm_bench.report.style import DASHES, INK, MARKERS, MUTED, base_colours
+from hbvm_bench.report.markdown import code
+from hbvm_bench.report.plots import Axis, Panel, Plot, Trace, as_csv
+from hbvm_bench.report.png import small
+from hbvm_bench.report.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
 from hbvm_bench.spec import parse_spec
 from hbvm_bench.store import atomic, ensure_writable
 from hbvm_bench.table import seconds
 
-FIGURE = "endure.svg"
+Array = NDArray[np.float64]
+
+FIGURE = "figures/endure.svg"
+TITLE = "Endurance: the energy of the outer Solar System"
+LAW_POINTS = 40
+FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
 
 
 def write(result: Endurance, directory: Path) -> Path:
@@ -30,25 +39,37 @@ def write(result: Endurance, directory: Path) -> Path:
     problems.errors.InputError
         If the directory cannot be written.
     """
-    made = over_time(result)
-    environment = Environment(
-        loader=PackageLoader("hbvm_bench.endure", "templates"),
-        autoescape=False,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"plain": plain, "code": code, "table": in_markdown}
-    text = environment.get_template("endure.md.j2").render(
-        result=result, tables=tables(result), picture=made, figure=FIGURE
-    )
-    ensure_writable(directory)
-    files = {"README.md": text.encode()} | ({FIGURE: made.svg.encode()} if made is not None else {})
-    for name, data in files.items():
+    look = looks(result)
+    made = over_time(result, look)
+    content = {"result": result, "tables": tables(result), "picture": made, "figure": FIGURE}
+    environment = shell.environment("hbvm_bench.endure", autoescape=False)
+    environment.filters |= {"code": code, "table": in_markdown}
+    files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}
+    pictures = [made] if made is not None else []
+    page = shell.environment("hbvm_bench.endure", autoescape=True).get_template("endure.html.j2")
+    data = {"csv": as_csv(made.plot)} if made is not None and made.plot is not None else {}
+    more = shell.values(pictures, list(look.values()), data=data)
+    files["index.html"] = page.render(title=TITLE, **content, **more).encode()
+    for one in pictures:
+        files[f"figures/{one.key}.svg"] = one.svg.encode()
+        files[f"figures/{one.key}.png"] = small(one.png)
+        files[f"data/{one.key}.csv"] = data["csv"].encode()
+    for folder in {(directory / name).parent for name in files}:
+        ensure_writable(folder)
+    for name, text in files.items():
         with atomic(directory / name) as path:
-            path.write_bytes(data)
+            path.write_bytes(text)
     return directory / "README.md"
+
+
+def looks(result: Endurance) -> dict[str, Look]:
+    """Return the look of every method, by its text."""
+    made: dict[str, Look] = {}
+    for number, method in enumerate(result.methods, 1):
+        name = parse_spec(method).name
+        dash = DASHES[sum(parse_spec(other).name == name for other in made) % len(DASHES)]
+        made[method] = Look(number, *base_colours(name), dash=dash, marker=MARKERS.get(name, UNKNOWN_MARKER))
+    return made
 
 
 def tables(result: Endurance) -> list[Table]:
@@ -96,7 +117,7 @@ def tables(result: Endurance) -> list[Table]:
     return made
 
 
-def over_time(result: Endurance) -> Picture | None:
+def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
     t = np.array(result.t)
     shown = [
@@ -115,10 +136,8 @@ def over_time(result: Endurance) -> Picture | None:
         figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
         log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
         log_axis(axes, "y", low, max(high, low + 1))
-        for index, (method, errors) in enumerate(shown):
-            name = parse_spec(method).name
-            colour = base_colours(name)[0]
-            dash = DASHES[sum(parse_spec(other).name == name for other, _ in shown[:index])]
+        for method, errors in shown:
+            colour, dash = look[method].light, look[method].dash
             for row in np.abs(errors):
                 axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
             axes.plot(
@@ -126,7 +145,7 @@ def over_time(result: Endurance) -> Picture | None:
                 drift.rms(errors),
                 color=colour,
                 dashes=dash or (None, None),
-                marker=MARKERS.get(name, "*"),
+                marker=look[method].marker,
                 markevery=24,
                 markersize=5,
                 linewidth=1.6,
@@ -137,7 +156,7 @@ def over_time(result: Endurance) -> Picture | None:
         axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
         axes.set_xlabel("years")
         axes.set_title("relative energy error, root mean square over the starts", color=INK)
-        axes.legend(loc="upper left")
+        axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
         for line in lines(result)
@@ -149,4 +168,26 @@ def over_time(result: Endurance) -> Picture | None:
         "Thick: root mean square over the starts; thin: every start. The grey line grows like the square "
         "root of time, as unbiased round-off does.",
         said,
+        Plot([_panel(result, shown, look)]),
+    )
+
+
+def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[str, Look]) -> Panel:
+    t = np.array(result.t)
+    found = {line.method: line.drift for line in lines(result)}
+    traces = []
+    for method, errors in shown:
+        rms = drift.rms(errors)
+        traces.append(Trace(look[method].number, method, t, np.where(rms > 0.0, rms, np.nan)))
+        law = found[method]
+        if law is not None and law.law is not None:
+            at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
+            traces.append(
+                Trace(look[method].number, method, at, law.curve(at, float(t[-1])), "law", LAWS[law.law])
+            )
+    return Panel(
+        "relative energy error, root mean square over the starts",
+        Axis("years", log=True, both=True),
+        Axis("rms of the relative energy error", log=True),
+        traces,
     )

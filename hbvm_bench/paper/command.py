@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from hbvm_bench import terminal
+from hbvm_bench.report.png import small
 from hbvm_bench.store import atomic, ensure_writable
 from problems.errors import unknown
 
@@ -97,17 +98,6 @@ def _module(name: str) -> ModuleType:
 
     modules = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
     return modules[PARTS.index(name)]
-
-
-def small(png: bytes) -> bytes:
-    """Return a picture with a palette of its own: a third of the bytes, and no difference to the eye."""
-    from PIL import Image  # comes with matplotlib
-
-    image, made = Image.open(io.BytesIO(png)).convert("RGB"), io.BytesIO()
-    image.quantize(128, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(
-        made, "PNG", optimize=True
-    )
-    return made.getvalue()
 
 
 def _csv(rows: Sequence[Sequence[str]]) -> bytes:

@@ -1,24 +1,25 @@
 """The report of a race: ``README.md``, ``index.html`` and ``figures/``, from stored results alone."""
 
-from collections.abc import Sequence
+import csv
+import io
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.race import tables
 from hbvm_bench.race.accuracy import SAMPLES
-from hbvm_bench.race.figures import work_precision
+from hbvm_bench.race.figures import looks, work_precision
 from hbvm_bench.race.results import Race
 from hbvm_bench.race.rounds import SHORTEST
 from hbvm_bench.race.settings import FAMILIES
 from hbvm_bench.race.standings import calibrated, present
-from hbvm_bench.report.canvas import Picture, inline_svg
-from hbvm_bench.report.markdown import code, plain
-from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, base_colours
+from hbvm_bench.report import shell
+from hbvm_bench.report.canvas import Picture
+from hbvm_bench.report.markdown import code
+from hbvm_bench.report.plots import as_csv
+from hbvm_bench.report.png import small
+from hbvm_bench.report.style import Look
 from hbvm_bench.store import atomic, ensure_writable
 
 FIGURES = "figures"
@@ -71,26 +72,34 @@ def write(races: Sequence[Race], directory: Path) -> list[Path]:
     problems.errors.InputError
         If the directory cannot be written.
     """
-    sections = [section(race) for race in races]
+    look = looks(races)
+    sections = [section(race, look) for race in races]
     top = [tables.headline(races), tables.goals(races)]
-    documents = {"README.md": markdown(sections, top), "index.html": page(sections, top)}
-    made: dict[Path, bytes] = {directory / name: text.encode() for name, text in documents.items()}
+    made: dict[str, bytes] = {
+        "data/settings.csv": settings_csv(sections).encode(),
+        "README.md": markdown(sections, top).encode(),
+        "index.html": page(sections, top, look).encode(),
+    }
     for one in sections:
-        if one.picture is not None:
-            made[directory / FIGURES / f"{one.picture.key}.svg"] = one.picture.svg.encode()
-    ensure_writable(directory / FIGURES)
-    for path, data in made.items():
-        with atomic(path) as temporary:
+        if one.picture is not None and one.picture.plot is not None:
+            key = one.picture.key
+            made[f"{FIGURES}/{key}.svg"] = one.picture.svg.encode()
+            made[f"{FIGURES}/{key}.png"] = small(one.picture.png)
+            made[f"data/{key}.csv"] = as_csv(one.picture.plot).encode()
+    for folder in {(directory / name).parent for name in made}:
+        ensure_writable(folder)
+    for name, data in made.items():
+        with atomic(directory / name) as temporary:
             temporary.write_bytes(data)
-    return [directory / name for name in documents]
+    return [directory / "README.md", directory / "index.html"]
 
 
-def section(race: Race) -> Section:
+def section(race: Race, look: Mapping[str, Look]) -> Section:
     """Gather what the report says about one contest."""
     shown = [tables.fastest(race), tables.levels(race), tables.defaults(race), tables.compiling(race)]
     return Section(
         race,
-        work_precision(race),
+        work_precision(race, look),
         [t for t in shown if t is not None],
         tables.everything(race),
         remarks(race),
@@ -126,24 +135,22 @@ def remarks(race: Race) -> list[str]:
 
 def markdown(sections: Sequence[Section], top: Sequence[Table]) -> str:
     """Return the report as markdown, with relative links to its figures."""
-    environment = _environment(autoescape=False)
-    environment.filters |= {"plain": plain, "code": code, "table": in_markdown}
+    environment = shell.environment("hbvm_bench.race", autoescape=False)
+    environment.filters |= {"code": code, "table": in_markdown}
     return environment.get_template("race.md.j2").render(**_content(sections, top))
 
 
-def page(sections: Sequence[Section], top: Sequence[Table]) -> str:
+def page(sections: Sequence[Section], top: Sequence[Table], look: Mapping[str, Look]) -> str:
     """Return the report as one self-contained HTML document."""
-    environment = _environment(autoescape=True)
-    themed = {f"--{name.lower()}": base_colours(name) for name in _names()}
-    colours = {light: variable for variable, (light, _) in themed.items()}
-    environment.globals |= {"drawn": lambda picture: Markup(inline_svg(picture, colours))}
-    light = {v: k for k, v in NEUTRALS.items()} | {variable: pair[0] for variable, pair in themed.items()}
-    dark = DARK_NEUTRALS | {variable: pair[1] for variable, pair in themed.items()}
+    environment = shell.environment("hbvm_bench.race", autoescape=True)
     return environment.get_template("race.html.j2").render(
-        css=Markup((files("hbvm_bench.report") / "templates" / "style.css").read_text(encoding="utf-8")),
-        light=_variables(light),
-        dark=_variables(dark),
         **_content(sections, top),
+        **shell.values(
+            [s.picture for s in sections if s.picture is not None],
+            list(look.values()),
+            names={one.number: name for name, one in look.items()},
+            data={"csv": settings_csv(sections)},
+        ),
     )
 
 
@@ -162,20 +169,12 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
     }
 
 
-def _names() -> list[str]:
-    return ["Gauss", *(family.lead for family in FAMILIES.values())]
-
-
-def _environment(*, autoescape: bool) -> Environment:
-    return Environment(
-        loader=PackageLoader("hbvm_bench.race", "templates"),
-        autoescape=autoescape,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-
-
-def _variables(values: dict[str, str]) -> Markup:
-    return Markup("".join(f"{name}:{value};" for name, value in values.items()))
+def settings_csv(sections: Sequence[Section]) -> str:
+    """Return all settings of all contests as one table of text."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for number, one in enumerate(sections):
+        if number == 0:
+            writer.writerow(["contest", *one.full.head])
+        writer.writerows([one.race.contest.key, *row] for row in one.full.rows)
+    return stream.getvalue()

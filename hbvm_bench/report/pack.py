@@ -8,7 +8,7 @@ import base64
 import csv
 import gzip
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -18,6 +18,7 @@ from plotly.offline import get_plotlyjs
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report import motion
+from hbvm_bench.report.canvas import Picture
 from hbvm_bench.report.content import Content
 from hbvm_bench.report.plots import as_csv, as_json, numbers
 from hbvm_bench.report.style import Look
@@ -58,34 +59,38 @@ def library() -> str:
     return packed(get_plotlyjs().encode())
 
 
-def page_data(content: Content) -> str:
-    """Return what the page's figures, tables and downloads are made of, packed."""
+def figures_data(
+    pictures: Sequence[Picture], looks: Iterable[Look], names: Mapping[int, str], more: Mapping[str, Any]
+) -> str:
+    """Return what the figures, tables and downloads of a page are made of, packed."""
     plots: dict[str, Any] = {}
-    for picture in content.pictures:
+    for picture in pictures:
         if picture.plot is not None:
             table = numbers(picture.plot)
             plots[picture.key] = as_json(picture.plot) | {
                 "numbers": {"head": table.head, "rows": table.rows, "words": table.words}
             }
-    data = {
-        "looks": looks_json(content.looks.values()),
-        "plots": plots,
+    return packed(msgspec.json.encode({"looks": looks_json(looks, names), "plots": plots, **more}))
+
+
+def raw(content: Content) -> dict[str, Any]:
+    """Return what the page of a campaign carries beside its figures' numbers."""
+    return {
         "motions": {s.motion.key: motion.as_json(s.motion) for s in content.sections if s.motion is not None},
         "csv": results_csv(content.records),
         "json": results_json(content),
     }
-    return packed(msgspec.json.encode(data))
 
 
-def looks_json(looks: Any) -> dict[str, dict[str, Any]]:
+def looks_json(looks: Iterable[Look], names: Mapping[int, str]) -> dict[str, dict[str, Any]]:
     """Return the looks by number, for the page's script; colours are variables of the page."""
-    unique: dict[int, Look] = {look.number: look for look in looks}
     return {
-        str(number): {
+        str(look.number): {
             "dash": ",".join(f"{1.3 * length:.3g}px" for length in look.dash) or "solid",
             "symbol": SYMBOLS[look.marker],
+            **({"name": names[look.number]} if look.number in names else {}),
         }
-        for number, look in unique.items()
+        for look in looks
     }
 
 

@@ -109,7 +109,8 @@ def test_the_report_names_what_was_run_and_is_deterministic(tmp_path):
     result = made(years=1e5, starts=3)
     first = report.write(result, tmp_path / "a").read_bytes()
     assert report.write(result, tmp_path / "b").read_bytes() == first
-    assert (tmp_path / "a" / "endure.svg").read_bytes() == (tmp_path / "b" / "endure.svg").read_bytes()
+    for name in ("index.html", "figures/endure.svg", "figures/endure.png", "data/endure.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     assert b"Gauss(s=8, h=1.0)" in first
 
 

@@ -13,6 +13,7 @@ from hbvm_bench.paper.departure import departure
 from hbvm_bench.paper.document import Claim, Part, Table, number, sheet
 from hbvm_bench.paper.henon_heiles_figures import fates
 from hbvm_bench.report.canvas import picture
+from hbvm_bench.report.png import small
 from integrators.gauss import Gauss
 from integrators.protocol import Samples, Status
 from problems import Hamiltonian
@@ -101,10 +102,10 @@ def test_pictures_are_kept_small_without_a_visible_difference():
     from PIL import Image
 
     drawn = fates({"Gauss(s=2, h=1.0)": [100.0, None], "HBVM(k=4, s=2, h=1.0)": [None]}, 7000.0).png
-    small = command.small(drawn)
-    assert len(small) < 0.6 * len(drawn)  # 0.4
+    made = small(drawn)
+    assert len(made) < 0.6 * len(drawn)  # 0.4
     before, after = (
-        np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float) for png in (drawn, small)
+        np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float) for png in (drawn, made)
     )
     assert np.abs(before - after).mean() < 0.5  # 0.02 of 255
 

@@ -191,13 +191,15 @@
     field.append(make("legend", "Cases"));
     const bar = make("div", "", { class: "bulk" });
     const numbers = [...new Set(plot.panels.flatMap((panel) => panel.traces.map((t) => t.case)))].filter(Boolean);
-    const names = new Map(plot.panels.flatMap((panel) => panel.traces.map((t) => [t.case, t.name])));
+    const names = new Map(plot.panels.flatMap((panel) => panel.traces.map((t) => [t.case, looks[t.case]?.name ?? t.name])));
+    const ours = (n) => /^(HBVM|Gauss|LineIntegral)/.test(names.get(n));
     const set = (wanted) => {
       for (const number of numbers) (wanted(number) ? off.delete(number) : off.add(number));
       sync();
       redraw();
     };
-    for (const [text, wanted] of [["All", () => true], ["None", () => false], ["Ours", (n) => /^(HBVM|Gauss|LineIntegral)/.test(names.get(n))]]) {
+    for (const [text, wanted] of [["All", () => true], ["None", () => false], ["Ours", ours]]) {
+      if (wanted === ours && numbers.every(ours) === numbers.some(ours)) continue; // it would switch nothing
       const button = make("button", text, { type: "button" });
       button.addEventListener("click", () => set(wanted));
       bar.append(button);

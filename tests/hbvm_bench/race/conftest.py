@@ -22,6 +22,10 @@ def outcome(method, seconds, energy, position, family="hbvm", **more):
 
 @pytest.fixture
 def race():
+    return made_up()
+
+
+def made_up():
     """Return a small race with every kind of row."""
     return Race(
         contest=CONTESTS["outer_solar_system"],
