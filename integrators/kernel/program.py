@@ -74,6 +74,7 @@ class HBVMProgram:
         )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
         self._scaled: dict[float, dict[str, Array]] = {}
+        self._fresh: dict[bool, Context] = {}
         self.from_cache = all(
             made.from_cache for made in (self.field, kernel, self.fused) if made is not None
         )
@@ -171,11 +172,12 @@ class HBVMProgram:
 
     def context(self, *, side: bool = False) -> Context:
         """Return fresh memory for a trajectory, or for its partial steps."""
-        scaled = self.scaled(self.h)
-        shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
-        context = Context(self.shape, {**self._fixed, **shared})
-        context.reals[layout.TOLERANCE] = TOLERANCE
-        return context
+        if side not in self._fresh:
+            scaled = self.scaled(self.h)
+            shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
+            self._fresh[side] = Context(self.shape, {**self._fixed, **shared})
+            self._fresh[side].reals[layout.TOLERANCE] = TOLERANCE
+        return self._fresh[side].copy()
 
     def load(self, context: Context, par: Array) -> None:
         """Put parameters, and the velocities that follow from them, into a context."""
