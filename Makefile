@@ -34,6 +34,7 @@ $(STAMP): FORCE
 	  echo "setting up $(VENV) from requirements.lock" && \
 	  rm -rf $(VENV) && $(PYTHON) -m venv $(VENV) && \
 	  $(PIP) --no-compile --require-hashes -r requirements.lock && \
+	  { $(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true; } && \
 	  echo "$$lock" > $(VENV)/.locked || exit 1; \
 	fi; \
 	if [ "$$(cat $@ 2>/dev/null)" != "$$project" ]; then \
