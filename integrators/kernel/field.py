@@ -18,7 +18,7 @@ Arguments = list[tuple[Any, str]]
 FUSED_ROWS = 4
 """Components of a stage up to which whole sweeps are compiled with the field."""
 
-SOURCES = ("lanes", "lane_functions", "native", "field")
+SOURCES = ("lanes", "lane_views", "lane_functions", "native", "field")
 
 
 def compile_field(system: System, what: str, lanes: int) -> native.Native:
@@ -116,7 +116,8 @@ def build_one_by_one(function: Any, lanes: int) -> bytes:
 def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
     """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `native.build`."""
     from integrators.kernel import lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
-    from integrators.kernel.lanes import Lanes, Rows, Strided
+    from integrators.kernel.lane_views import Rows, Strided
+    from integrators.kernel.lanes import Lanes
 
     stages = Rows(lanes)
     arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (Strided(1), "ptr"), (stages, "ptr")]
@@ -126,7 +127,7 @@ def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
 def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
     from numba import types
 
-    from integrators.kernel.lanes import strided
+    from integrators.kernel.lane_views import strided
 
     scalar = _jit(function)
 

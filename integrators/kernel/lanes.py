@@ -7,9 +7,7 @@ lane in the order written: nothing is contracted or reordered, because the
 symmetry of a problem may hang on the last bit. The one fused operation,
 `fma`, is explicit and meant for the linear algebra, not for vector fields.
 
-A vector field is called with `Rows`, the view ``y[i] -> Lanes`` of
-structure-of-arrays memory, and `Strided`, the view ``par[i] -> float`` that
-also serves one stage at a time where a field cannot run on lanes.
+A vector field reads and writes them through the views of `integrators.kernel.lane_views`.
 """
 
 import math
@@ -47,22 +45,6 @@ class Mask(types.Type):
         super().__init__(name=f"Mask({count})")
 
 
-class Rows(types.Type):
-    """Memory of K doubles per row: ``rows[i]`` is a `Lanes(K)`."""
-
-    def __init__(self, count: int):
-        self.count = count
-        super().__init__(name=f"Rows({count})")
-
-
-class Strided(types.Type):
-    """Memory with K doubles from one item to the next: ``view[i]`` is a float."""
-
-    def __init__(self, stride: int):
-        self.stride = stride
-        super().__init__(name=f"Strided({stride})")
-
-
 def vector(count: int) -> ir.VectorType:
     """Return LLVM's type of ``count`` doubles."""
     return ir.VectorType(DOUBLE, count)
@@ -80,13 +62,6 @@ class _MaskModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.count))
 
 
-@register_model(Rows)
-@register_model(Strided)
-class _PointerModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any):
-        super().__init__(manager, kind, DOUBLE.as_pointer())
-
-
 # --- values in and out of vectors ---------------------------------------------------------------
 
 
@@ -99,10 +74,6 @@ def splat(builder: Any, scalar: Any, count: int) -> Any:
     return builder.shuffle_vector(one, ir.Constant(vector(count), ir.Undefined), zeros)
 
 
-def _aligned(stride: int) -> int:
-    return min(ALIGNMENT, 8 * stride)
-
-
 def _count(*kinds: Any) -> int | None:
     """Return the number of lanes if all of ``kinds`` are lanes of one width or numbers, and one is lanes."""
     counts = {kind.count for kind in kinds if isinstance(kind, Lanes)}
@@ -112,12 +83,13 @@ def _count(*kinds: Any) -> int | None:
     return counts.pop()
 
 
-def _arguments(kinds: Any) -> list[Any]:
+def arguments_for(kinds: Any) -> list[Any]:
     """Lanes stay lanes; every other number is converted to a double before it is spread."""
     return [kind if isinstance(kind, Lanes) else types.float64 for kind in kinds]
 
 
-def _spread(builder: Any, kinds: Any, values: Any, count: int) -> list[Any]:
+def spread_to(builder: Any, kinds: Any, values: Any, count: int) -> list[Any]:
+    """Return values of these kinds as lanes: numbers in all of them."""
     return [
         v if isinstance(kind, Lanes) else splat(builder, v, count)
         for kind, v in zip(kinds, values, strict=True)
@@ -130,14 +102,14 @@ def register(function: Any, arity: int, result: Any, emit: Any) -> None:
     class Template(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
             count = None if kws or len(args) != arity else _count(*args)
-            return None if count is None else signature(result(count), *_arguments(args))
+            return None if count is None else signature(result(count), *arguments_for(args))
 
     infer_global(function)(Template)
 
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         count = _count(*sig.args)
         assert count is not None
-        return emit(builder, *_spread(builder, sig.args, args, count))
+        return emit(builder, *spread_to(builder, sig.args, args, count))
 
     mixtures = [[Lanes]] if arity == 1 else [[Lanes, Lanes], [Lanes, types.Float], [types.Float, Lanes]]
     for kinds in mixtures:
@@ -283,9 +255,9 @@ def _fma_lanes(typing, x, y, z):
     assert count is not None
 
     def generate(context, builder, sig, args):
-        return llvm_call(builder, "fma", *_spread(builder, sig.args, args, count))
+        return llvm_call(builder, "fma", *spread_to(builder, sig.args, args, count))
 
-    return signature(Lanes(count), *_arguments((x, y, z))), generate
+    return signature(Lanes(count), *arguments_for((x, y, z))), generate
 
 
 @overload(select)
@@ -296,85 +268,7 @@ def _select(mask, x, y):
 @intrinsic
 def _select_lanes(typing, mask, x, y):
     def generate(context, builder, sig, args):
-        first, second = _spread(builder, sig.args[1:], args[1:], mask.count)
+        first, second = spread_to(builder, sig.args[1:], args[1:], mask.count)
         return builder.select(args[0], first, second)
 
-    return signature(Lanes(mask.count), mask, *_arguments((x, y))), generate
-
-
-# --- memory -----------------------------------------------------------------------------------------
-
-
-def _element(builder: Any, pointer: Any, index: Any, stride: int, kind: Any) -> Any:
-    """Return the address of item ``index`` as a pointer to ``kind``."""
-    if stride != 1:
-        index = builder.mul(index, ir.Constant(index.type, stride))
-    return builder.bitcast(builder.gep(pointer, [index]), kind.as_pointer())
-
-
-@infer_global(operator.getitem)
-class _GetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        view, index = args
-        if not isinstance(index, types.Integer):
-            return None
-        if isinstance(view, Rows):
-            return signature(Lanes(view.count), view, types.intp)
-        return signature(types.float64, view, types.intp) if isinstance(view, Strided) else None
-
-
-@infer_global(operator.setitem)
-class _SetItem(AbstractTemplate):
-    def generic(self, args: Any, kws: Any) -> Any:
-        view, index, value = args
-        if not isinstance(index, types.Integer):
-            return None
-        if isinstance(view, Rows) and isinstance(value, Lanes | types.Number):
-            return signature(types.none, view, types.intp, *_arguments([value]))
-        if isinstance(view, Strided) and isinstance(value, types.Number):
-            return signature(types.none, view, types.intp, types.float64)
-        return None
-
-
-@lower_builtin(operator.getitem, Rows, types.Integer)
-def _get_row(context, builder, sig, args):
-    count = sig.args[0].count
-    return builder.load(_element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
-
-
-@lower_builtin(operator.setitem, Rows, types.Integer, Lanes)
-@lower_builtin(operator.setitem, Rows, types.Integer, types.Float)
-def _set_row(context, builder, sig, args):
-    count = sig.args[0].count
-    (value,) = _spread(builder, sig.args[2:], args[2:], count)
-    builder.store(value, _element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
-
-
-@lower_builtin(operator.getitem, Strided, types.Integer)
-def _get_scalar(context, builder, sig, args):
-    return builder.load(_element(builder, args[0], args[1], sig.args[0].stride, DOUBLE))
-
-
-@lower_builtin(operator.setitem, Strided, types.Integer, types.Float)
-def _set_scalar(context, builder, sig, args):
-    builder.store(args[2], _element(builder, args[0], args[1], sig.args[0].stride, DOUBLE))
-
-
-def _view(kind: Any) -> Any:
-    """Make the conversion of an address (intp) to a view of type ``kind(width)``."""
-
-    @intrinsic(prefer_literal=True)
-    def view(typing, address, width):
-        if not isinstance(width, types.IntegerLiteral):
-            return None
-
-        def generate(context, builder, sig, args):
-            return builder.inttoptr(args[0], DOUBLE.as_pointer())
-
-        return signature(kind(width.literal_value), types.intp, width), generate
-
-    return view
-
-
-rows = _view(Rows)
-strided = _view(Strided)
+    return signature(Lanes(mask.count), mask, *arguments_for((x, y))), generate
