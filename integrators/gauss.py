@@ -91,7 +91,7 @@ class Gauss(MethodBase):
         if self.tol is not None:
             from integrators.kernel.adaptive.program import AdaptiveProgram
 
-            return AdaptiveProgram(system, k=self.s, s=self.s, tol=self.tol, h=self.h)
+            return AdaptiveProgram(system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver)
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None

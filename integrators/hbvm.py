@@ -49,7 +49,10 @@ class HBVM(MethodBase):
     This costs an energy-preserving method nothing, whereas a symplectic one, such as
     Gauss, loses its long-time behaviour (`test_adaptive`). Without k and s these are
     chosen too (`integrators.automatic`), and the length of a step is bounded such that
-    the error of the quadrature, by which the energy changes, is at round-off.
+    the error of the quadrature, by which the energy changes, is at round-off. Stiff
+    systems run too: the method is A-stable, but it damps nothing, so that a transient that was
+    left at the size of the tolerance stays and keeps the steps shorter than those of a method
+    that damps it (`test_general`, Robertson's chemistry).
 
     Limits: energy is not accuracy. At a step too large for the trajectory the
     energy is still conserved and the trajectory is wrong; other invariants, such
@@ -87,9 +90,11 @@ class HBVM(MethodBase):
         system (of half its size for q'' = a(q)) per pair of stages, sparse where the
         system is large. ``"blended"``: blended iteration, one real matrix. ``"auto"``:
         fixed point, and Newton from where that fails or takes a hundred iterations a
-        step until it would contract well again. The Jacobian is traced; its factors are
-        kept while they serve. ``stats`` tells which solver did how much. With ``tol`` always
-        fixed point: steps are short enough for it to contract well.
+        step until it would contract well again. With ``tol`` steps are as short as the
+        fixed point needs, until errors would allow ten times longer ones or more; then
+        Newton takes over, and errors alone bound the steps. The Jacobian is traced, or taken
+        by differences; its factors are kept while they serve. ``stats`` tells which solver did
+        how much. Poisson systems: fixed point.
 
     Raises
     ------
@@ -140,11 +145,6 @@ class HBVM(MethodBase):
             )
         if self.solver not in SOLVERS:
             raise unknown("solver", str(self.solver), SOLVERS)
-        if self.tol is not None and self.solver in ("newton", "blended"):
-            raise InputError(
-                f"{type(self).__name__} solves steps of varying length by fixed-point iteration, with steps "
-                f"short enough for it; leave out solver={self.solver!r}, or give h in place of tol."
-            )
 
     @property
     def order(self) -> int | None:
@@ -180,7 +180,9 @@ class HBVM(MethodBase):
         if self.tol is not None:
             from integrators.kernel.adaptive.program import AdaptiveProgram
 
-            return AdaptiveProgram(system, k=k, s=s, tol=self.tol, defect=defect, h=self.h)
+            return AdaptiveProgram(
+                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver
+            )
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None

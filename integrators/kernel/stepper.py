@@ -153,6 +153,13 @@ class HBVMStepper:
             extra=extra,
         )
 
+    @property
+    def _solver(self) -> str:
+        """Name of the iteration that is at work."""
+        if self._implicit is not None and self._context.words[layout.IMPLICIT]:
+            return self._implicit[0].name
+        return "fixed-point"
+
     def _solvers(self) -> str:
         """Return the names of the solvers that have solved steps, the one that solved more first."""
         words = self._context.words
@@ -287,10 +294,7 @@ class HBVMStepper:
                 workspace.raise_what_is_no_failure()
         status = Status.FINISHED
         if outcome != layout.DONE:
-            name = "fixed-point"
-            if self._implicit is not None and context.words[layout.IMPLICIT]:
-                name = self._implicit[0].name
-            status, self._reason = failure(outcome, self.t, context.reals, name)
+            status, self._reason = failure(outcome, self.t, context.reals, self._solver)
             self._status = status
         return Samples(times[:made], out[:made], status, self._reason)
 

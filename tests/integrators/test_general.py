@@ -60,7 +60,7 @@ def dop853(tol):
     [
         ("van_der_pol", HBVM(k=6, s=4, tol=1e-8), 5e-9),  # measured 5.2e-10
         ("van_der_pol", radau(1e-8), 1e-9),  # measured 2.2e-11
-        ("robertson", HBVM(tol=1e-8), 1e-12),  # measured 3.9e-14
+        ("robertson", HBVM(tol=1e-8, solver="fixed_point"), 1e-12),  # measured 3.9e-14
         ("robertson", Gauss(s=3, h=0.01, solver="newton"), 2e-8),  # measured 1.5e-9
         ("robertson", radau(1e-8), 1e-9),  # measured 8.8e-12
     ],
@@ -87,6 +87,48 @@ def test_arenstorfs_orbits_close_after_their_published_periods(method, error, lo
     problem = problems.load("cr3bp", loops=loops)
     made = integrate(problem, method, [problem.t_end])
     assert np.abs(made.y[0] - problem.y0).max() < error
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+@pytest.mark.parametrize(
+    ("method", "error", "most"),
+    [
+        (HBVM(), 1e-11, 1000),  # measured: van der Pol 2.4e-14, 273 steps; Robertson 3.9e-14, 141 steps
+        (HBVM(tol=1e-8), 1e-7, 1000),  # 8.3e-11, 419; 7.0e-10, 279
+        (HBVM(k=6, s=4, tol=1e-8, solver="newton"), 1e-7, 2000),  # 6.2e-10, 661; 3.6e-9, 235
+        (HBVM(k=6, s=4, tol=1e-8, solver="blended"), 1e-7, 2000),  # 5.9e-10, 680; 4.7e-9, 228
+        (Gauss(s=3, tol=1e-8), 1e-6, 4000),  # 2.7e-8, 1705; 2.7e-8, 263
+    ],
+    ids=repr,
+)
+def test_stiff_systems_take_steps_that_errors_alone_bound(name, method, error, most):
+    problem, published = PUBLISHED[name]
+    made = integrate(problem, method, [problem.t_end])
+    assert made.status is Status.FINISHED
+    assert np.abs(made.y[0] / published - 1).max() < error
+    assert made.stats.steps < most
+    work = made.stats.extra["implicit"]
+    assert 0 < work["steps"] <= made.stats.steps + 1
+    always = method.solver in ("newton", "blended")
+    assert (work["switches"] > 0) != always
+    solver = made.stats.solver or ""
+    assert ("fixed point" in solver) != always
+    assert ("blended" if method.solver == "blended" else "Newton") in solver
+
+
+def test_without_the_implicit_solver_a_stiff_system_takes_far_more_steps():
+    fixed = integrate(ROBERTSON, HBVM(solver="fixed_point"), [40.0])
+    auto = integrate(ROBERTSON, HBVM(), [40.0])
+    assert fixed.stats.solver == "fixed point"
+    assert fixed.stats.steps > 50 * auto.stats.steps  # measured 27589 and 141
+
+
+def test_robertsons_chemistry_to_its_published_end_at_1e11():
+    # F. Mazzia, C. Magherini, Test Set for Initial Value Problem Solvers, release 2.4.
+    published = np.array([0.2083340149701255e-07, 0.8333360770334713e-13, 0.9999999791665050])
+    made = integrate(ROBERTSON, HBVM(tol=1e-10), [1e11])
+    assert made.status is Status.FINISHED
+    assert np.abs(made.y[0] / published - 1).max() < 1e-11  # measured 1.9e-14
 
 
 def test_hbvm_keeps_the_jacobi_integral_of_arenstorfs_orbit_and_dop853_does_not():
@@ -128,3 +170,43 @@ def test_a_stiff_chain_runs_at_a_hundred_times_the_step_at_which_the_fixed_point
     assert made.stats.solver == "Newton"
     assert made.stats.steps == 125
     assert made.errors()["energy"].max() < 1e-14  # measured 1.2e-15
+
+
+def tied_chain(frequency):
+    """Three particles between walls; a stiff spring ties the middle one down, the others pull it evenly."""
+
+    def energy(q, p, par, m):
+        kinetic = (p[0] ** 2 + p[1] ** 2 + p[2] ** 2) / 2
+        soft = q[0] ** 2 + (q[1] - q[0]) ** 2 + (q[2] - q[1]) ** 2 + q[2] ** 2
+        return kinetic + soft / 2 + q[0] ** 4 / 4 + q[2] ** 4 / 4 + par.frequency**2 * q[1] ** 2 / 2
+
+    system = Hamiltonian(energy, dof=3, parameters={"frequency": frequency}, name="tied_chain")
+    return Problem(system, y0=[1.0, 1e-40, -1.0, 0.0, 0.0, 0.0], t_end=100.0)
+
+
+@pytest.mark.parametrize(
+    ("method", "most"),
+    [
+        (HBVM(k=8, s=4, tol=1e-6), 2),  # measured 323 steps, 279 of the soft chain, 487823 by the fixed point
+        (HBVM(tol=1e-8), 50),  # 4595, 158, 312566: bounded by rounding errors of the fast force
+    ],
+    ids=repr,
+)
+def test_a_fast_mode_at_rest_does_not_bound_the_steps(method, most):
+    stiff = integrate(tied_chain(1e4), method, sample="steps")
+    soft = integrate(tied_chain(1.0), method, [100.0])
+    assert stiff.errors()["energy"].max() < 1e-14  # measured 1.5e-15 and 5e-16
+    assert np.abs(stiff.y[:, 1]).max() < 1e-15  # measured 2e-22
+    assert stiff.stats.extra["implicit"]["switches"] == 1
+    assert stiff.stats.steps < most * soft.stats.steps
+
+
+def test_fast_modes_in_motion_are_followed_with_the_energy_at_round_off():
+    problem = problems.load("stiff_chain", omega=1e4, t_end=1.0)
+    ends = []
+    for method in (HBVM(tol=1e-8), HBVM(k=8, s=4, tol=1e-8, solver="newton")):
+        made = integrate(problem, method)
+        assert made.errors()["energy"].max() < 1e-13  # measured 4.3e-15 and 2.0e-14
+        assert made.stats.steps > 2e3
+        ends.append(made.y[-1])
+    assert np.abs(ends[0] - ends[1]).max() < 1e-3

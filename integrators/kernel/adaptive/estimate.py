@@ -1,11 +1,17 @@
 """Estimates from the Legendre coefficients that the polynomial of a step leaves out."""
 
+from math import log
+
 from integrators.kernel import layout as at
-from integrators.kernel.control import INFINITY, NOTHING
+from integrators.kernel.control import INFINITY, NOTHING, TINY
 from integrators.kernel.lanes import fma
-from integrators.kernel.memory import get, get_float, get_int, put, put_float, splat8, sums
+from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8, sums
 from integrators.kernel.products import compiled, evaluate, offset
 from integrators.kernel.step import prepare, set_step, start_plain
+
+UNSEEN = (
+    1e-13  # part of a block that rounding may account for in a step that the fixed-point iteration solves
+)
 
 
 @compiled
@@ -26,6 +32,13 @@ def momentum(ctx, d):
     """Return the component of the state whose slope is row d of the field."""
     i = 8 * (d // 4) + d % 4 if get_int(ctx, at.SECOND) else d
     return get_float(get_int(ctx, at.STATE), i)
+
+
+@compiled
+def block_size(ctx, room, b):
+    """Return the size that a block's errors are relative to, its own unless that is next to nothing."""
+    largest = get_float(get_int(ctx, at.LARGEST), get_int(get_int(ctx, at.GROUP), b))
+    return max(get_float(room, at.BLOCK_ROOM * b), NOTHING * largest)
 
 
 @compiled
@@ -75,11 +88,56 @@ def estimate(ctx):
         i = at.BLOCK_ROOM * b
         slope = get_float(room, i + 1)
         if slope > 0.0:
-            size = max(get_float(room, i), NOTHING * get_float(largest, get_int(group, b)))
-            part = h / slope / size
+            part = h / slope / block_size(ctx, room, b)
             error = max(error, part * get_float(room, i + 2) ** 2)
             defect = max(defect, part * get_float(room, i + 3) ** 2)
     return error, defect
+
+
+@compiled
+def log_decay(ctx):
+    """Return the logarithm of the factor from one low coefficient of the field to the next, after `estimate`.
+
+    Of the block where they fall off slowest. High ones drown in rounding where h J is
+    large and the solution smooth; 0 where one of them does not, for `estimate` is right then.
+    """
+    rows = get_int(ctx, at.ROWS)
+    steps = min(3, get_int(ctx, at.ERROR_DEGREE) - 1)
+    if steps < 1:
+        return 0.0
+    h = abs(get_float(ctx, at.H))
+    decay = get_float(ctx, at.ERROR_DECAY)
+    found, block = get_int(ctx, at.ESTIMATES), get_int(ctx, at.BLOCK)
+    room = found + 64 * rows
+    slowest = -INFINITY
+    for b in range(get_int(ctx, at.BLOCK_COUNT)):
+        i = at.BLOCK_ROOM * b
+        if h * get_float(room, i + 2) > UNSEEN * block_size(ctx, room, b):
+            return 0.0
+    for d in range(rows):
+        b = get_int(block, d)
+        i = 8 * d
+        last = get_float(found, i + 3)
+        if steps == 3:
+            last = max(last, decay * get_float(found, i + 2))
+        if h * last > UNSEEN * block_size(ctx, room, b):
+            slowest = max(slowest, log(last / get_float(room, at.BLOCK_ROOM * b + 1)) / steps)
+    return max(slowest, log(TINY))
+
+
+@compiled
+def estimate_implicit(ctx):
+    """As `estimate`, after the implicit solver, which leaves the polynomial's values in place of the field's.
+
+    Those stay: where h J is large, rounding spoils the field's.
+    """
+    kept = get_int(ctx, at.F)
+    put_int(ctx, at.F, get_int(ctx, at.SUM))
+    evaluate(ctx)
+    found = estimate(ctx)
+    put_int(ctx, at.F, kept)
+    put_int(ctx, at.EVALUATIONS, get_int(ctx, at.EVALUATIONS) + get_int(ctx, at.STAGES))
+    return found
 
 
 @compiled

@@ -41,6 +41,8 @@ class AdaptiveProgram(HBVMProgram):
         The same for the error of the quadrature, by which the energy changes; by default any.
     h : float, optional
         Length of the first step.
+    solver : {"auto", "fixed_point", "newton", "blended"}, optional
+        How the stage equations are solved; see `integrators.hbvm.HBVM`.
     """
 
     varying = True
@@ -54,8 +56,9 @@ class AdaptiveProgram(HBVMProgram):
         tol: float,
         defect: float | None = None,
         h: float | None = None,
+        solver: str = "auto",
     ):
-        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver="fixed_point")
+        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
         started = perf_counter()
         self.tol, self.defect, self.first = tol, defect, h
         made = engine.code()

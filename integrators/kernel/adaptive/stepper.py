@@ -116,6 +116,12 @@ class AdaptiveStepper(HBVMStepper):
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)
 
+    def _take_implicit(self) -> None:
+        """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""
+        super()._take_implicit()
+        self._context.words[layout.HELD] = 0
+        self._context.reals[layout.LENGTH_LIMIT] = np.inf
+
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         words, reals = self._context.words, self._context.reals
@@ -192,4 +198,4 @@ class AdaptiveStepper(HBVMStepper):
                 f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
                 "the solution may end or be singular here."
             )
-        return failure(outcome, self.t, self._context.reals)
+        return failure(outcome, self.t, self._context.reals, self._solver)

@@ -1,9 +1,12 @@
-"""Steps of varying length: each as long as the estimated errors and the iterations allow."""
+"""Steps of varying length: each as long as the estimated errors and the iterations allow.
+
+Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
+"""
 
 from math import log
 
 from integrators.kernel import layout as at
-from integrators.kernel.adaptive.estimate import estimate
+from integrators.kernel.adaptive.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.control import (
     APPROACH,
     CLOSE,
@@ -20,7 +23,15 @@ from integrators.kernel.line.views import two_sum
 from integrators.kernel.loops import sample
 from integrators.kernel.memory import get_float, get_int, put_float, put_int
 from integrators.kernel.products import compiled, evaluate
-from integrators.kernel.solve import ROUNDING, close, rewind, settle, sweep, sweep_tested
+from integrators.kernel.solve import (
+    ROUNDING,
+    close,
+    rewind,
+    settle,
+    solve_implicitly,
+    sweep,
+    sweep_tested,
+)
 from integrators.kernel.step import FARTHEST, prepare, set_step, start_elsewhere, start_plain, take_sizes
 from integrators.kernel.update import commit, update, write
 
@@ -29,14 +40,27 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
 BUSY, BUSY_FIRST = 18.0, 36.0
 GOAL = log(1e-17)  # a change that is going to be no larger is not waited for
-LEAST_RATE, MOST_RATE = log(1e-4), log(0.9)
+FIRST_RATE, LEAST_RATE, MOST_RATE = log(0.01), log(1e-4), log(0.9)
 HOPE = log(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+# The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
+# errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
+# MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
+HELD_BACK_STEPS = 8
+HELD_BACK = 1.2
+GAIN, GAIN_PER_ROW, MOST_ROWS = 8.0, 1.5, 64
+MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
+STAY = 16  # steps for which it then stays
+STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
 
 @compiled
 def attempt(ctx, h):
     """Solve the step of length h from STATE; return the outcome."""
     set_step(ctx, h)
+    if get_int(ctx, at.IMPLICIT):
+        put_float(ctx, at.LOG_RATE, FIRST_RATE)  # nobody knows what it will be afterwards
+        outcome = solve_implicitly(ctx, ctx, 0)
+        return update(ctx) if outcome == at.DONE else outcome
     rewind(ctx)
     prepare(ctx)
     length = get_float(ctx, at.LENGTH)
@@ -110,10 +134,49 @@ def longer(ctx, error, defect, grow):
 
 
 @compiled
+def watch(ctx, factor):
+    """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
+    room = get_float(ctx, at.ERROR_AIM) - get_float(ctx, at.ERROR_AHEAD)
+    if get_float(ctx, at.ALLOWED_DEFECT) < INFINITY:
+        room = min(room, get_float(ctx, at.DEFECT_AIM) - get_float(ctx, at.DEFECT_AHEAD))
+    worth = log(GAIN + GAIN_PER_ROW * min(get_int(ctx, at.ROWS), MOST_ROWS))
+    held_back = factor < HELD_BACK
+    if held_back and room <= worth and get_int(ctx, at.ROWS) <= MOST_ROWS:
+        room = log(get_float(ctx, at.ERROR_DECAY)) - log_decay(ctx)
+    put_int(ctx, at.SLOW, get_int(ctx, at.SLOW) + 1 if held_back and room > worth else 0)
+
+
+@compiled
+def take_over(ctx):
+    """Put the implicit solver to work."""
+    put_int(ctx, at.LEFT, STAY)
+    put_int(ctx, at.SLOW, 0)
+    put_int(ctx, at.IMPLICIT, 1)
+    put_int(ctx, at.SWITCHES, get_int(ctx, at.SWITCHES) + 1)
+    put_float(ctx, at.LENGTH_LIMIT, INFINITY)
+
+
+@compiled
+def learn(ctx):
+    """Set HELD, the steps to wait for the implicit solver, when that has given way to the fixed point again.
+
+    If it did so as soon as it might, steps have not become longer.
+    """
+    waited = max(get_int(ctx, at.HELD), HELD_BACK_STEPS)
+    gained = get_int(ctx, at.LEFT) < -1
+    put_int(ctx, at.HELD, HELD_BACK_STEPS if gained else min(2 * waited, MOST_HELD_BACK_STEPS))
+
+
+@compiled
 def ready(ctx):
     """Solve the step ahead with a length that the tolerance allows; H is its length."""
     if get_int(ctx, at.SOLVED):
         return at.DONE
+    if get_int(ctx, at.SLOW) >= max(get_int(ctx, at.HELD), HELD_BACK_STEPS):
+        if get_int(ctx, at.SOLVER) == 0:
+            put_int(ctx, at.WANTED, 1)
+            return at.BUDGET  # to be continued when it is there
+        take_over(ctx)
     t = get_float(ctx, at.T0)
     allowed, allowed_defect = get_float(ctx, at.ALLOWED_ERROR), get_float(ctx, at.ALLOWED_DEFECT)
     busy = BUSY if get_int(ctx, at.SECOND) else BUSY_FIRST
@@ -124,20 +187,31 @@ def ready(ctx):
         if not abs(h) > SHORTEST * abs(t):
             return failure
         before = get_int(ctx, at.ITERATIONS)
+        implicit = get_int(ctx, at.IMPLICIT)
         outcome = attempt(ctx, h)
+        if implicit and get_int(ctx, at.IMPLICIT) == 0:
+            learn(ctx)
         put_int(ctx, at.SOLVED, 0)
         error, defect = INFINITY, INFINITY
         if outcome == at.DONE:
-            error, defect = estimate(ctx)
+            error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
         factor = longer(ctx, error, defect, grow)
         if error <= allowed and defect <= allowed_defect:
-            factor = min(factor, max(busy / (get_int(ctx, at.ITERATIONS) - before), 0.5))
             limit = get_float(ctx, at.LENGTH_LIMIT) * APPROACH
             put_float(ctx, at.LENGTH_LIMIT, limit)
-            put_float(ctx, at.LENGTH_AFTER, h * min(factor, limit / abs(h)))
+            if implicit:
+                factor = min(1.0 if 1.0 < factor < STEADY else factor, limit / abs(h))
+            else:
+                factor = min(factor, max(busy / (get_int(ctx, at.ITERATIONS) - before), 0.5))
+                factor = min(factor, limit / abs(h))
+                if get_int(ctx, at.STRATEGY) != at.FIXED_POINT:
+                    watch(ctx, factor)
+            put_float(ctx, at.LENGTH_AFTER, h * factor)
             put_int(ctx, at.SOLVED, 1)
             return at.DONE
         failure = at.UNDERFLOW
+        if implicit:
+            put_int(ctx, at.IMPLICIT_STEPS, get_int(ctx, at.IMPLICIT_STEPS) - 1)
         if outcome == at.DONE:
             put_float(ctx, at.LENGTH, h)
             put_int(ctx, at.REJECTED, 1)

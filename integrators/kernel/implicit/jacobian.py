@@ -53,7 +53,6 @@ def differences(ctx, m, field, t):
 @compiled
 def linearize(ctx, m, source, t):
     """Take the Jacobian at `Memory.point` and time t, with the function at ``source``, 0 for differences."""
-    m.real[of.POINT_T] = t
     if source == 0:
         differences(ctx, m, get_int(ctx, at.FIELD), t)
     else:

@@ -23,17 +23,16 @@ FACTORIZE, SOLVE = range(2)
     STALE,  # 1: take a new Jacobian at the next step
     PREDICT,  # 1: the extrapolated start is nearer than the constant one
     SINCE,  # steps since the Jacobian was taken
-    RETURNED,  # 1: `Memory.entries` are to be taken anew at `Memory.point`
     TRIED, CORRECTIONS, JACOBIANS, FACTORIZATIONS, RESCUES, COUNTS,
-) = range(12)  # fmt: skip
+) = range(11)  # fmt: skip
 
 # ... and in Memory.real.
 (
     FACTORED_H,
-    POINT_T,
     CHANGE,  # of the last correction
     RATE,  # by which corrections have contracted with this Jacobian; 1 where that is not known
     CONTRACTION,  # by which one fixed-point iteration contracts, an estimate ...
+    CONTRACTION_H,  # ... of a step of this length, and ...
     RADIUS,  # ... in which this is the part of X_s: its spectral radius, squared in the second-order form
     REALS,
 ) = range(7)

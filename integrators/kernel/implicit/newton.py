@@ -30,7 +30,9 @@ FORGET = 0.7  # of the rate of contraction, from one step to the next
 SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
 HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
-GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
+# Contraction of the fixed-point iteration at which that is to be tried again: with steps of one length, and
+# with varying ones, which it may shorten a little.
+GENTLE, GENTLE_VARYING = 0.25, 0.5
 CALM = 1e-3  # sizes are measured until changes are this small
 SCATTERED = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
 INFINITY = float("inf")
@@ -107,6 +109,7 @@ def renew(ctx, m, source):
         m.point[d] = get_float(get_int(ctx, at.ROW_STATE), d)
     linearize(ctx, m, source, get_float(ctx, at.T0) + get_int(ctx, at.N) * get_float(ctx, at.H))
     m.real[of.CONTRACTION] = m.real[of.RADIUS] * contraction(m)
+    m.real[of.CONTRACTION_H] = get_float(ctx, at.H)
     m.count[of.STALE] = 0
     m.real[of.RATE] = 1.0
 
@@ -156,12 +159,8 @@ def solve_step(ctx, m, method, source, factors, started):
         length = get_float(ctx, at.LENGTH)
         put_int(ctx, at.PREDICTED, 0)
         if length != 0.0 and abs(h / length) <= FARTHEST:
-            start_elsewhere(ctx, ctx, 1.0, h / length)
+            start_elsewhere(ctx, ctx, 0.0 if get_int(ctx, at.REJECTED) else 1.0, h / length)
     set_factor(ctx, m)
-    if m.count[of.RETURNED]:
-        since = m.count[of.SINCE]
-        linearize(ctx, m, source, m.real[of.POINT_T])
-        m.count[of.SINCE], m.count[of.RETURNED] = since, 0
     extrapolated = get_int(ctx, at.PREDICTED)
     if extrapolated:
         project(ctx, m, m.predicted, m.gamma.shape[1] - m.factor.size)
@@ -204,7 +203,11 @@ def solve_step(ctx, m, method, source, factors, started):
     if not started and get_int(ctx, at.STRATEGY) == at.AUTO:
         left = get_int(ctx, at.LEFT) - 1
         put_int(ctx, at.LEFT, left)
-        if left < 0 and m.real[of.CONTRACTION] < GENTLE:
+        longer = abs(h / m.real[of.CONTRACTION_H])
+        if get_int(ctx, at.SECOND):
+            longer *= longer
+        gentle = GENTLE_VARYING if get_int(ctx, at.ERROR_DEGREE) else GENTLE
+        if left < 0 and longer * m.real[of.CONTRACTION] < gentle:
             put_int(ctx, at.IMPLICIT, 0)
     tried = m.count[of.TRIED]
     put_float(ctx, at.LAST, m.real[of.CHANGE])

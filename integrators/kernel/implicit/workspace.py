@@ -128,8 +128,6 @@ class Workspace:
     ----------
     count, real : ndarray
         See `integrators.kernel.implicit.layout`.
-    point : ndarray, shape (rows,)
-        Where the Jacobian was taken.
     increment : ndarray, shape (dim,)
         What the solved step adds to the state.
     traced : bool
@@ -146,7 +144,6 @@ class Workspace:
         self._kept = _arrays(shape, self.method, linearization.places(shape.rows), elsewhere)
         self.count: Integers = self._kept["count"]
         self.real: Array = self._kept["real"]
-        self.point: Array = self._kept["point"]
         self.increment: Array = self._kept["increment"]
         self.real[of.RADIUS] = self.method.radius
         self.factors = Factors(self._kept, second=shape.second) if elsewhere else None
@@ -170,17 +167,22 @@ class Workspace:
         """Of the iteration."""
         return "blended" if self._words[of.METHOD] == of.BLENDED else "Newton"
 
+    @property
+    def _lasting(self) -> tuple[Any, ...]:
+        """What goes from step to step, but for the factors, which follow from the Jacobian's entries."""
+        return self.count, self.real, self.increment, self._kept["entries"]
+
     def save(self) -> tuple[Any, ...]:
         """Return copies of all that the continuation depends on."""
-        return tuple(array.copy() for array in (self.count, self.real, self.point, self.increment))
+        return tuple(array.copy() for array in self._lasting)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what `save` returned; the counters of the work done keep counting."""
         work = self.count[of.TRIED :].copy()
-        for array, kept in zip((self.count, self.real, self.point, self.increment), saved, strict=True):
+        for array, kept in zip(self._lasting, saved, strict=True):
             array[:] = kept
         self.count[of.TRIED :] = work
-        self.count[of.RETURNED] = self.count[of.LINEARIZED]
+        self.count[of.FACTORED] = 0
 
     def raise_what_is_no_failure(self) -> None:
         """Raise what stopped a factorization, unless that is a singular matrix: Ctrl-C, no memory left."""

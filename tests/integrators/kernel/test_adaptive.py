@@ -236,8 +236,6 @@ def test_what_cannot_be_done_is_refused_with_the_fix():
         HBVM(h=0.1)
     with pytest.raises(InputError, match="one stage tells nothing about its error"):
         HBVM(k=1, s=1, tol=1e-8)
-    with pytest.raises(InputError, match="HBVM solves steps of varying length by fixed-point iteration"):
-        HBVM(tol=1e-8, solver="newton")
     with pytest.raises(InputError, match="Gauss needs a step h, or a tolerance tol"):
         Gauss(s=2)
     with pytest.raises(InputError, match="Gauss needs k > 1"):
