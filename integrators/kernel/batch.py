@@ -17,6 +17,7 @@ from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.protocol import Array, Status, check_state, check_times
+from integrators.trajectories import Trajectories
 from problems.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -27,29 +28,15 @@ SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
-    """Trajectories of one system.
+class Batch(Trajectories):
+    """Trajectories of one system, and what the kernel counts besides steps.
 
     Attributes
     ----------
-    t : ndarray, shape (m,)
-        Times.
-    y : ndarray, shape (n, m, dim)
-        States; NaN where a trajectory did not arrive.
-    status, reason : list, length n
-        How each trajectory ended, and one sentence where it failed.
-    t_stop : ndarray, shape (n,)
-        The last time, or that of the last own step before a failure.
-    steps, iterations, evaluations : ndarray of int, shape (n,)
+    iterations, evaluations : ndarray of int, shape (n,)
         Work done per trajectory.
     """
 
-    t: Array
-    y: Array
-    status: list[Status]
-    reason: list[str]
-    t_stop: Array
-    steps: Counts
     iterations: Counts
     evaluations: Counts
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.peers.heyoka_batch import Lanes, TaylorBatch
+from integrators.peers.heyoka_batch import Lanes
 from integrators.peers.options import UNTRACED, flag, load, number
 from integrators.peers.stepper import CRAWL_STEPS, Crawl, PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
@@ -134,7 +134,7 @@ class TaylorProgram(PeerProgram):
         *,
         times: ArrayLike,
         t0: float = 0.0,
-    ) -> TaylorBatch:
+    ) -> Trajectories:
         """Integrate many starts to the same times by heyoka's batch integrator.
 
         It is compiled when this is first called. Every lane has steps of its own; the

@@ -1,45 +1,17 @@
 """Many trajectories by heyoka's batch integrator: one trajectory in each lane of the vector unit."""
 
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from integrators.peers.options import load
 from integrators.protocol import Array, Status, check_state, check_times
+from integrators.trajectories import Counts, Trajectories
 from problems import emit
 from problems.errors import InputError
 from problems.system import System
-
-Counts = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class TaylorBatch:
-    """Trajectories of one system.
-
-    Attributes
-    ----------
-    t : ndarray, shape (m,)
-        Times.
-    y : ndarray, shape (n, m, dim)
-        States; NaN where a trajectory did not arrive.
-    status, reason : list, length n
-        How each trajectory ended, and one sentence where it failed.
-    t_stop : ndarray, shape (n,)
-        The last time, or that of the last step before a failure.
-    steps : ndarray of int, shape (n,)
-        Accepted steps.
-    """
-
-    t: Array
-    y: Array
-    status: list[Status]
-    reason: list[str]
-    t_stop: Array
-    steps: Counts
 
 
 class Lanes:
@@ -67,12 +39,12 @@ class Lanes:
         )
         self.compile_seconds = perf_counter() - started
 
-    def run(self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float) -> TaylorBatch:
+    def run(self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float) -> Trajectories:
         """Integrate every start to all times; see `integrators.peers.heyoka.TaylorProgram.batch`."""
         given, parameters = self._given(starts, par)
         grid = check_times(times, t0)
         n = len(given)
-        result = TaylorBatch(
+        result = Trajectories(
             t=grid,
             y=np.full((n, grid.size, self.system.dim), np.nan),
             status=[Status.FINISHED] * n,
@@ -86,7 +58,7 @@ class Lanes:
             self._group(result, members[: min(self.size, n - first)], given[members], parameters[members], t0)
         return result
 
-    def _group(self, result: TaylorBatch, members: Counts, starts: Array, par: Array, t0: float) -> None:
+    def _group(self, result: Trajectories, members: Counts, starts: Array, par: Array, t0: float) -> None:
         ta, lanes = self._ta, range(len(members))
         ta.set_time(t0)
         ta.state[:] = starts.T
