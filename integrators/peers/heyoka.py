@@ -16,6 +16,7 @@ from integrators.peers.heyoka_batch import Lanes
 from integrators.peers.options import UNTRACED, flag, load, number
 from integrators.peers.stepper import CRAWL_STEPS, Crawl, PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
+from integrators.trajectories import Trajectories
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)
