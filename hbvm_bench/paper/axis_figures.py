@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hbvm_bench.paper.axis_motion import START, Growth
-from hbvm_bench.paper.document import MOTION, SEQUENTIAL, WIDTH, sheet
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
+from hbvm_bench.paper.document import MOTION, SEQUENTIAL, WIDTH, picture, sheet
+from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.style import INK, MUTED, PAPER
 from integrators.protocol import Array
 

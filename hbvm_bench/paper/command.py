@@ -1,20 +1,23 @@
 """``hbvm-bench paper``: run the paper's experiments and write the report."""
 
-import csv
-import io
 import os
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hbvm_bench import terminal
+from hbvm_bench.report import plots
 from hbvm_bench.report.png import small
 from hbvm_bench.store import atomic, ensure_writable
 from problems.errors import unknown
+
+if TYPE_CHECKING:  # what computes costs seconds to import
+    from collections.abc import Sequence
+
+    from hbvm_bench.paper.document import Part
 
 PARTS = ("sitnikov", "henon-heiles", "period-annulus", "claims")
 DEFAULT = Path("reports/paper")
@@ -58,7 +61,6 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
     float
         Seconds that it took.
     """
-    from hbvm_bench.paper.page import flat_heads, markdown, page
     from hbvm_bench.paper.tasks import run_all
 
     started = time.perf_counter()
@@ -73,24 +75,31 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
         console.print(f"  {count}/{len(tasks)} {key}: {seconds:.1f} s", markup=False)
 
     results = run_all(tasks, jobs, done)
-    parts = [module.part(results) for module in modules]
-    files: dict[Path, bytes] = {
-        Path("report.md"): markdown(parts, command).encode(),
-        Path("index.html"): page(parts, command).encode(),
+    write_parts([module.part(results) for module in modules], directory, command)
+    return time.perf_counter() - started
+
+
+def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
+    """Write the documents, figures and data of parts that are computed already."""
+    from hbvm_bench.paper.page import as_csv, claims_csv, flat_heads, markdown, page
+
+    files: dict[str, bytes] = {
+        "report.md": markdown(parts, command).encode(),
+        "index.html": page(parts, command).encode(),
+        "data/claims.csv": claims_csv(parts).encode(),
     }
     for part in parts:
         for picture in part.pictures:
-            files[Path("figures") / f"{picture.key}.svg"] = picture.svg.encode()
-            files[Path("figures") / f"{picture.key}.png"] = small(picture.png)
+            files[f"figures/{picture.key}.svg"] = picture.svg.encode()
+            files[f"figures/{picture.key}.png"] = small(picture.png)
+            if picture.plot is not None:
+                files[f"data/{picture.key}.csv"] = plots.as_csv(picture.plot).encode()
         for table in part.tables:
-            files[Path("data") / f"{table.key}.csv"] = _csv([flat_heads(table), *table.rows])
-    claims = [(part.title, c.words, c.paper, c.here, c.verdict) for part in parts for c in part.claims]
-    files[Path("data") / "claims.csv"] = _csv([("part", "claim", "paper", "here", "verdict"), *claims])
+            files[f"data/{table.key}.csv"] = as_csv([flat_heads(table), *table.rows]).encode()
     for name, data in files.items():
         (directory / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic(directory / name) as temporary:
             temporary.write_bytes(data)
-    return time.perf_counter() - started
 
 
 def _module(name: str) -> ModuleType:
@@ -98,9 +107,3 @@ def _module(name: str) -> ModuleType:
 
     modules = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
     return modules[PARTS.index(name)]
-
-
-def _csv(rows: Sequence[Sequence[str]]) -> bytes:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue().encode()

@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from hbvm_bench.report import canvas
 from hbvm_bench.report.canvas import Picture, new
-from hbvm_bench.report.style import OTHERS, base_colours
+from hbvm_bench.report.read_off import read_off
+from hbvm_bench.report.style import MARKERS, OTHERS, UNKNOWN_MARKER, Look, base_colours
 
 VERDICTS = {
     "holds": "confirmed",
@@ -19,6 +21,12 @@ VERDICTS = {
 GAUSS, GAUSS_DARK = base_colours("Gauss")
 HBVM, HBVM_DARK = base_colours("HBVM")
 MOTION, MOTION_DARK = OTHERS[0]  # of what is a property of the motion, not of a method
+LOOKS = (
+    Look(1, GAUSS, GAUSS_DARK, (), MARKERS["Gauss"]),
+    Look(2, HBVM, HBVM_DARK, (), MARKERS["HBVM"]),
+    Look(3, MOTION, MOTION_DARK, (), UNKNOWN_MARKER),
+)
+NAMES = {1: "Gauss", 2: "HBVM", 3: "the motion itself"}
 SEQUENTIAL = LinearSegmentedColormap.from_list(
     "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
@@ -126,3 +134,9 @@ def sheet(width: float, height: float) -> Figure:
     figure = new(width, height)
     figure.set_layout_engine("constrained")
     return figure
+
+
+def picture(figure: Figure, key: str, title: str, caption: str, summary: str) -> Picture:
+    """Render a figure with the numbers that are read off it; the same figure gives the same bytes."""
+    plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
+    return canvas.picture(figure, key, title, caption, summary, plot)

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
-from hbvm_bench.paper.document import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, sheet
+from hbvm_bench.paper.document import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, sheet
 from hbvm_bench.paper.henon_heiles import GAP, T_END, H, Orbit, potential
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture, power_label
+from hbvm_bench.report.canvas import Picture, drawing, log_axis, power_label
 from hbvm_bench.report.figures import envelope
 from hbvm_bench.report.style import INK, MUTED, PAPER
 from integrators.protocol import Array

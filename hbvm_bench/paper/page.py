@@ -1,27 +1,17 @@
 """The paper report as markdown and as one self-contained page."""
 
+import csv
+import io
 import re
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from hbvm_bench.paper.document import (
-    GAUSS,
-    GAUSS_DARK,
-    HBVM,
-    HBVM_DARK,
-    MOTION,
-    MOTION_DARK,
-    VERDICTS,
-    Part,
-    Table,
-)
+from hbvm_bench.paper.document import LOOKS, NAMES, VERDICTS, Part, Table
+from hbvm_bench.report import shell
 from hbvm_bench.report.canvas import Picture, inline_svg
 from hbvm_bench.report.markdown import code, plain
-from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS
 
 TITLE = "The seed paper, run again"
 PAPER = (
@@ -33,13 +23,13 @@ LEAD = (
     "the two differ, the difference is explained; where the paper is silent, it is measured."
 )
 ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
-COLOURS = {GAUSS: "--gauss", HBVM: "--hbvm", MOTION: "--motion"}
+COLOURS = {look.light: f"--m{look.number}" for look in LOOKS}
 
 
 def markdown(parts: Sequence[Part], command: str) -> str:
     """Return the report as markdown with relative links to its figures."""
-    environment = _environment(autoescape=False)
-    environment.filters |= {"plain": plain, "code": code, "prose": prose}
+    environment = shell.environment("hbvm_bench.paper", autoescape=False)
+    environment.filters |= {"code": code, "prose": prose}
     environment.globals |= {"kind": kind, "cell": markdown_cell, "heads": flat_heads}
     text = environment.get_template("paper.md.j2").render(**_values(parts, command))
     return re.sub(r"\n{3,}", "\n\n", text)
@@ -47,22 +37,28 @@ def markdown(parts: Sequence[Part], command: str) -> str:
 
 def page(parts: Sequence[Part], command: str) -> str:
     """Return the report as an HTML document from which no request leaves."""
-    environment = _environment(autoescape=True)
+    environment = shell.environment("hbvm_bench.paper", autoescape=True)
     environment.filters |= {"prose": html_prose}
-    environment.globals |= {
-        "kind": kind,
-        "cell": html_cell,
-        "figure": drawing,
-    }
+    environment.globals |= {"kind": kind, "cell": html_cell}
+    pictures = [picture for part in parts for picture in part.pictures]
+    css = shell.text("hbvm_bench.paper", "paper.css")
+    shared = shell.values(pictures, LOOKS, names=NAMES, data={"csv": claims_csv(parts)}, css=css)
     return environment.get_template("paper.html.j2").render(
-        **_values(parts, command),
-        css=Markup(_style("hbvm_bench.report", "style.css") + _style("hbvm_bench.paper", "paper.css")),
-        script=Markup(_style("hbvm_bench.report", "script.js")),
-        light=_variables({name: colour for colour, name in (NEUTRALS | COLOURS).items()}),
-        dark=_variables(
-            DARK_NEUTRALS | {"--gauss": GAUSS_DARK, "--hbvm": HBVM_DARK, "--motion": MOTION_DARK}
-        ),
+        **_values(parts, command), **shared | {"drawing": drawing}
     )
+
+
+def claims_csv(parts: Sequence[Part]) -> str:
+    """Return all claims as one table."""
+    rows = [(part.title, c.words, c.paper, c.here, c.verdict) for part in parts for c in part.claims]
+    return as_csv([("part", "claim", "paper", "here", "verdict"), *rows])
+
+
+def as_csv(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as text."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
 
 
 def drawing(picture: Picture) -> Markup:
@@ -139,22 +135,3 @@ def _values(parts: Sequence[Part], command: str) -> Mapping[str, Any]:
         "counts": {key: sum(claim.verdict == key for claim in claims) for key in VERDICTS},
         "total": len(claims),
     }
-
-
-def _environment(*, autoescape: bool) -> Environment:
-    return Environment(
-        loader=PackageLoader("hbvm_bench.paper", "templates"),
-        autoescape=autoescape,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-
-
-def _variables(values: Mapping[str, str]) -> Markup:
-    return Markup("".join(f"{name}:{value};" for name, value in values.items()))
-
-
-def _style(package: str, name: str) -> str:
-    return (files(package) / "templates" / name).read_text(encoding="utf-8")

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, sheet
+from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.paper.period_annulus import SPAN, energy
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
+from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.style import INK, MUTED, TRUTH
 from integrators.protocol import Array
 from problems.period_annulus import H_STAR, P1

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from hbvm_bench.paper.document import HBVM, WIDTH, sheet
+from hbvm_bench.paper.document import HBVM, WIDTH, picture, sheet
 from hbvm_bench.paper.properties import Order
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
+from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.style import INK, MUTED, PAPER, TRUTH
 
 MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))
@@ -30,6 +30,7 @@ def order(rows: Sequence[Order]) -> Picture:
                     mfc=HBVM if row.k == s else "none",
                     markersize=3 if row.k == s else 7,
                     linewidth=0.8,
+                    label=f"_HBVM(k={row.k}, s={row.s})",
                 )
             axes.annotate(
                 f"s = {s}: {min(r.slope for r in chosen):.2f} … {max(r.slope for r in chosen):.2f}",
@@ -91,9 +92,11 @@ def _threshold(axes: Axes, rows: Sequence[Row], nu: int) -> None:
         k = np.array([row[1] for row in rows if row[0] == s])
         error = np.array([row[2] for row in rows if row[0] == s])
         exact = 2 * k >= nu * s
-        axes.plot(k, error, color=HBVM, alpha=0.35 + 0.13 * s, linewidth=0.9, zorder=2)
+        axes.plot(k, error, color=HBVM, alpha=0.35 + 0.13 * s, linewidth=0.9, zorder=2, label=f"_s = {s}")
         axes.plot(k[exact], error[exact], MARKERS[s], color=HBVM, markersize=5, label=f"s = {s}")
-        axes.plot(k[~exact], error[~exact], MARKERS[s], mfc=PAPER, mec=HBVM, markersize=5)
+        axes.plot(
+            k[~exact], error[~exact], MARKERS[s], mfc=PAPER, mec=HBVM, markersize=5, label=f"_s = {s}, fewer"
+        )
     axes.axhspan(1e-17, 5e-15, color=TRUTH, alpha=0.18, linewidth=0)
     axes.text(15.4, 2.5e-17, "round-off", fontsize=8, color=MUTED, ha="right")
     log_axis(axes, "y", -17, 0, most=9)

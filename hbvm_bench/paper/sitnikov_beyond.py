@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, Table, number, sheet
+from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, Table, number, picture, sheet
 from hbvm_bench.paper.sitnikov import DEGREE, T_END, StepRow, usable
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
+from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.style import INK, MUTED, TRUTH
 from integrators.protocol import Array
 

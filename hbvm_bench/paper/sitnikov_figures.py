@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, sheet
+from hbvm_bench.paper.document import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, picture
+from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures import envelope
 from hbvm_bench.report.style import INK, MUTED, TRUTH
 from integrators.protocol import Array

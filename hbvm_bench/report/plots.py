@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 DIGITS = 4  # significant ones of what is drawn; the store has them all
+NEAR = 0.02  # of a curve's length before its first point: a bin of an envelope may begin so late
 TABLE_COLUMNS = 6  # places on the horizontal axis that the table of a curve shows
 
 
@@ -46,6 +47,8 @@ class Trace:
         A law is drawn thin over its case; the truth is neutral.
     note : str
         What the law says.
+    joined : bool
+        Whether a line goes through the points.
     """
 
     case: int
@@ -54,6 +57,7 @@ class Trace:
     y: Array
     role: Literal["case", "law", "truth"] = "case"
     note: str = ""
+    joined: bool = True
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,7 @@ def as_json(plot: Plot) -> dict[str, Any]:
                         "name": trace.name,
                         "role": trace.role,
                         "note": trace.note,
+                        "joined": trace.joined,
                         "x": [short(value) for value in trace.x.tolist()],
                         "y": [short(value) for value in trace.y.tolist()],
                     }
@@ -188,10 +193,10 @@ def _places(xs: Sequence[Array], *, log: bool) -> list[float]:
 
 
 def _at(trace: Trace, place: float) -> str:
-    """Return the value at the last point that is not after a place; curves are not extended."""
+    """Return the value at the point nearest to a place; curves are not extended."""
     known = np.isfinite(trace.x)
     x, y = trace.x[known], trace.y[known]
-    if x.size == 0 or place > x[-1] * (1 + 1e-3) + 1e-12:
+    if x.size == 0 or place > x[-1] * (1 + 1e-3) + 1e-12 or place < x[0] - NEAR * (x[-1] - x[0]):
         return "–"
     return _text(float(y[np.argmin(np.abs(x - place))]))
 

@@ -1,4 +1,4 @@
-"""The pages of the race and of endurance in a real browser: what all pages share works."""
+"""The pages of the race, of endurance and of the paper in a real browser: what all pages share works."""
 
 import re
 
@@ -10,6 +10,10 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from hbvm_bench.endure import report as endure
+from hbvm_bench.paper import command as paper
+from hbvm_bench.paper.document import Claim, Part, Table
+from hbvm_bench.paper.properties import Order
+from hbvm_bench.paper.properties_figures import order
 from hbvm_bench.race import report as race
 
 from . import test_endure
@@ -20,13 +24,23 @@ __all__ = ["browser"]  # a fixture
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium on this machine")
 
 
-@pytest.fixture(scope="module", params=["race", "endure"])
+def made_up_part():
+    """Return a part of the paper's report with one of everything."""
+    rows = [Order(s, s, [0.2, 0.1], [0.2 ** (2 * s), 0.1 ** (2 * s)], 2.0 * s) for s in (1, 2)]
+    claim = Claim("It is of order 2s", "Section 2", "2.00 at `h=0.1`, 3.4e-15", "holds")
+    table = Table("numbers", "Numbers", ("method", "error"), (("Gauss(s=2)", "3.4e-15"),), frozenset({1}))
+    return Part("made-up", "Made up", ["A sentence."], [claim], [order(rows), table])
+
+
+@pytest.fixture(scope="module", params=["race", "endure", "paper"])
 def folder(request, tmp_path_factory):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
         race.write([made_up()], target)
-    else:
+    elif request.param == "endure":
         endure.write(test_endure.made(years=1e5, starts=3), target)
+    else:
+        paper.write_parts([made_up_part()], target, "hbvm-bench paper")
     return target
 
 

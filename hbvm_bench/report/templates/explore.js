@@ -135,10 +135,10 @@
       for (const t of panel.traces) {
         const look = looks[t.case] ?? { dash: "solid", symbol: "circle-open" };
         const zeros = panel.y.log ? t.y.map((v) => (v === 0 ? least : v)) : t.y;
-        const lines = t.role === "law" || ((plot.kind === "lines" || plot.kind === "paths") && t.role !== "truth");
+        const lines = t.role === "law" || (t.joined && (plot.kind === "lines" || plot.kind === "paths") && t.role !== "truth");
         traces.push({
           type: "scatter",
-          mode: plot.dotted && t.role === "case" ? "markers" : lines ? (t.x.length < 80 && t.role === "case" ? "lines+markers" : "lines") : "markers",
+          mode: lines ? (t.x.length < 80 && t.role === "case" ? "lines+markers" : "lines") : "markers",
           name: safe(t.case ? `${t.case}  ${t.name}` : t.name),
           x: t.x,
           y: zeros,
