@@ -14,6 +14,7 @@ import pytest
 import integrators
 import problems
 from integrators import HBVM, Gauss, integrate
+from integrators.kernel.adaptive.stepper import AdaptiveStepper
 from integrators.protocol import Status
 from problems import Foreign, Hamiltonian, Problem, VectorField
 
@@ -210,3 +211,12 @@ def test_fast_modes_in_motion_are_followed_with_the_energy_at_round_off():
         assert made.stats.steps > 2e3
         ends.append(made.y[-1])
     assert np.abs(ends[0] - ends[1]).max() < 1e-3
+
+
+def test_a_number_of_steps_is_that_number_where_newton_takes_over_on_the_way():
+    stepper = HBVM(tol=1e-8).compile(ROBERTSON.system).start(ROBERTSON.y0)
+    assert isinstance(stepper, AdaptiveStepper)
+    for _ in range(30):
+        stepper.take(10)
+    assert stepper.stats.steps == 300
+    assert stepper.stats.extra["implicit"]["steps"] > 0

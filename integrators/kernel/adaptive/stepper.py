@@ -125,7 +125,7 @@ class AdaptiveStepper(HBVMStepper):
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         words, reals = self._context.words, self._context.reals
-        if not (end - self.t) * reals[layout.NEXT_LENGTH] < 0.0:
+        if not np.sign(end - self.t) * reals[layout.NEXT_LENGTH] < 0.0:
             return
         reals[layout.NEXT_LENGTH] *= -1.0
         if words[layout.SOLVED]:
@@ -163,7 +163,7 @@ class AdaptiveStepper(HBVMStepper):
         self._face(end)
         outcome, steps, reals = layout.BUDGET, 0, self._context.reals
         while outcome == layout.BUDGET and (limit is None or steps < limit):
-            n = limit or CHUNK
+            n = CHUNK if limit is None else limit - steps  # fewer come where the implicit solver is made
             if longest < math.inf:
                 n = 1
                 reals[layout.NEXT_LENGTH] = np.clip(reals[layout.NEXT_LENGTH], -longest, longest)
