@@ -58,7 +58,7 @@ def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture |
             axes,
             members,
             markers=True,
-            notes={case.record.id: text(laws[case.record.id]) for case in members},
+            notes={case.record.id: text(laws[case.record.id]).replace(" to ", "–") for case in members},
         )
     starts = max(law.starts for law in laws.values())
     over = (

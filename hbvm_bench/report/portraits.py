@@ -18,6 +18,7 @@ COLUMNS = 6
 MOST = 3000  # points of one case that are drawn
 PAGE_POINTS = 700  # and that the page carries
 FEWEST_CROSSINGS = 20
+FARTHEST = 3.0  # times the usual width: a wider cloud is cut at the edge of its panel
 COARSEST = 0.5  # of the largest |q1| between two samples: beyond, a crossing is a guess
 
 
@@ -88,7 +89,7 @@ def _grid(
     height = 2.3 * rows
     figure = new(WIDTH, height)
     figure.subplots_adjust(
-        left=0.045, right=0.99, top=1 - 0.26 / height, bottom=0.42 / height, hspace=0.5, wspace=0.12
+        left=0.055, right=0.99, top=1 - 0.26 / height, bottom=0.42 / height, hspace=0.5, wspace=0.12
     )
     grid = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey=True).ravel().tolist()
     reach = [_reach([x for _, x, _ in clouds]), _reach([y for _, _, y in clouds])]
@@ -104,9 +105,13 @@ def _grid(
             f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=8, color=INK
         )
         words = options(case.record)
+        lowest = axes in grid[max(len(clouds) - COLUMNS, 0) : len(clouds)]
+        if lowest:  # of its column
+            axes.tick_params(labelbottom=True)
+            axes.text(1.0, -0.2, labels[0], transform=axes.transAxes, fontsize=8, ha="right", va="top")
         axes.text(
             0.0,
-            -0.2 if axes in grid[len(clouds) - COLUMNS : len(clouds)] else -0.08,
+            -0.2 if lowest else -0.08,
             words if len(words) < 34 else words[:33] + "…",
             transform=axes.transAxes,
             fontsize=6,
@@ -130,8 +135,9 @@ def _grid(
 
 def _reach(values: Sequence[Array]) -> tuple[float, float]:
     """Return the limits that nearly all values lie in: one case that escaped must not shrink the others."""
-    lows = sorted(float(np.nanmin(v)) for v in values)
-    highs = sorted(float(np.nanmax(v)) for v in values)
-    low, high = lows[len(lows) // 2], highs[len(highs) // 2]
+    ends = [(float(np.nanmin(v)), float(np.nanmax(v))) for v in values]
+    usual = FARTHEST * sorted(high - low for low, high in ends)[len(ends) // 2]
+    kept = [(low, high) for low, high in ends if high - low <= usual] or ends
+    low, high = min(low for low, _ in kept), max(high for _, high in kept)
     margin = 0.08 * (high - low or 1.0)
     return low - margin, high + margin

@@ -18,6 +18,7 @@ from hbvm_bench.report.drift_figure import drift_figure
 from hbvm_bench.report.figures import Drawn, OverTime
 from hbvm_bench.report.motion import Motion
 from hbvm_bench.report.style import Look, method_name
+from hbvm_bench.report.work_precision import work_precision
 from hbvm_bench.store import Store
 from hbvm_bench.table import GROUPS, Row, group_of, rows
 from problems.problem import Problem
@@ -121,7 +122,7 @@ def _pictures(
         main = telling(cases)
         with drawing():
             made = [
-                figures.work_precision(cases),
+                work_precision(cases),
                 drift_figure(main),
                 figures.over_time(main, OVER_TIME[0]),
                 portraits.portrait(problem, main),
@@ -137,7 +138,7 @@ def _pictures(
             if p is not None
         ]
     with drawing():
-        made = [figures.work_precision(cases), drift_figure(cases)]
+        made = [work_precision(cases), drift_figure(cases)]
         made += [figures.over_time(cases, what) for what in OVER_TIME]
         made += [figures.over_time(cases, what) for what in _other_invariants(cases)]
         made += [portraits.portrait(problem, cases), portraits.section(problem, cases)]
