@@ -24,7 +24,7 @@ from integrators.kernel.products import compiled, multiply, offset, product, pro
 
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good
-LARGE = 1e200
+SMALLEST, LARGE = 1e-200, 1e200  # a block smaller than that has no size to divide by
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 
 
@@ -213,8 +213,8 @@ def take_sizes(ctx):
         b = get_int(block, d)
         own = get_float(size, b)
         floor = max(own, FLOOR * get_float(biggest, get_int(group, b)))
-        known = known and own > 0.0
-        # Whatever moves a block of size 0 is a large change; and then it has a size: look again.
-        put_float(strict, d, 1.0 / own if own > 0.0 else LARGE)
-        put_float(floored, d, 1.0 / floor if floor > 0.0 else LARGE)
+        known = known and own > SMALLEST
+        # Whatever moves a block of no size is a large change; and then it has a size: look again.
+        put_float(strict, d, 1.0 / own if own > SMALLEST else LARGE)
+        put_float(floored, d, 1.0 / floor if floor > SMALLEST else LARGE)
     put_int(ctx, at.AGE, SIZES_LAST if known else 0)

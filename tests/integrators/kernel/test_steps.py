@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
+import problems
 from integrators import legendre
 from integrators.kernel import field, layout, native, tables
 from integrators.kernel.program import HBVMProgram
@@ -203,3 +204,12 @@ def test_a_field_that_cannot_run_on_lanes_runs_stage_by_stage(chain, driven, mon
         assert alone.stats.extra["lanes"] is False
         assert alone.stats.evaluations == stepper.stats.evaluations
         assert np.array_equal(found, states)
+
+
+@pytest.mark.parametrize("q", [5e-324, 2.2e-309, 1e-201])
+def test_a_start_too_small_to_divide_by_is_as_good_as_zero(q):
+    problem = problems.load("pendulum")
+    program = HBVMProgram(problem.system, k=8, s=4, h=0.1)
+    tiny, zero = (program.start([start, 0.375], problem.par).advance([10.0]) for start in (q, 0.0))
+    assert tiny.status is Status.FINISHED
+    assert np.abs(tiny.y - zero.y).max() < 1e-14  # measured 0
