@@ -139,6 +139,7 @@ RECURRENCE = (
 )
 
 FUSED = 112  # address of whole sweeps, void(context, count, tested); 0: none, see `integrators.kernel.fused`
+LEAST_SLOPE = 114  # double: of a block's field beside the largest in its group, where errors are estimated
 CHANGE = 113  # double: the largest change of the last fused sweep
 
 CONTEXT = 120

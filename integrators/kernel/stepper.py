@@ -197,7 +197,7 @@ class HBVMStepper:
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         reals, targets = self._context.reals, int(self._context.words[layout.N]) + np.arange(1, count + 1)
-        times = float(reals[layout.T0]) + targets * float(reals[layout.H])
+        times = np.asarray(float(reals[layout.T0]) + targets * float(reals[layout.H]), dtype=np.float64)
         return self._run(layout.SIDE, times, targets, np.zeros(count))
 
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.diffrax import DiffraxMethod, Dopri8
 from integrators.peers.options import load
-from integrators.peers.stepper import CRAWL_STEPS, Crawl, FixedStepper, PeerProgram, PeerStepper
+from integrators.peers.stepper import FixedStepper, PeerProgram, PeerStepper
 from integrators.protocol import Array, Status, Stepper
 from problems.errors import InputError
 from problems.problem import System

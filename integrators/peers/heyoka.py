@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.heyoka_batch import Lanes
 from integrators.peers.options import UNTRACED, flag, load, number
-from integrators.peers.stepper import CRAWL_STEPS, Crawl, PeerProgram, PeerStepper
+from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
 from integrators.trajectories import Trajectories
 from problems.problem import Problem, System

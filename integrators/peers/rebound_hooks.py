@@ -17,8 +17,8 @@ from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from integrators.crawl import CRAWL_SHARE, CRAWL_STEPS
 from integrators.peers.options import load
-from integrators.peers.stepper import CRAWL_SHARE, CRAWL_STEPS
 from integrators.protocol import Array
 
 FROZEN = 128

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from integrators.crawl import CRAWL_STEPS
 from integrators.peers.options import choice, number
 from integrators.peers.rebound_program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
-from integrators.peers.stepper import CRAWL_STEPS, PeerStepper
+from integrators.peers.stepper import PeerStepper
 from integrators.protocol import Array, Status
 from problems.errors import InputError
 from problems.problem import Problem, System

@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.crawl import Crawl
 from integrators.peers.options import load, number
-from integrators.peers.stepper import Crawl, PeerProgram, PeerStepper
+from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
 from problems.errors import InputError
 from problems.problem import Problem, System

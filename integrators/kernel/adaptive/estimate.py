@@ -49,7 +49,9 @@ def estimate(ctx):
     j >= s, are of size h^j. ``h |gamma_s|^2 / |gamma|`` has the order 2s + 1 of the
     local error, and its units; with the last one that k nodes see, gamma_{k-1}, it is
     of the size of the quadrature's error or larger. Both relative to the size of each
-    block of the state; the largest of all.
+    block of the state; the largest of all. A block whose field is nothing beside that of
+    others in its group may be moved by their rounding alone, which no step is short
+    enough for: its gamma counts as a part of theirs.
     """
     rows = get_int(ctx, at.ROWS)
     h = abs(get_float(ctx, at.H))
@@ -65,8 +67,10 @@ def estimate(ctx):
     room = found + 64 * rows
     for i in range(at.BLOCK_ROOM * blocks):
         put_float(room, i, 0.0)
+    steepest = room + 8 * at.BLOCK_ROOM * blocks
     for g in range(get_int(ctx, at.GROUP_COUNT)):
         put_float(largest, g, 0.0)
+        put_float(steepest, g, 0.0)
     for d in range(rows):
         b = at.BLOCK_ROOM * get_int(block, d)
         i = 8 * d
@@ -83,10 +87,12 @@ def estimate(ctx):
     for b in range(blocks):
         g = get_int(group, b)
         put_float(largest, g, max(get_float(largest, g), get_float(room, at.BLOCK_ROOM * b)))
+        put_float(steepest, g, max(get_float(steepest, g), get_float(room, at.BLOCK_ROOM * b + 1)))
+    least = get_float(ctx, at.LEAST_SLOPE)
     error, defect = 0.0, 0.0
     for b in range(blocks):
         i = at.BLOCK_ROOM * b
-        slope = get_float(room, i + 1)
+        slope = max(get_float(room, i + 1), least * get_float(steepest, get_int(group, b)))
         if slope > 0.0:
             part = h / slope / block_size(ctx, room, b)
             error = max(error, part * get_float(room, i + 2) ** 2)

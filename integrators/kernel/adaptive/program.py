@@ -25,6 +25,13 @@ much as one that is taken: with 1 a fifth of the steps are rejected and all prob
 race take 5 to 20 % longer.
 """
 
+OF_A_BODY, OF_A_COMPONENT = 1e-6, 1e-4
+"""What the field of a block counts as at least, as a part of the largest in its group.
+
+A light body is an object of its own; single components next to nodes or turning points
+of a lattice are moved by the others' rounding.
+"""
+
 
 class AdaptiveProgram(HBVMProgram):
     """HBVM(k, s) with steps as long as a tolerance allows, compiled for one system.
@@ -87,11 +94,13 @@ class AdaptiveProgram(HBVMProgram):
         """Return fresh memory for a trajectory, or for its partial steps."""
         context = super().context(side=True)  # with a matrix of its own
         shape = self.shape
-        room = 8 * shape.rows + layout.BLOCK_ROOM * shape.group.size
+        room = 8 * shape.rows + (layout.BLOCK_ROOM + 1) * shape.group.size
         context.point({"ESTIMATORS": self._estimators, "ESTIMATES": aligned(room)})
         reals, order = context.reals, 2 * self.degree + 1
         context.words[layout.ERROR_DEGREE] = self.degree
         reals[layout.ALLOWED_ERROR] = self.tol
+        bodies = getattr(self.system, "bodies", None) is not None
+        reals[layout.LEAST_SLOPE] = OF_A_BODY if bodies else OF_A_COMPONENT
         reals[layout.ALLOWED_DEFECT] = math.inf if self.defect is None else self.defect
         reals[layout.ERROR_AIM] = math.log(self.tol) / order + math.log(MARGIN)
         reals[layout.ERROR_DECAY] = self.tol ** (0.5 / self.degree)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.crawl import Crawl
 from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper, failure
@@ -134,14 +135,18 @@ class AdaptiveStepper(HBVMStepper):
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, in chunks so that Ctrl-C is heard between them."""
         grid, out = np.ascontiguousarray(times), np.empty((times.size, self._dim))
-        outcome, made = layout.BUDGET, 0
-        while outcome == layout.BUDGET:
+        outcome, made, crawl = layout.BUDGET, 0, ""
+        watch, words = Crawl(self.t, float(grid[-1])), self._context.words
+        while outcome == layout.BUDGET and not crawl:
+            before = int(words[layout.STEPS])
             outcome = self._call(
                 engine.VARY, between=between, count=grid.size, times=grid.ctypes.data, first=made,
                 out=out.ctypes.data, budget=CHUNK,
             )  # fmt: skip
-            made = int(self._context.words[layout.MADE])
-        return self._samples(grid[:made], out[:made], outcome)
+            made = int(words[layout.MADE])
+            if outcome == layout.BUDGET:
+                crawl = watch.sees(self.t, int(words[layout.STEPS]) - before)
+        return self._samples(grid[:made], out[:made], outcome, crawl)
 
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
@@ -161,8 +166,9 @@ class AdaptiveStepper(HBVMStepper):
         """
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
-        outcome, steps, reals = layout.BUDGET, 0, self._context.reals
-        while outcome == layout.BUDGET and (limit is None or steps < limit):
+        outcome, steps, crawl, reals = layout.BUDGET, 0, "", self._context.reals
+        watch = Crawl(self.t, end)
+        while outcome == layout.BUDGET and (limit is None or steps < limit) and not crawl:
             n = CHUNK if limit is None else limit - steps  # fewer come where the implicit solver is made
             if longest < math.inf:
                 n = 1
@@ -172,8 +178,10 @@ class AdaptiveStepper(HBVMStepper):
             made = int(self._context.words[layout.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
+            if outcome == layout.BUDGET and limit is None:
+                crawl = watch.sees(self.t, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, layout.DONE if outcome == layout.BUDGET else outcome)
+        return self._samples(t, y, layout.DONE if outcome == layout.BUDGET else outcome, crawl)
 
     def _call(self, what: int, **arguments: int) -> int:
         """Call the kernel once; put the implicit solver to work where it is wanted."""
@@ -184,9 +192,12 @@ class AdaptiveStepper(HBVMStepper):
             workspace.raise_what_is_no_failure()
         return outcome
 
-    def _samples(self, t: Array, y: Array, outcome: int) -> Samples:
+    def _samples(self, t: Array, y: Array, outcome: int, crawl: str) -> Samples:
         status = Status.FINISHED
-        if outcome != layout.DONE:
+        if crawl:
+            status, self._reason = Status.STALLED, crawl
+            self._status = status
+        elif outcome != layout.DONE:
             status, self._reason = self._failure(outcome)
             self._status = status
         return Samples(t, y, status, self._reason)

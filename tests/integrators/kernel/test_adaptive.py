@@ -10,6 +10,7 @@ import problems
 from integrators import HBVM, Gauss, testing
 from integrators.automatic import choose
 from integrators.protocol import Status
+from problems import Problem, VectorField
 from problems.errors import InputError
 
 METHODS = [HBVM(), HBVM(tol=1e-8), HBVM(k=6, s=3, tol=1e-6), Gauss(s=4, tol=1e-8, h=0.01)]
@@ -247,3 +248,15 @@ def test_a_checkpoint_of_another_tolerance_is_refused():
     checkpoint = HBVM(tol=1e-8).compile(problem.system).start(problem.y0).checkpoint()
     with pytest.raises(InputError, match="belongs to another method or system"):
         HBVM(tol=1e-9).compile(problem.system).start(problem.y0).restore(checkpoint)
+
+
+def test_steps_that_have_collapsed_are_a_status_with_time_and_reason():
+    def f(t, m):
+        return [1.0 + 0.5 * m.sin(1e9 * t)]
+
+    problem = Problem(VectorField(f, dim=1), y0=[0.0], t_end=1e6)
+    for sample in ("side", "steps"):
+        found = integrators.integrate(problem, HBVM(tol=1e-10), [0.0, 1e6], sample=sample)
+        assert found.status is Status.STALLED
+        assert "the steps have collapsed" in found.reason
+        assert 0.0 < found.stats.steps < 10**6
