@@ -155,7 +155,8 @@ def page(sections: Sequence[Section], top: Sequence[Table], look: Mapping[str, L
 
 
 def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, object]:
-    last = max((s.race for s in sections), key=lambda race: race.started)
+    races = sorted((s.race for s in sections), key=lambda race: race.started)
+    last = races[-1]
     return {
         "sections": sections,
         "top": top,
@@ -163,7 +164,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "families": [(family.title, family.code) for family in FAMILIES.values()],
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
-        "command": last.command,
+        "command": "\n".join(dict.fromkeys(race.command for race in races)),
         "started": sorted({s.race.started[:10] for s in sections}),
         "figures": FIGURES,
     }
