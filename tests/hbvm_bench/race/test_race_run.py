@@ -116,7 +116,9 @@ def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
     data = json.loads(capsys.readouterr().out)
     assert [race["contest"]["key"] for race in data["races"]] == ["kepler"]
     assert {ratio["peer"] for ratio in data["ratios"]} == {"heyoka", "ias15", "leapfrog", "dop853"}
-    assert {path.name for path in tmp_path.iterdir()} == {"kepler.json", "README.md", "index.html", "figures"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        *("kepler.json", "README.md", "index.html", "figures", "data")
+    }
     assert str(tmp_path) not in (tmp_path / "README.md").read_text()
     assert main(["race", "--redraw", "--out", str(tmp_path)]) == 0
 
