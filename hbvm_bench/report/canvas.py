@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from hbvm_bench.report.plots import Plot
-from hbvm_bench.report.png import with_small_images
+from hbvm_bench.report.png import small, with_small_images
 from hbvm_bench.report.style import GRID, INK, MUTED, NEUTRALS, PAPER
 
 FONT = "DejaVu Sans"
@@ -102,7 +102,9 @@ def picture(
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    return Picture(key, title, caption, summary, compact(with_small_images(text)), png.getvalue(), plot)
+    return Picture(
+        key, title, caption, summary, compact(with_small_images(text)), small(png.getvalue()), plot
+    )
 
 
 def compact(svg: str) -> str:

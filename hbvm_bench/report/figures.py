@@ -190,12 +190,11 @@ def panel_legend(
     )
 
 
-def shortened(name: str, note: str, most: int = 48) -> str:
-    """Return a name and its note in one line of a legend; the name gives way."""
-    if not note:
-        return name
-    room = max(most - len(note) - 3, 8)
-    return f"{name if len(name) <= room else name[: room - 1] + '…'}   {note}"
+def shortened(name: str, note: str) -> str:
+    """Return a name and its note in one line of a legend under its panel; the name gives way."""
+    room = max(48 - len(note) - 3, 8) if note else 42  # with notes the letters are smaller
+    cut = name if len(name) <= room else name[: room - 1] + "…"
+    return f"{cut}   {note}" if note else cut
 
 
 def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
