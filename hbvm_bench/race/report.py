@@ -9,6 +9,7 @@ from pathlib import Path
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.race import tables
 from hbvm_bench.race.accuracy import SAMPLES
+from hbvm_bench.race.contests import CONTESTS
 from hbvm_bench.race.figures import looks, work_precision
 from hbvm_bench.race.results import Race
 from hbvm_bench.race.rounds import SHORTEST
@@ -164,10 +165,21 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "families": [(family.title, family.code) for family in FAMILIES.values()],
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
-        "command": "\n".join(dict.fromkeys(race.command for race in races)),
+        "command": commands(races),
         "started": sorted({s.race.started[:10] for s in sections}),
         "figures": FIGURES,
     }
+
+
+def commands(races: Sequence[Race]) -> str:
+    """Return the commands the contests came from; one if together they are all contests, run alike."""
+    words = [race.command.split(" ") for race in races]
+    alike = {
+        " ".join(w for i, w in enumerate(ws) if "--problem" not in (w, ws[max(i - 1, 0)])) for ws in words
+    }
+    if len(alike) == 1 and {race.contest.key for race in races} == set(CONTESTS):
+        return alike.pop()
+    return "\n".join(dict.fromkeys(race.command for race in races))
 
 
 def settings_csv(sections: Sequence[Section]) -> str:

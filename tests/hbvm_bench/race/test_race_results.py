@@ -5,6 +5,7 @@ import pytest
 
 from hbvm_bench.race import report, results, tables
 from hbvm_bench.race.command import as_data
+from hbvm_bench.race.contests import CONTESTS
 from hbvm_bench.race.figures import front, looks, work_precision
 from problems.errors import InputError
 
@@ -99,3 +100,15 @@ def test_the_front_of_a_family_is_beaten_by_none_of_it(race):
         "Gauss(s=8, h=2.0)",
         "HBVM(k=16, s=8, h=2.0)",
     ]
+
+
+def test_the_report_names_one_command_where_the_contests_together_are_one_run(race):
+    def run(key, words):
+        contest = msgspec.structs.replace(race.contest, key=key)
+        return msgspec.structs.replace(race, contest=contest, command=words)
+
+    single = [run(key, f"hbvm-bench race --problem {key} --out x") for key in CONTESTS]
+    assert report.commands(single) == "hbvm-bench race --out x"
+    assert report.commands(single[1:]) == "\n".join(one.command for one in single[1:])
+    other = [run("kepler", "hbvm-bench race --problem kepler --rounds 5 --out x"), *single[1:]]
+    assert report.commands(other).count("\n") == len(CONTESTS) - 1
