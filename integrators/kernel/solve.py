@@ -14,6 +14,8 @@ ROUNDING = 1e-15  # below it, the first change that does not decrease ends the i
 # s = 2, h = 1; with five 3e-18).
 PATIENCE = 5
 # A change that is going to be no larger is not waited for, if the last two say so by falling this steeply.
+# One steep fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
+# average fall, from a first change as large as the state, must promise three times that too.
 GOAL = 3e-17
 STEEP = 0.15
 INFINITY = float("inf")
@@ -80,6 +82,19 @@ def moved(ctx):
 
 
 @compiled
+def falls(strict, tried):
+    """Whether falls as steep as ``tried`` equal ones from 1 to 1e-15 would bring ``strict`` to 3 GOAL."""
+    # strict * 1e-15 ** (1 / tried) <= 3 GOAL
+    part = strict / (3.0 * GOAL)
+    power = 1.0
+    for _ in range(tried):
+        power *= part
+        if power > 1e15:
+            return False
+    return True
+
+
+@compiled
 def sweep_tested(ctx):
     """Iterate once and apply the stopping rule; OUTCOME says what came of it.
 
@@ -105,7 +120,7 @@ def sweep_tested(ctx):
         put_float(ctx, at.BEST, strict)
         put_int(ctx, at.STALLED, 0)
         # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
-        if last < 1.0 and strict <= STEEP * last and strict * strict <= GOAL * last:
+        if last < 1.0 and strict <= STEEP * last and strict * strict <= GOAL * last and falls(strict, tried):
             evaluate(ctx)
             put_int(ctx, at.TRIED, tried + 1)
             put_int(ctx, at.OUTCOME, at.DONE)

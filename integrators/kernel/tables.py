@@ -92,13 +92,15 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     name = store.key("tables", f"{k} {s} {second} {route}", native.sources("tables", "../legendre"))
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
-        arrays = _make(k, s, second, route)
-        store.put(name, b"".join(arrays[part].astype("<f8").tobytes() for part in NAMES))
-    else:
-        arrays, start = {}, 0
-        for part, (rows, columns) in zip(NAMES, shapes, strict=True):
-            arrays[part] = np.frombuffer(kept, "<f8", rows * columns, start).reshape(rows, columns)
-            start += 8 * rows * columns
+        made = _make(k, s, second, route)
+        kept = b"".join(made[part].astype("<f8").tobytes() for part in NAMES)
+        store.put(name, kept)
+    # Read back even if just made: what is computed from the tables depends on their layout, in the last bit.
+    arrays: dict[str, Array] = {}
+    start = 0
+    for part, (rows, columns) in zip(NAMES, shapes, strict=True):
+        arrays[part] = np.frombuffer(kept, "<f8", rows * columns, start).reshape(rows, columns)
+        start += 8 * rows * columns
     return Constants(k, s, lanes, second, route, min(k, MODES), arrays)
 
 

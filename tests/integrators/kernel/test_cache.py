@@ -8,7 +8,7 @@ import textwrap
 
 import pytest
 
-from integrators.kernel import store
+from integrators.kernel import store, tables
 
 # A system of its own for each constant; prints whether numba was needed, and a result.
 SCRIPT = textwrap.dedent(
@@ -123,3 +123,14 @@ def test_what_was_put_is_got_and_keys_depend_on_every_part(tmp_path, monkeypatch
     assert store.put(name, b"content")
     assert store.get(name) == b"content"
     assert len({name, store.key("kind", "source"), store.key("kindsource", "", b"bytes")}) == 3
+
+
+def test_tables_from_the_store_make_the_bits_of_those_just_made(tmp_path, monkeypatch):
+    monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path))
+    made = []
+    for _ in range(2):
+        tables.constants.cache_clear()
+        made.append(tables.scaled(tables.constants(10, 1, True, 16), 1.0, squared=True))
+    tables.constants.cache_clear()
+    for name, table in made[0].items():
+        assert table.tobytes() == made[1][name].tobytes(), name
