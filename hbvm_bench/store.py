@@ -223,8 +223,8 @@ def atomic(path: Path) -> Iterator[Path]:
         raise
 
 
-def ensure_writable(directory: Path) -> None:
-    """Make a directory and try to write in it; on failure leave nothing behind.
+def ensure_writable(directory: Path, *, keep: bool = True) -> None:
+    """Make a directory and try to write in it; on failure, or unless ``keep``, leave nothing behind.
 
     Raises
     ------
@@ -232,6 +232,7 @@ def ensure_writable(directory: Path) -> None:
         With the reason.
     """
     made: list[Path] = []
+    kept = False
     try:
         missing = [path for path in (directory, *directory.parents) if not path.exists()]
         for path in reversed(missing):
@@ -239,7 +240,10 @@ def ensure_writable(directory: Path) -> None:
             made.append(path)
         with tempfile.TemporaryFile(dir=directory):
             pass
+        kept = keep
     except OSError as error:
-        for path in reversed(made):
-            path.rmdir()
         raise InputError(f"cannot write to the directory {str(directory)!r}: {error.strerror}.") from None
+    finally:
+        if not kept:
+            for path in reversed(made):
+                path.rmdir()

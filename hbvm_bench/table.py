@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hbvm_bench.entries import Ensemble
 from hbvm_bench.metrics import METRICS, Metric, find
 from hbvm_bench.records import Record, Value
 
@@ -100,6 +101,19 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     order = list(GROUPS)
     # sorting is stable: what has no number keeps the campaign's order
     return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
+
+
+def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[Record]]:
+    """Return the records of each table: one trajectory of a problem, or an ensemble, in order."""
+    made: dict[tuple[str, Ensemble | None], list[Record]] = {}
+    for record in records:
+        made.setdefault((record.case.problem, record.case.ensemble), []).append(record)
+    return made
+
+
+def at_once(ensemble: Ensemble | None) -> str:
+    """Return what follows a problem's name where it is an ensemble, else ``""``."""
+    return f", {ensemble.count} trajectories at once" if ensemble else ""
 
 
 def numbers(records: Sequence[Record]) -> dict[str, int]:

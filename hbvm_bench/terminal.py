@@ -9,7 +9,7 @@ from rich.text import Text
 
 from hbvm_bench.metrics import Metric
 from hbvm_bench.records import Record
-from hbvm_bench.table import GROUPS, Row, columns, numbers, rows
+from hbvm_bench.table import GROUPS, Row, at_once, columns, numbers, rows, tasks
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -48,7 +48,7 @@ def results(
     sort: str | None = None,
     width: int = PIPE_WIDTH,
 ) -> list[RenderableType]:
-    """Return, for each problem, its table and the remarks on its rows.
+    """Return, for each problem and each ensemble, its table and the remarks on its rows.
 
     Parameters
     ----------
@@ -61,21 +61,20 @@ def results(
     width : int
         Of the terminal, in characters.
     """
-    problems = list(dict.fromkeys(record.case.problem for record in records))
     return [
-        _results(problem, [r for r in records if r.case.problem == problem], keys, sort, width)
-        for problem in problems
+        _results(problem + at_once(ensemble), members, keys, sort, width)
+        for (problem, ensemble), members in tasks(records).items()
     ]
 
 
 def _results(
-    problem: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None, width: int
+    title: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None, width: int
 ) -> RenderableType:
     shown = columns(records, keys)
     lines = rows(records, sort)
     hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
-    made = Table(title=Text(problem), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("#", justify="right", no_wrap=True)
     made.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:

@@ -34,7 +34,7 @@ def report(
         for store in stores:
             store.index()
         target = out or runs[0] / "report"
-        ensure_writable(target)
+        ensure_writable(target, keep=False)
         written = write_report(stores, target)
         for path in written:
             print(path)

@@ -52,7 +52,7 @@ def run(
     store = Store(out or Path("runs") / campaign.name)
     store.prepare()
     if report_to is not None:
-        ensure_writable(report_to)
+        ensure_writable(report_to, keep=False)
     with store.locked():
         index = Index(
             campaign=campaign,

@@ -14,7 +14,7 @@ from hbvm_bench.report.sections import Section, section
 from hbvm_bench.report.style import Look, looks, method_name
 from hbvm_bench.store import Store
 from hbvm_bench.summaries import fairness
-from hbvm_bench.table import columns
+from hbvm_bench.table import columns, tasks
 
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
@@ -57,7 +57,7 @@ class Content:
     overview : Overview
         What they say together.
     sections : list of Section
-        Problem by problem.
+        Problem by problem; an ensemble has one of its own.
     columns : list of Metric
         Of the table of results.
     looks : dict of Look
@@ -119,7 +119,7 @@ def gather(stores: Sequence[Store]) -> Content:
                 latest[record.id] = (record, store)
     records = [record for record, _ in latest.values()]
     look = looks(records)
-    texts = list(dict.fromkeys(record.case.problem for record in records))
+    found = tasks(records)
     runs = [
         Run(
             title=index.campaign.title or index.campaign.name,
@@ -135,13 +135,18 @@ def gather(stores: Sequence[Store]) -> Content:
     sections = [
         section(
             text,
-            [(record, store) for record, store in latest.values() if record.case.problem == text],
+            [latest[record.id] for record in members],
             look,
-            [case for run in runs for case in run.missing if printed[case.problem] == text],
+            [
+                case
+                for run in runs
+                for case in run.missing
+                if (printed[case.problem], case.ensemble) == (text, ensemble)
+            ],
             number,
-            brief=len(texts) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
+            brief=len(found) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
         )
-        for number, text in enumerate(texts, 1)
+        for number, ((text, ensemble), members) in enumerate(found.items(), 1)
     ]
     first = indices[0].campaign
     together = f"{len(runs)} runs together"

@@ -20,7 +20,7 @@ from hbvm_bench.report.motion import Motion
 from hbvm_bench.report.style import Look, method_name
 from hbvm_bench.report.work_precision import work_precision
 from hbvm_bench.store import Store
-from hbvm_bench.table import GROUPS, Row, group_of, rows
+from hbvm_bench.table import GROUPS, Row, at_once, group_of, rows
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -36,6 +36,8 @@ class Section:
     ----------
     problem : Problem
         What was integrated.
+    title : str
+        Of the problem; of an ensemble also how many trajectories it has.
     summary, shortcomings : list of str
         Sentences.
     groups : list of (str, list of Row)
@@ -53,6 +55,7 @@ class Section:
     """
 
     problem: Problem
+    title: str
     summary: list[str]
     shortcomings: list[str]
     groups: list[tuple[str, list[Row]]]
@@ -72,14 +75,15 @@ def section(
     *,
     brief: bool = False,
 ) -> Section:
-    """Gather what the report says about one problem.
+    """Gather what the report says about one problem, or about an ensemble of it.
 
     Parameters
     ----------
     text : str
         The problem as it prints.
     found : sequence of (Record, Store)
-        Its cases and where their series are.
+        Its cases, at least one, and where their series are. An ensemble's are over its trajectories
+        and not over time: it has rows and no figures.
     look : dict of Look
         By case id.
     missing : list of Case
@@ -92,13 +96,17 @@ def section(
     problem = make_problem(text)
     records = [record for record, _ in found]
     known = references.find(problem)
-    cases = [Drawn(record, look[record.id], store.series(record.id)) for record, store in found]
+    ensemble = records[0].case.ensemble
+    cases = [
+        Drawn(record, look[record.id], store.series(record.id)) for record, store in found if ensemble is None
+    ]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
     pictures = _pictures(problem, drawn, known, number, brief=brief)
     moving = [picture.key for picture in pictures if picture.key.partition("-")[0] == "motion"]
     return Section(
         problem=problem,
+        title=f"{problem.title}{at_once(ensemble)}",
         summary=words.summary(records),
         shortcomings=words.shortcomings(records),
         groups=[
