@@ -13,6 +13,7 @@ from typer.exceptions import TyperException
 from hbvm_bench import listing, terminal
 from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import find
+from hbvm_bench.records import printable
 from hbvm_bench.store import Store, ensure_writable
 from problems.errors import InputError
 
@@ -73,7 +74,7 @@ def _attach(arguments: list[str]) -> None:
 
 
 def _fail(sentence: str) -> int:
-    one_line = " ".join(sentence.split())
+    one_line = printable(" ".join(sentence.split()))
     print(f"hbvm-bench: {one_line}" if one_line else "hbvm-bench: nothing to do; see --help", file=sys.stderr)
     return 2
 

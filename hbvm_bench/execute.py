@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import msgspec
 
-from hbvm_bench import machine, supervise
+from hbvm_bench import machine, records, supervise
 from hbvm_bench.campaign import Case, Limits
 from hbvm_bench.identity import Resolved, is_ours, resolve, versions_of
 from hbvm_bench.records import Outcome, Record, Result
@@ -144,7 +144,7 @@ def start(scratch: Path, request: Request, limits: Limits) -> Ended:
 def decoded(path: Path, type_: type[T]) -> T | None:
     """Return what a worker wrote, or ``None`` if it is missing or something else."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=type_)
+        return records.decoded(path.read_bytes(), type_)
     except (FileNotFoundError, ValueError):  # msgspec's errors and bad UTF-8 are among the latter
         return None
 

@@ -11,10 +11,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.spec import parse_spec
-from hbvm_bench.store import Store, atomic
+from hbvm_bench.store import Store, atomic, damage
 from problems.errors import InputError, MissingLibraryError, unknown
 
 Row = dict[str, Any]
@@ -152,16 +153,18 @@ def _timings(record: Record, store: Store) -> Iterator[Row]:
 
 def _series(record: Record, store: Store) -> Iterator[Row]:
     series = store.series(record.id)
+    if why := damage(record, series, make_problem(record.case.problem).system.dim):
+        yield _key(record) | {"quantity": f"damaged: {why}"}
+        return
     for name, values in series.items():
-        times = series.get("position_t" if name.startswith("position") else "t", np.empty(0))
-        rows = values.reshape(len(values), -1) if values.ndim else values.reshape(1, 1)
-        for i, parts in enumerate(rows.tolist()):
-            for component, value in enumerate(parts):
+        times = series["position_t" if name.startswith(("position", "phase")) else "t"]
+        for i, parts in enumerate(values):
+            for component, value in enumerate(np.ravel(parts).tolist()):
                 yield _key(record) | {
                     "quantity": name,
                     "sample": i,
                     "component": component,
-                    "t": float(times[i]) if len(times) == len(rows) else None,
+                    "t": float(times[i]) if len(times) == len(values) else None,
                     "value": float(value),
                 }
 

@@ -5,17 +5,51 @@ Not-a-number and infinity never enter a record: a value that does not exist is
 """
 
 import math
+import re
+from datetime import datetime
 from statistics import median, quantiles
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
 from hbvm_bench.campaign import Case, Limits, Role
 from hbvm_bench.laws import Law
 
+T = TypeVar("T")
 SCHEMA = 1
+# They command a terminal, or turn the direction in which a line is read.
+COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
 Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
+
+
+def decoded(content: bytes, type_: type[T]) -> T:
+    """Read JSON that somebody else may have written: its texts lose the characters that command a terminal.
+
+    Raises
+    ------
+    msgspec.MsgspecError
+        If it is no JSON, or not that of the type.
+    ValueError
+        If it is no UTF-8.
+    """
+    return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
+
+
+def printable(text: str) -> str:
+    """Return text without the characters that command a terminal; line ends and tabs stay."""
+    return COMMANDS.sub("", text)
+
+
+def _printable(value: Any) -> Any:
+    match value:
+        case str():
+            return printable(value)
+        case list():
+            return [_printable(item) for item in value]
+        case dict():
+            return {printable(key): _printable(item) for key, item in value.items()}
+    return value
 
 
 class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -74,6 +108,10 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     compile: Compile
     share: float = 1.0
     calibration: list[float] = []
+
+    def __post_init__(self) -> None:
+        if not self.samples or not all(0.0 < s < math.inf for s in [*self.samples, *self.calibration]):
+            raise ValueError("a timing has samples, and all of them are positive")
 
     @property
     def calibrated(self) -> list[float]:
@@ -208,3 +246,7 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     machine: dict[str, str | int] = {}
     finished: str = ""
     schema: int = SCHEMA
+
+    def __post_init__(self) -> None:
+        if self.finished:
+            datetime.fromisoformat(self.finished)

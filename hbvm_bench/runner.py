@@ -6,14 +6,12 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from pathlib import Path
 
-import msgspec
-
 from hbvm_bench.campaign import Campaign, Case, Limits
 from hbvm_bench.execute import InterruptedRunError, Reply, execute, task_of
 from hbvm_bench.executors import Pool
 from hbvm_bench.identity import Resolved, resolve
-from hbvm_bench.records import Record
-from hbvm_bench.store import Store
+from hbvm_bench.records import Record, decoded
+from hbvm_bench.store import Store, damage
 from hbvm_bench.worker import STALE
 from problems.errors import InputError
 
@@ -48,6 +46,14 @@ def is_done(record: Record | None, limits: Limits) -> bool:
         return False
     stopped_by = {"timeout": "wall_seconds", "killed": "memory_gib"}.get(record.result.outcome)
     return stopped_by is None or getattr(limits, stopped_by) <= getattr(record.limits, stopped_by)
+
+
+def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
+    """Whether the store has a case as a run under these limits leaves it, its series with it."""
+    record = store.load(resolved.id)
+    if record is None or not is_done(record, limits):
+        return False
+    return not damage(record, store.series(resolved.id), resolved.problem.system.dim)
 
 
 def run_case(case: Case, directory: str, limits: Limits) -> Record:
@@ -165,7 +171,7 @@ def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
 
 
 def _stored(store: Store, reply: bytes, series: bytes) -> Record:
-    answer = msgspec.json.decode(reply, type=Reply)
+    answer = decoded(reply, Reply)
     if answer.why == STALE:
         raise InputError(STALE)
     if answer.record is None:

@@ -13,6 +13,7 @@ does what is missing. Nothing is pickled.
 import fcntl
 import io
 import os
+import re
 import tempfile
 import threading
 import time
@@ -21,18 +22,21 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import Campaign, Case
-from hbvm_bench.records import SCHEMA, Record
+from hbvm_bench.records import SCHEMA, Record, Result, decoded
 from problems.errors import InputError
 
 INDEX = "campaign.json"
 CASES = "cases"
 NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
+NAME = re.compile(r"\w[\w .-]{0,99}")
+SERIES = ("t", "y", "distance", "position_t", "position", "phase")  # every trajectory has them
 FORGOTTEN = 3600.0  # seconds after which a half-written file has nobody who writes it
 
 
@@ -54,7 +58,7 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     campaign: Campaign
-    ids: list[str]
+    ids: list[Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]]  # they are file names, too
     version: str
     command: str
     cases: list[Case] = []
@@ -113,10 +117,9 @@ class Store:
     def load(self, case_id: str) -> Record | None:
         """Return the record of a case, or ``None`` if it is missing or unreadable."""
         try:
-            record = msgspec.json.decode(self._record_path(case_id).read_bytes(), type=Record)
-        except (FileNotFoundError, msgspec.MsgspecError):
+            return self._read(case_id)
+        except (FileNotFoundError, ValueError):
             return None
-        return record if record.id == case_id and record.schema == SCHEMA else None
 
     def save(self, record: Record, series: Mapping[str, NDArray[np.float64]] | bytes | None = None) -> None:
         """Store a record, its series first so that a record never lacks them."""
@@ -162,37 +165,104 @@ class Store:
         except OSError as error:
             raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
         try:
-            return msgspec.json.decode(content, type=Index)
-        except (msgspec.MsgspecError, InputError) as error:
-            raise InputError(f"{self.directory / INDEX} is not the index of a run: {error}.") from None
+            index = decoded(content, Index)
+            cases = index.cases or index.campaign.cases()
+        except ValueError as error:  # msgspec's errors and ours are among them
+            words = str(error).rstrip(".")
+            raise InputError(f"{self.directory / INDEX} is not the index of a run: {words}.") from None
+        if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
+            raise InputError(
+                f"{self.directory / INDEX} is damaged: {len(set(index.ids))} ids of {len(cases)} cases; "
+                f"what has run is kept, write it anew with: {index.command}."
+            )
+        return index
 
     def records(self) -> list[Record]:
         """Return the records of the run that are there, in the order of the campaign.
 
         Labels and notes are the campaign's present ones: they are words, and no reason to run again.
+        A record that cannot be read is one that says so.
         """
         made: list[Record] = []
-        for case_id, case in self.index().listed():
-            if (record := self.load(case_id)) is not None:
-                words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
-                made.append(msgspec.structs.replace(record, case=words))
+        index = self.index()
+        for case_id, case in index.listed():
+            try:
+                record = self._read(case_id)
+            except FileNotFoundError:
+                continue
+            except ValueError as error:
+                made.append(_unreadable(case_id, case, " ".join(str(error).split()), index.command))
+                continue
+            words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
+            made.append(msgspec.structs.replace(record, case=words))
         return made
 
     def everything(self) -> Iterator[Record]:
         """Yield all records in the directory, those of earlier versions and other settings too."""
         for path in sorted(self.cases.glob("[!.]*.json")):
             try:
-                record = msgspec.json.decode(path.read_bytes(), type=Record)
+                record = decoded(path.read_bytes(), Record)
             except (OSError, ValueError):
                 continue
             if record.schema == SCHEMA and path == self._record_path(record.id):
                 yield record
+
+    def _read(self, case_id: str) -> Record:
+        record = decoded(self._record_path(case_id).read_bytes(), Record)
+        if record.id != case_id or record.schema != SCHEMA:
+            raise ValueError("it is the record of another case, or of another version")
+        return record
 
     def _record_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.json"
 
     def _series_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
+
+
+def _unreadable(case_id: str, case: Case, why: str, command: str) -> Record:
+    """Return the row of a case whose record is damaged."""
+    reason = f"its record in the store is damaged ({why}); run it again with: {command}"
+    result = Result(outcome="crashed", reason=reason)
+    return Record(id=case_id, case=case, role="peer", library="", order=None, result=result)
+
+
+def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) -> str:
+    """Return what is wrong with the series of a case, ``""`` where they are as a run writes them.
+
+    Parameters
+    ----------
+    record : Record
+        One without a trajectory has no series.
+    series : mapping of ndarray
+        As `Store.series` returns them.
+    dim : int
+        Length of a state.
+    """
+    if record.result.outcome not in ("ok", "stalled"):
+        return ""
+    if absent := [name for name in SERIES if name not in series]:
+        return f"there is no {absent[0]}"
+    t, y = series["t"], series["y"]
+    lengths = {name: t.size for name in series if name.startswith(("distance", "error.", "guard."))}
+    lengths |= dict.fromkeys(("position", "phase"), series["position_t"].size)
+    if t.ndim != 1 or y.shape != (t.size, dim):
+        return f"t has the shape {t.shape} and y {y.shape}"
+    if wrong := [name for name, length in lengths.items() if series[name].shape != (length,)]:
+        return f"{wrong[0]} has the shape {series[wrong[0]].shape}, beside {lengths[wrong[0]]} times"
+    if drifts := [name for name in series if name.startswith("drift.")]:
+        times = series.get("drift.t", np.empty(0))
+        if times.ndim != 1 or any(series[name].shape[-1:] != times.shape for name in drifts):
+            return "the errors of its drift do not belong to the times of it"
+    if series.get("extra.dt_history", np.empty((0, 2))).shape[1:] != (2,):
+        return "its step sizes have no times"
+    steps = np.diff(t)
+    if record.case.ensemble is None:
+        if not np.isfinite(t).all() or not (np.all(steps > 0) or np.all(steps < 0)):
+            return "its times do not go one way"
+        if not np.isfinite(y[:1]).all() or (record.result.status == "finished" and not np.isfinite(y).all()):
+            return "its states are not finite"
+    return ""
 
 
 def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
@@ -203,10 +273,16 @@ def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
 
 
 def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of a ``.npz`` file by name; empty if it is cut, something else, or has pickles."""
+    """Return the arrays of a ``.npz`` file by name; empty if it is not one of ours.
+
+    It may be cut or something else; have pickles, texts or complex numbers; or have names that
+    are none, for names go into pages and file names.
+    """
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            found = {name: np.atleast_1d(stored[name]) for name in stored.files}
+            ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in found.items())
+            return found if ours else {}
     except (ValueError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error):
         return {}
 

@@ -27,7 +27,7 @@ from hbvm_bench.measure import Measured, measure
 from hbvm_bench.metrics import evaluate, guard_violation
 from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.solve import solve
-from hbvm_bench.store import atomic, encode_series
+from hbvm_bench.store import NAME, atomic, encode_series
 from integrators.integrate import Solution
 from integrators.protocol import Program, Status
 from problems.errors import InputError
@@ -109,6 +109,9 @@ def _measure(request: Request, directory: Path) -> Result:
         resolved = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
             return Result(outcome="refused", reason=reason)
+        names = resolved.problem.system.invariant_names
+        if bad := [name for name in names if not NAME.fullmatch(name)]:
+            return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem)
         program = resolved.method.compile(resolved.problem.system)
         if resolved.case.ensemble is not None:

@@ -119,7 +119,7 @@ def _run(
     campaign: Campaign, cases: list[Resolved], store: Store, executor: str, jobs: int | None, timing: bool
 ) -> None:
     supervise.allow()
-    missing = [case for case in cases if not runner.is_done(store.load(case.id), campaign.limits)]
+    missing = [case for case in cases if not runner.is_kept(case, store, campaign.limits)]
     with Live() as live, executors.opened(executor, jobs) as pool:
         try:
             estimate = Estimate(_known_seconds(store, missing), campaign.limits.wall_seconds)

@@ -84,6 +84,10 @@ class Picture:
     png: bytes
     plot: Plot | None = None
 
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[\w-]+", self.key):
+            raise ValueError(f"{self.key!r} can be no anchor and no file name")
+
 
 def drawing() -> AbstractContextManager[None]:
     """Return the context in which figures are made, so that they all look alike."""

@@ -3,6 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
 from hbvm_bench.campaign import Case
 from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import METRICS, Metric
@@ -12,7 +16,7 @@ from hbvm_bench.report.canvas import Picture
 from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
 from hbvm_bench.report.style import Look, looks, method_name
-from hbvm_bench.store import Store
+from hbvm_bench.store import Store, damage
 from hbvm_bench.summaries import fairness
 from hbvm_bench.table import columns, tasks
 
@@ -117,9 +121,10 @@ def gather(stores: Sequence[Store]) -> Content:
         for record in store.records():
             if record.id not in latest or record.finished > latest[record.id][0].finished:
                 latest[record.id] = (record, store)
-    records = [record for record, _ in latest.values()]
+    found = {number: _read(record, store) for number, (record, store) in latest.items()}
+    records = [record for record, _ in found.values()]
     look = looks(records)
-    found = tasks(records)
+    tables = tasks(records)
     runs = [
         Run(
             title=index.campaign.title or index.campaign.name,
@@ -135,7 +140,7 @@ def gather(stores: Sequence[Store]) -> Content:
     sections = [
         section(
             text,
-            [latest[record.id] for record in members],
+            [found[record.id] for record in members],
             look,
             [
                 case
@@ -144,9 +149,9 @@ def gather(stores: Sequence[Store]) -> Content:
                 if (printed[case.problem], case.ensemble) == (text, ensemble)
             ],
             number,
-            brief=len(found) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
+            brief=len(tables) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES,
         )
-        for number, ((text, ensemble), members) in enumerate(found.items(), 1)
+        for number, ((text, ensemble), members) in enumerate(tables.items(), 1)
     ]
     first = indices[0].campaign
     together = f"{len(runs)} runs together"
@@ -168,6 +173,17 @@ def gather(stores: Sequence[Store]) -> Content:
         metrics=list(METRICS.values()),
         references=list(dict.fromkeys(ref for s in sections for ref in s.problem.references)),
     )
+
+
+def _read(record: Record, store: Store) -> tuple[Record, dict[str, NDArray[np.float64]]]:
+    """Return a record and its series; where these are damaged, none and a remark."""
+    series = store.series(record.id)
+    why = damage(record, series, make_problem(record.case.problem).system.dim)
+    if not why:
+        return record, series
+    words = f"its series in the store are damaged ({why}): not drawn"
+    note = "; ".join(text for text in (record.case.note, words) if text)
+    return replace(record, case=replace(record.case, note=note)), {}
 
 
 def _first_numbers(records: Sequence[Record], look: dict[str, Look]) -> dict[str, int]:

@@ -1,5 +1,6 @@
 """One problem's part of a report: sentences, rows and figures."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,7 +20,6 @@ from hbvm_bench.report.figures import Drawn, OverTime
 from hbvm_bench.report.motion import Motion
 from hbvm_bench.report.style import Look, method_name
 from hbvm_bench.report.work_precision import work_precision
-from hbvm_bench.store import Store
 from hbvm_bench.table import GROUPS, Row, at_once, group_of, rows
 from problems.problem import Problem
 
@@ -68,7 +68,7 @@ class Section:
 
 def section(
     text: str,
-    found: Sequence[tuple[Record, Store]],
+    found: Sequence[tuple[Record, dict[str, Array]]],
     look: dict[str, Look],
     missing: list[Case],
     number: int,
@@ -81,8 +81,8 @@ def section(
     ----------
     text : str
         The problem as it prints.
-    found : sequence of (Record, Store)
-        Its cases, at least one, and where their series are. An ensemble's are over its trajectories
+    found : sequence of (Record, dict)
+        Its cases, at least one, and their series. An ensemble's are over its trajectories
         and not over time: it has rows and no figures.
     look : dict of Look
         By case id.
@@ -97,9 +97,7 @@ def section(
     records = [record for record, _ in found]
     known = references.find(problem)
     ensemble = records[0].case.ensemble
-    cases = [
-        Drawn(record, look[record.id], store.series(record.id)) for record, store in found if ensemble is None
-    ]
+    cases = [Drawn(record, look[record.id], series) for record, series in found if ensemble is None]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
     pictures = _pictures(problem, drawn, known, number, brief=brief)
@@ -245,7 +243,7 @@ def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
         words_ = name.removeprefix("error.").replace("_", " ")
         made.append(
             OverTime(
-                key=f"invariant-{words_.replace(' ', '-')}",
+                key="invariant-" + re.sub(r"\W+", "-", words_),
                 title=f"{words_.capitalize()}: error over time",
                 caption="Relative error, or absolute where the value at the start is 0; a vector's 2-norm.",
                 label=f"error of {words_}",

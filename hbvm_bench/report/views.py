@@ -125,7 +125,7 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     shown = [
         case
         for case in cases
-        if "extra.dt_history" in case.series and case.record.result.outcome == "stalled"
+        if case.record.result.outcome == "stalled" and np.any(case.series.get("extra.dt_history", 0.0))
     ]
     if not shown:
         return None

@@ -163,7 +163,10 @@ def write(store, texts, count, *, missing=0):
                 machine={"cores": 2},
                 finished="2026-11-21T10:00:00+00:00",
             )
-            store.save(record, {"t": t, "y": y, "error.energy": error, "distance": np.ones_like(t)})
+            nowhere = dict.fromkeys(("position_t", "position", "phase"), np.empty(0))
+            store.save(
+                record, {"t": t, "y": y, "error.energy": error, "distance": np.ones_like(t), **nowhere}
+            )
     campaign = Campaign(
         name="large",
         title="A large campaign",

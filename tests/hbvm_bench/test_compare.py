@@ -62,7 +62,9 @@ def make(folder, count=3, seed=0, prefix="0", edit=lambda number, record: record
             finished="2026-11-21T10:00:00+00:00",
         )
         if (edited := edit(number, record)) is not None:
-            store.save(edited, {"t": np.arange(3.0), "y": np.arange(6.0).reshape(3, 2) / 7})
+            nowhere = dict.fromkeys(("position_t", "position", "phase"), np.empty(0))
+            y = np.arange(12.0).reshape(3, 4) / 7
+            store.save(edited, {"t": np.arange(3.0), "y": y, "distance": np.ones(3), **nowhere})
     return store
 
 
@@ -175,7 +177,7 @@ def test_merged_runs_keep_of_each_case_what_got_further(tmp_path):
     assert records[0] == one.records()[0]
     assert records[1:3] == two.records()
     assert records[3].id.startswith("9")
-    assert np.array_equal(out.series(records[1].id)["y"], np.arange(6.0).reshape(3, 2) / 7)
+    assert np.array_equal(out.series(records[1].id)["y"], np.arange(12.0).reshape(3, 4) / 7)
     with pytest.raises(InputError, match="holds a run already"):
         merge([one, two], out)
     assert not comparing.compare(one, out).unchanged
@@ -207,10 +209,10 @@ def test_an_exported_table_has_all_that_was_measured(tmp_path, ending):
     assert export(store, tmp_path / f"t.{ending}", "timings") == 18
     times = [float(row["seconds"]) for row in read(tmp_path / f"t.{ending}")[:6]]
     assert times == store.records()[0].timing.samples
-    assert export(store, tmp_path / f"s.{ending}", "series") == 27
-    last = read(tmp_path / f"s.{ending}")[8]
-    assert (last["quantity"], int(last["component"]), float(last["t"])) == ("y", 1, 2.0)
-    assert float(last["value"]) == 5 / 7
+    assert export(store, tmp_path / f"s.{ending}", "series") == 54
+    last = read(tmp_path / f"s.{ending}")[14]
+    assert (last["quantity"], int(last["component"]), float(last["t"])) == ("y", 3, 2.0)
+    assert float(last["value"]) == 11 / 7
 
 
 def _read_csv(path):

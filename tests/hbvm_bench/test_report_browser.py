@@ -279,3 +279,15 @@ def test_a_large_campaign_stays_usable(browser, large):
         page.get_by_role("button", name="time", exact=True).click()
         page.click("#work-precision [data-view=explore]")
         page.wait_for_selector("#work-precision .area[data-drawn]")
+
+
+def test_a_script_that_gets_into_the_page_does_not_run(browser, folder, tmp_path):
+    attack = '<script>document.title = "hit"</script><img src="x" onerror="document.title = \'hit\'">'
+    page_text = (folder / "index.html").read_text(encoding="utf-8")
+    (tmp_path / "index.html").write_text(page_text.replace("<main>", f"<main>{attack}"), encoding="utf-8")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto((tmp_path / "index.html").as_uri())
+    page.wait_for_selector("html[data-data=ready]", state="attached", timeout=PATIENCE)  # ours does
+    assert page.title() != "hit"
+    context.close()
