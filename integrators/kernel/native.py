@@ -93,17 +93,23 @@ def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:
     with _lock:
         if (known := _loaded.get(name)) is not None:
             return Native(known.address, known.note, True, 0.0)
-        started = perf_counter()
         full = store.key(name, platform())
+        started = perf_counter()
         kept = store.get(full)
-        if kept:
-            note, code = chr(kept[0]), kept[1:]
-        else:
-            note, code = make()
-            store.put(full, note.encode("ascii") + code)
-        native = Native(load(code), note, bool(kept), perf_counter() - started)
-        _loaded[name] = native
-        return native
+        if not kept:
+            with store.making(full):  # processes that start together need it made once
+                started = perf_counter()  # what another one compiled meanwhile was not our time
+                kept = store.get(full)
+                if not kept:
+                    note, code = make()
+                    store.put(full, note.encode("ascii") + code)
+                    return _keep(name, Native(load(code), note, False, perf_counter() - started))
+        return _keep(name, Native(load(kept[1:]), chr(kept[0]), True, perf_counter() - started))
+
+
+def _keep(name: str, native: Native) -> Native:
+    _loaded[name] = native
+    return native
 
 
 def build(

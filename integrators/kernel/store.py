@@ -2,16 +2,18 @@
 
 Several processes may start together, and a file may be cut short by a full
 disk: each file carries the digest of its content, is written under another
-name and renamed, and is dropped and made anew when it does not check out.
+name and renamed, and is dropped and made anew when it does not check out. The digest
+is over the key too: code under another key's name would be run all the same.
 """
 
 import contextlib
 import hashlib
 import os
 import tempfile
+from contextlib import AbstractContextManager
 from pathlib import Path
 
-from problems.emit.cache import directory
+from problems.emit.cache import directory, locked
 
 DIGEST = 32
 
@@ -30,6 +32,15 @@ def _path(name: str) -> Path:
     return directory() / "native" / name[:2] / name
 
 
+def _digest(name: str, content: bytes) -> bytes:
+    return hashlib.sha256(name.encode() + content).digest()
+
+
+def making(name: str) -> AbstractContextManager[None]:
+    """Return what only one process at a time passes for a key; see `problems.emit.cache.locked`."""
+    return locked(directory() / "locks" / name)
+
+
 def get(name: str) -> bytes | None:
     """Return what is kept under a key, or ``None``: nothing there, not readable, or damaged."""
     try:
@@ -37,7 +48,7 @@ def get(name: str) -> bytes | None:
     except OSError:
         return None
     digest, content = data[:DIGEST], data[DIGEST:]
-    if hashlib.sha256(content).digest() == digest:
+    if _digest(name, content) == digest:
         return content
     with contextlib.suppress(OSError):
         _path(name).unlink()
@@ -52,7 +63,7 @@ def put(name: str, content: bytes) -> bool:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".")
         with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
+            file.write(_digest(name, content) + content)
         Path(temporary).replace(path)
     except OSError:
         if temporary is not None:

@@ -89,7 +89,9 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     """
     route = route_for(k, s, lanes)
     shapes = _shapes(k, s, route)
-    name = store.key("tables", f"{k} {s} {second} {route}", native.sources("tables", "../legendre"))
+    name = store.key(
+        "tables", f"{k} {s} {second} {route}", native.sources("tables", "../legendre", "../../problems/dd")
+    )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
         made = _make(k, s, second, route)

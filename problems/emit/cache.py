@@ -13,16 +13,23 @@ import importlib.util
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 from problems.errors import InputError
 
+try:
+    import fcntl
+except ImportError:  # not a Unix: processes that start together all compile
+    fcntl = None
+
 VARIABLE = "HBVM_BENCH_CACHE"
 
 
 @functools.cache
-def _prepared(explicit: str | None, xdg: str | None) -> Path:
+def _prepared(explicit: str | None, xdg: str | None) -> tuple[Path, bool]:
+    """Return the folder, and whether it can be written."""
     if explicit:
         folder = Path(explicit).expanduser()
     else:
@@ -32,28 +39,54 @@ def _prepared(explicit: str | None, xdg: str | None) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
+        if folder.is_dir() and os.access(folder, os.R_OK | os.X_OK):
+            return folder, False
         if explicit:
             raise InputError(
-                f"{VARIABLE}={explicit} is not a folder that can be written: {error}."
+                f"{VARIABLE}={explicit} is not a folder that can be written, or read: {error}."
             ) from error
-        # Without a home to write to, the code is compiled anew in each process.
-        folder = Path(tempfile.mkdtemp(prefix="hbvm-bench-"))
-    return folder
+        return _own(), True
+    return folder, True
+
+
+@functools.cache
+def _own() -> Path:
+    """Return a folder of this process: what is compiled there is compiled anew in each."""
+    return Path(tempfile.mkdtemp(prefix="hbvm-bench-"))
 
 
 def directory() -> Path:
-    """Return the folder of generated source, made if it is missing.
+    """Return the folder of what is kept between processes, made if it is missing.
 
     ``HBVM_BENCH_CACHE``, else ``$XDG_CACHE_HOME/hbvm-bench``, else
-    ``~/.cache/hbvm-bench``; where none of the latter two can be written, a
-    folder of this process.
+    ``~/.cache/hbvm-bench``; where it can only be read, what it has is used and nothing is
+    added; where none of the latter two is there, a folder of this process.
 
     Raises
     ------
     problems.errors.InputError
-        If ``HBVM_BENCH_CACHE`` names a folder that cannot be written.
+        If ``HBVM_BENCH_CACHE`` names a folder that can neither be written nor read.
     """
-    return _prepared(os.environ.get(VARIABLE), os.environ.get("XDG_CACHE_HOME"))
+    return _prepared(os.environ.get(VARIABLE), os.environ.get("XDG_CACHE_HOME"))[0]
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Let one process at a time through, or all of them where nothing can be locked.
+
+    The lock belongs to the process that holds it and ends with it, however it ends; the file stays.
+    """
+    handle = None
+    try:
+        with contextlib.suppress(OSError):  # a folder that can only be read, a file system without locks
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            if fcntl is not None:
+                fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 def versions() -> str:
@@ -78,15 +111,17 @@ def module(text: str, stem: str) -> ModuleType:
     -------
     ModuleType
         The same module object for the same text, within a process.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is no place to write the source to.
     """
     full = f"# {versions()}\n{text}"
     name = f"{stem}_{hashlib.sha256(full.encode()).hexdigest()[:20]}"
     if name in sys.modules:
         return sys.modules[name]
-    path = directory() / f"{name}.py"
-    # Left alone when it is right: numba takes a newer file for a changed one.
-    if not _holds(path, full):
-        _write(path, full)
+    path = _written(f"{name}.py", full)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
@@ -98,6 +133,23 @@ def module(text: str, stem: str) -> ModuleType:
         del sys.modules[name]
         raise
     return made
+
+
+def _written(name: str, text: str) -> Path:
+    """Return a file that holds the source, in a folder that numba can write to as well."""
+    folder, writable = _prepared(os.environ.get(VARIABLE), os.environ.get("XDG_CACHE_HOME"))
+    error = None
+    for path in (folder / name, _own() / name) if writable else (_own() / name,):
+        # Left alone when it is right: numba takes a newer file for a changed one.
+        if _holds(path, text):
+            return path
+        try:
+            _write(path, text)
+        except OSError as full_or_gone:
+            error = full_or_gone
+        else:
+            return path
+    raise InputError(f"cannot write generated code to {path.parent}: {error}; make room, or set {VARIABLE}.")
 
 
 def _holds(path: Path, text: str) -> bool:
