@@ -14,10 +14,10 @@ import msgspec
 from hbvm_bench import machine, records, supervise
 from hbvm_bench.campaign import Case, Limits
 from hbvm_bench.identity import Resolved, is_ours, resolve, versions_of
-from hbvm_bench.records import Outcome, Record, Result
+from hbvm_bench.records import COMPILING, Outcome, Record, Result
 from hbvm_bench.store import decode_series
 from hbvm_bench.supervise import Ended
-from hbvm_bench.worker import ENVIRONMENT, STALE, Request
+from hbvm_bench.worker import COMPILED, ENVIRONMENT, NO_ROOM, STALE, Request
 from problems.errors import InputError
 
 T = TypeVar("T")
@@ -102,6 +102,11 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         result, series = _result(Path(scratch), ended, asked.limits)
     if result.reason == STALE:
         return _refuse(STALE)
+    if ended.code == NO_ROOM:
+        return _refuse(
+            f"there is no room for the results of a case on {platform.node()}; make some in "
+            f"{tempfile.gettempdir()} and in the cache, and run the same command again"
+        )
     record = Record(
         id=resolved.id,
         case=resolved.case,
@@ -135,7 +140,8 @@ def start(scratch: Path, request: Request, limits: Limits) -> Ended:
     """
     path = scratch / "request.json"
     path.write_bytes(msgspec.json.encode(request))
-    ended = supervise.run([sys.executable, "-m", "hbvm_bench.worker", str(path)], ENVIRONMENT, limits)
+    command = [sys.executable, "-m", "hbvm_bench.worker", str(path)]
+    ended = supervise.run(command, ENVIRONMENT, limits, scratch / COMPILED)
     if ended.cause == "stopped":
         raise InterruptedRunError
     return ended
@@ -170,6 +176,9 @@ def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]
 
     if ended.cause == "timeout":
         return failed("timeout", f"did not end within {limits.wall_seconds:g} s")
+    if ended.cause == "compiling":
+        reason = f"was still compiling after {limits.compile_seconds:g} s; it is tried again in the next run"
+        return Result(outcome="timeout", status=COMPILING, reason=reason), b""
     if ended.cause == "memory":
         return failed("killed", f"used more than {limits.memory_gib:g} GiB of memory")
     if ended.code == -9:

@@ -17,6 +17,7 @@ from hbvm_bench.laws import Law
 
 T = TypeVar("T")
 SCHEMA = 1
+COMPILING = "compiling"
 # They command a terminal, or turn the direction in which a line is read.
 COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
 
@@ -179,7 +180,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     outcome : str
         ``ok``, ``stalled``, ``refused`` or ``crashed``; the other outcomes are seen from outside.
     status : str
-        The solution's own status; empty without a solution.
+        The solution's own status; empty without a solution, `COMPILING` for a timeout before it began.
     reason : str
         One sentence where something did not go as asked.
     t_stop : float or None

@@ -10,7 +10,7 @@ from hbvm_bench.campaign import Campaign, Case, Limits
 from hbvm_bench.execute import InterruptedRunError, Reply, execute, task_of
 from hbvm_bench.executors import Pool
 from hbvm_bench.identity import Resolved, resolve
-from hbvm_bench.records import Record, decoded
+from hbvm_bench.records import COMPILING, Record, decoded
 from hbvm_bench.store import Store, damage
 from hbvm_bench.worker import STALE
 from problems.errors import InputError
@@ -42,7 +42,7 @@ def plan(campaign: Campaign) -> list[Resolved]:
 
 def is_done(record: Record | None, limits: Limits) -> bool:
     """Whether a stored case need not run again under these limits."""
-    if record is None:
+    if record is None or record.result.status == COMPILING:
         return False
     stopped_by = {"timeout": "wall_seconds", "killed": "memory_gib"}.get(record.result.outcome)
     return stopped_by is None or getattr(limits, stopped_by) <= getattr(record.limits, stopped_by)

@@ -45,17 +45,19 @@ def time_cases(
         If the run was stopped; every visit that ended is in the store.
     """
     here = machine.describe()
+    failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
         for number in range(plan.rounds):
             for resolved in cases:
                 record = store.load(resolved.id)
-                if record is None or not timeable(record):
+                if record is None or not timeable(record) or resolved.id in failed:
                     continue
                 timing = _timing_of(record, here)
-                if timing.why or len(timing.rounds) > number:
+                if len(timing.rounds) > number:
                     continue
                 tell(number, resolved)
                 timing = _visit(resolved, timing, plan, limits, core)
+                failed |= {resolved.id} if timing.why else set()
                 store.save(_with_timing(store, record, resolved, timing))
 
 
@@ -68,7 +70,7 @@ def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) ->
         key
         for number in range(plan.rounds)
         for key, timing in timings.items()
-        if not timing.why and len(timing.rounds) <= number
+        if len(timing.rounds) <= number
     ]
 
 
@@ -95,7 +97,11 @@ def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits,
         ended = start(Path(scratch), request, limits)
         reply = decoded(Path(scratch) / "timing.json", TimingReply)
     if reply is None:
-        words = {"timeout": "the time limit", "memory": "the memory limit"}.get(ended.cause, ended.words)
+        words = {
+            "timeout": "the time limit",
+            "compiling": "still compiling",
+            "memory": "the memory limit",
+        }.get(ended.cause, ended.words)
         return msgspec.structs.replace(timing, why=f"not timed: {words}")
     if reply.round is None:
         return msgspec.structs.replace(timing, why=reply.why)
@@ -103,7 +109,10 @@ def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits,
 
 
 def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:
-    """Return what was timed on this machine; seconds of another one are no rounds of the same pass."""
+    """Return what was timed on this machine; seconds of another one are no rounds of the same pass.
+
+    Why a round failed is forgotten: it is tried again.
+    """
     if record.timing is None or (record.timing.machine and record.timing.machine != here):
         return Timing(machine=here)
-    return record.timing
+    return msgspec.structs.replace(record.timing, why="")

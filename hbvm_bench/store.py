@@ -20,7 +20,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -289,13 +289,45 @@ def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """Yield a temporary path that becomes ``path`` if the block succeeds, and vanishes if not."""
+    """Yield a temporary path that becomes ``path`` if the block succeeds, and vanishes if not.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it cannot be written, as on a full disk.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.part")
     try:
         yield temporary
         temporary.replace(path)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}.") from error
+        raise
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all of them or, as far as it can be helped, none.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If one cannot be written; what there was is left as it was.
+    """
+    folders = {path.parent for path in files}
+    new = {path for folder in folders for path in (folder, *folder.parents) if not path.exists()}
+    try:
+        for folder in folders:
+            ensure_writable(folder)
+        with ExitStack() as stack:
+            for path, content in files.items():
+                stack.enter_context(atomic(path)).write_bytes(content)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        for path in sorted(new, reverse=True):
+            with suppress(OSError):
+                path.rmdir()
         raise
 
 

@@ -19,6 +19,7 @@ from typing import IO, Literal
 
 from hbvm_bench.campaign import Limits
 
+Cause = Literal["exit", "compiling", "timeout", "memory", "stopped"]
 POLL = 0.02  # seconds, at first
 LONGEST_POLL = 0.2  # of a case that takes long: the runner needs little of the machine
 KEPT_OUTPUT = 64  # chunks of at most 4 KiB
@@ -36,7 +37,7 @@ class Ended:
     ----------
     code : int
         Its exit code; negative for a signal.
-    cause : {"exit", "timeout", "memory", "stopped"}
+    cause : {"exit", "compiling", "timeout", "memory", "stopped"}
         Whether it ended itself, or what it was killed for.
     seconds : float
         Wall time from start to end.
@@ -47,7 +48,7 @@ class Ended:
     """
 
     code: int
-    cause: Literal["exit", "timeout", "memory", "stopped"]
+    cause: Cause
     seconds: float
     peak_gib: float
     output: str
@@ -60,7 +61,9 @@ class Ended:
         return f"ended with exit code {self.code}"
 
 
-def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) -> Ended:
+def run(
+    command: Sequence[str], environment: Mapping[str, str], limits: Limits, compiled: Path | None = None
+) -> Ended:
     """Run a command to its end, or to its limits.
 
     Parameters
@@ -71,12 +74,16 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
         Added to this process's environment.
     limits : Limits
         Wall seconds and resident memory.
+    compiled : Path, optional
+        The child makes this file when it has compiled: the wall seconds count from then on, and the
+        seconds to compile until then.
 
     Returns
     -------
     Ended
     """
     start = time.monotonic()
+    begun = start if compiled is None else None
     child = subprocess.Popen(
         list(command),
         stdin=subprocess.DEVNULL,
@@ -91,7 +98,7 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
     assert child.stdout is not None
     reader = threading.Thread(target=_drain, args=(child.stdout, kept), daemon=True)
     reader.start()
-    cause: Literal["exit", "timeout", "memory", "stopped"] = "exit"
+    cause: Cause = "exit"
     peak, delay = 0.0, POLL
     try:
         while child.poll() is None:
@@ -100,8 +107,13 @@ def run(command: Sequence[str], environment: Mapping[str, str], limits: Limits) 
                 cause = "stopped"
             elif peak > limits.memory_gib:
                 cause = "memory"
-            elif time.monotonic() - start > limits.wall_seconds:
+            elif begun is not None and time.monotonic() - begun > limits.wall_seconds:
                 cause = "timeout"
+            elif begun is None and compiled is not None:
+                if compiled.exists():
+                    begun = time.monotonic()
+                elif time.monotonic() - start > limits.compile_seconds:
+                    cause = "compiling"
             if cause != "exit":
                 break
             _stopping.wait(delay)

@@ -7,14 +7,16 @@ started it says what.
 
 import contextlib
 import ctypes
+import errno
 import os
 import resource
 import signal
 import sys
 import traceback
+import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -29,9 +31,13 @@ from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.solve import solve
 from hbvm_bench.store import NAME, atomic, encode_series
 from integrators.integrate import Solution
-from integrators.protocol import Program, Status
+from integrators.protocol import MethodBase, Program, Status
 from problems.errors import InputError
+from problems.system import System
 
+COMPILED = "compiled"  # the file that says that compiling has ended
+NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
 STALE = "the sources or versions changed while the run was under way; start it again."
 ENVIRONMENT = {
@@ -85,11 +91,18 @@ def main(path: Path) -> None:
     _limit_and_die_with(request.runner)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
+    # complex states are no states, and their real parts are not either
+    warnings.simplefilter("error", np.exceptions.ComplexWarning)
     work = _time if request.mode == "time" else _measure
     name = "timing.json" if request.mode == "time" else "result.json"
-    reply = work(request, path.parent)
-    with atomic(path.parent / name) as temporary:
-        temporary.write_bytes(msgspec.json.encode(reply))
+    try:
+        reply = work(request, path.parent)
+        with atomic(path.parent / name) as temporary:
+            temporary.write_bytes(msgspec.json.encode(reply))
+    except (OSError, InputError) as error:
+        if getattr(error.__cause__ or error, "errno", None) in DISK:
+            sys.exit(NO_ROOM)
+        raise
 
 
 def _limit_and_die_with(runner: int) -> None:
@@ -114,9 +127,15 @@ def _measure(request: Request, directory: Path) -> Result:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem)
         program = resolved.method.compile(resolved.problem.system)
+        (directory / COMPILED).touch()
         if resolved.case.ensemble is not None:
             return _measure_ensemble(resolved, program, directory)
         solution = solve(resolved.problem, resolved.method, program, grid)
+    except OSError as error:
+        if error.errno in DISK:
+            raise
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
     except InputError as error:  # a missing library among them
         return Result(outcome="refused", reason=str(error))
     except Exception as error:
@@ -164,14 +183,29 @@ def _stored(measured: Measured, status: Status, reason: str, directory: Path) ->
 
 
 def _time(request: Request, directory: Path) -> TimingReply:
-    del directory
     resolved = _resolved(request)
     asked = resolved.case.ensemble
+    method: Any = _Telling(resolved.method, directory)
     if asked is None:
-        answer = timing.time_round(resolved.problem, resolved.method, request.plan)
+        answer = timing.time_round(resolved.problem, method, request.plan)
     else:
-        answer = ensemble.time_round(resolved.problem, resolved.method, asked, request.plan)
+        answer = ensemble.time_round(resolved.problem, method, asked, request.plan)
     return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
+
+
+class _Telling:
+    """A method that tells the runner when it has compiled."""
+
+    def __init__(self, method: MethodBase, directory: Path) -> None:
+        self._method, self._directory = method, directory
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._method, name)
+
+    def compile(self, system: System) -> Program:
+        program = self._method.compile(system)
+        (self._directory / COMPILED).touch()
+        return program
 
 
 def _resolved(request: Request) -> Resolved:
@@ -184,6 +218,8 @@ def _resolved(request: Request) -> Resolved:
 def _garbage(solution: Solution, grid: np.ndarray) -> str:
     """Return what is wrong with a solution that breaks the protocol, else ``""``."""
     t, y = solution.t, solution.y
+    if y.dtype.kind not in "fiu":
+        return f"the method returned states of the type {y.dtype}, not real numbers"
     if t.ndim != 1 or y.shape != (t.size, solution.problem.system.dim):
         return f"the method returned times of shape {t.shape} and states of shape {y.shape}"
     if t.size > grid.size or not np.array_equal(t, grid[: t.size]):

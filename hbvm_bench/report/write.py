@@ -7,7 +7,7 @@ from hbvm_bench.report import pack
 from hbvm_bench.report.content import Content, gather
 from hbvm_bench.report.html import page
 from hbvm_bench.report.markdown import markdown
-from hbvm_bench.store import Store, atomic, ensure_writable
+from hbvm_bench.store import Store, write_all
 from problems.errors import InputError
 
 FIGURES = "figures"
@@ -41,11 +41,7 @@ def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]
             f"run: {stores[0].index().command}."
         )
     made = rendered(gather(stores))
-    for folder in {(directory / name).parent for name in made}:
-        ensure_writable(folder)
-    for name, data in made.items():
-        with atomic(directory / name) as temporary:
-            temporary.write_bytes(data)
+    write_all({directory / name: data for name, data in made.items()})
     return [directory / "report.md", directory / "index.html"]
 
 

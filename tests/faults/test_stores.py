@@ -1,6 +1,8 @@
 """Damaged stores: a bad case is a row with its reason, and what is no store is one sentence."""
 
+import errno
 import json
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,11 +20,11 @@ from hbvm_bench.measure import measure
 from hbvm_bench.metrics import evaluate
 from hbvm_bench.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.runner import is_kept
-from hbvm_bench.store import NAME_LENGTH, Index, Store
+from hbvm_bench.store import NAME_LENGTH, Index, Store, write_all
 from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
 
-from .fault import sentence
+from .fault import Fault, is_met, sentence
 
 PROBLEM = "pendulum(t_end=5.0)"
 SOUND = "Gauss(s=2, h=0.25)"
@@ -229,3 +231,41 @@ def test_what_commands_a_terminal_is_in_no_record_and_on_no_page(damaged, here, 
     assert all("[2Jtitle" in text.replace("\\", "") for text in pages)
     for text in (printed.out, printed.err, *pages):
         assert not set("\x1b\x9b\u202e") & set(text)
+
+
+def filling_up(monkeypatch, room):
+    """Let a disk take so many files more, and then only half of one."""
+    write, left = Path.write_bytes, [room]
+
+    def limited(path, content):
+        left[0] -= 1
+        if left[0] < 0:
+            write(path, content[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", limited)
+
+
+@pytest.mark.parametrize("room", [0, 2])
+def test_a_full_disk_is_one_sentence_and_leaves_nothing_half_written(tmp_path, monkeypatch, room):
+    old = tmp_path / "r" / "report.md"
+    old.parent.mkdir()
+    old.write_text("an earlier report")
+    files = {tmp_path / "r" / name: b"text" for name in ("report.md", "figures/a.svg", "data/b.csv")}
+    filling_up(monkeypatch, room)
+    is_met(Fault("full disk", lambda: write_all(files), "cannot write '.*': No space left on device"))
+    assert list(tmp_path.rglob("*")) == [old.parent, old]
+    assert old.read_text() == "an earlier report"
+
+
+@pytest.mark.parametrize(
+    "command", [["merge", "sound", "run", "--out", "both"], ["report", "run", "-o", "r"]]
+)
+def test_a_command_that_meets_a_full_disk_ends_with_the_sentence(here, monkeypatch, capsys, command):
+    monkeypatch.setattr("hbvm_bench.report.write.rendered", lambda content: {"report.md": b"text"})
+    monkeypatch.setattr("hbvm_bench.report.write.gather", lambda stores: None)
+    filling_up(monkeypatch, 0)
+    assert cli.main(command) == 2
+    sentence(capsys.readouterr().err, "No space left on device")
+    assert not [path for path in Path().rglob("*") if path.suffix == ".part" or path.name == "r"]

@@ -14,6 +14,7 @@ TOYS = (
     "Straying",
     "Stalling",
     "Endless",
+    "Compiling",
     "Crashing",
     "Raising",
     "Exiting",

@@ -63,6 +63,7 @@ def test_a_case_that_works_has_metrics_and_series(toys, store):
         ("Garbage(what='times')", "crashed", "not asked for"),
         ("Garbage(what='few')", "crashed", "2 of 5"),
         ("Garbage(what='nan')", "crashed", "not finite from t = 1"),
+        ("Garbage(what='complex')", "crashed", "complex128, not real numbers"),
         ("Garbage(what='result')", "crashed", "no readable result"),
         ("Garbage(what='series')", "crashed", "no readable result"),
         ("Refusing()", "refused", "it accepts nothing"),
@@ -93,6 +94,19 @@ def test_what_never_returns_is_ended_at_its_limit(toys, store):
     record = run(store, "Endless()", Limits(wall_seconds=3))
     assert (record.result.outcome, record.result.reason) == ("timeout", "did not end within 3 s")
     assert time.monotonic() - start < 10
+
+
+def test_compiling_does_not_count_against_the_limit_of_a_case(toys, store):
+    record = run(store, "Compiling(wait=1.5)", Limits(wall_seconds=1.0))
+    assert record.result.outcome == "ok"
+
+
+def test_a_timeout_while_compiling_is_not_kept_for_ever(toys, store):
+    limits = Limits(compile_seconds=1.0)
+    record = run(store, "Compiling(wait=60.0)", limits)
+    assert (record.result.outcome, record.result.status) == ("timeout", "compiling")
+    assert "still compiling after 1 s" in record.result.reason
+    assert not runner.is_done(record, limits)
 
 
 def test_what_eats_memory_is_killed_at_its_limit(toys, store):
@@ -146,7 +160,11 @@ def test_a_timing_that_fails_says_why(toys, store):
     record = store.load(one.id)
     assert record.timing.why == "not timed: the time limit"
     assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
-    assert serial.missing_visits([one], store, PLAN) == []
+    assert set(serial.missing_visits([one], store, PLAN)) == {one.id}
+    once = TimingPlan(rounds=1, samples=1, shortest=1e-4, budget=0.1)
+    serial.time_cases([one], store, once, GENEROUS)
+    assert store.load(one.id).timing.why == ""
+    assert serial.missing_visits([one], store, once) == []
 
 
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):

@@ -125,6 +125,17 @@ class Endless(ToyBase):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Compiling(ToyBase):
+    """Takes its time to compile."""
+
+    wait: float = 1.5
+
+    def compile(self, system):
+        time.sleep(self.wait)
+        return ToyProgram(self)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Crashing(ToyBase):
     """Dies of a signal."""
 
@@ -189,6 +200,8 @@ class Garbage(ToyBase):
                 return Samples(times[:2], states[:2], Status.FINISHED)
             case "nan":
                 states[-1] = np.nan
+            case "complex":
+                states = states * 1j
             case "noise":
                 sys.stdout.buffer.write(os.urandom(1 << 20))
                 sys.stdout.flush()
