@@ -4,10 +4,12 @@ The id of a case is the sha256 of canonical JSON of all this. A rerun therefore
 does only what is missing or stale, and two stores can be merged by id.
 """
 
+import ast
 import hashlib
-import inspect
 import json
 import platform
+import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
@@ -18,7 +20,7 @@ from typing import Any
 import msgspec
 
 import integrators.registry
-import problems
+import problems.registry
 from hbvm_bench import reference
 from hbvm_bench.campaign import Case, Checks
 from hbvm_bench.spec import Spec, parse_spec
@@ -26,23 +28,8 @@ from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem
 
-OWN_PACKAGES = ("problems", "integrators")
-# The modules of this package whose change changes a measured number.
-MEASURING_MODULES = (
-    *("worker.py", "measure.py", "reference.py", "metrics.py", "quantities.py", "timing.py"),
-    *("checks.py", "drift.py", "ensemble.py", "laws.py", "solve.py", "starts.py"),
-)
-# The other direction, the conformance kit: no case runs them.
-UNUSED = ("integrators/plugins/", "integrators/testing.py", "integrators/exercises.py")
-# A row of a peer is not stale because our kernel changed, nor ours because of a peer.
-UNUSED_BY_OURS = ("integrators/peers/",)
-UNUSED_BY_PEERS = (
-    "integrators/kernel/",
-    *(
-        f"integrators/{name}.py"
-        for name in ("automatic", "gauss", "hbvm", "legendre", "line_integral", "tableau")
-    ),
-)
+OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
+WORKER = "hbvm_bench.worker"  # the process that makes the numbers
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
@@ -133,8 +120,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
         "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
         "versions": versions_of(method),
         "reference": _reference_digest(problem),
-        "source": source_digest(method),
-        "method_source": _module_digest(type(method)),
+        "source": source_digest(method, case),
     } | {
         # a case without them keeps the id it had
         name: msgspec.to_builtins(asked)
@@ -159,32 +145,67 @@ def is_ours(method: MethodBase) -> bool:
     return method.library.lower() == "hbvm-bench"
 
 
-def source_digest(method: MethodBase) -> str:
-    """Return the sha256 of our own sources that decide about the measured numbers of a method."""
-    return _digest_without(UNUSED_BY_PEERS if _is_peer(method) else UNUSED_BY_OURS if is_ours(method) else ())
+def source_digest(method: MethodBase, case: Case) -> str:
+    """Return the sha256 of the sources that decide about the measured numbers of a case.
 
-
-def _is_peer(method: MethodBase) -> bool:
-    return type(method).__module__.startswith("integrators.peers.")
+    They are those that the worker process imports: its own, the method's and the problem's, and
+    what these import of our packages, at their heads or anywhere below. So a row of a peer is
+    not stale because our kernel changed, nor one of ours because of a peer, nor any because of a report.
+    """
+    problem = problems.registry.factory(parse_spec(case.problem).name)
+    return _digest((WORKER, type(method).__module__, problem.__module__))
 
 
 @cache
-def _digest_without(unused: tuple[str, ...]) -> str:
+def _digest(modules: tuple[str, ...]) -> str:
     digest = hashlib.sha256()
-    for name, path in sources(unused):
+    for name, path in sorted(sources(modules).items()):
         digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 
-def sources(unused: tuple[str, ...]) -> list[tuple[str, Path]]:
-    """Return the files that decide about measured numbers, by name, without those that begin as given."""
-    paths: list[tuple[str, Path]] = []
-    for package in OWN_PACKAGES:
-        root = Path(str(files(package)))
-        paths += [(f"{package}/{p.relative_to(root).as_posix()}", p) for p in root.rglob("*.py")]
-    here = Path(str(files("hbvm_bench")))
-    paths += [(f"hbvm_bench/{name}", here / name) for name in MEASURING_MODULES]
-    return sorted(item for item in paths if not item[0].startswith((*UNUSED, *unused)))
+def sources(modules: Iterable[str]) -> dict[str, Path]:
+    """Return the files of modules, and of what they import of our packages, by the modules' names."""
+    found: dict[str, Path] = {}
+    left = list(modules)
+    while left:
+        name = left.pop()
+        if name not in found and (path := _file_of(name)) is not None:
+            found[name] = path
+            left += [other for other in _imported(path, name) if other.partition(".")[0] in OWN_PACKAGES]
+    return found
+
+
+@cache
+def _file_of(module: str) -> Path | None:
+    """Return a module's file; for a third party's it must have been imported."""
+    package, *rest = module.split(".")
+    if package not in OWN_PACKAGES:
+        file = getattr(sys.modules.get(module), "__file__", None)
+        return Path(file) if file else None
+    base = Path(str(files(package))).joinpath(*rest)
+    return next((path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file()), None)
+
+
+@cache
+def _imported(path: Path, module: str) -> frozenset[str]:
+    """Return the modules, and what may be modules, that a file names in its imports."""
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    found: set[str] = set()
+    left: list[Any] = [ast.parse(path.read_bytes())]
+    while left:
+        node = left.pop()
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            origin = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
+        elif not (isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"):
+            for blocks in ("body", "orelse", "finalbody", "handlers", "cases"):  # statements only: quick
+                block = getattr(node, blocks, ())
+                left += block if isinstance(block, list) else ()
+    return frozenset(found)
 
 
 def _reference_digest(problem: Problem) -> str:
@@ -192,15 +213,6 @@ def _reference_digest(problem: Problem) -> str:
     if stored is None:
         return ""
     return hashlib.sha256(msgspec.json.encode([stored.t, stored.y])).hexdigest()
-
-
-@cache
-def _module_digest(cls: type) -> str:
-    # a third party's method is not covered by source_digest
-    try:
-        return hashlib.sha256(Path(inspect.getfile(cls)).read_bytes()).hexdigest()
-    except (OSError, TypeError):
-        return ""
 
 
 @cache

@@ -4,7 +4,7 @@ import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from types import CodeType, MappingProxyType
+from types import CodeType, FunctionType, MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -144,14 +144,7 @@ class Foreign(System):
     def fingerprint(self) -> str:
         """SHA-256 of the function's code and of what it takes from around it, not of parameters' values."""
         digest = hashlib.sha256(f"foreign {self.dim} {self.name}\n".encode())
-        function = getattr(self.f, "py_func", self.f)
-        code = getattr(function, "__code__", None)
-        if isinstance(code, CodeType):
-            _feed(digest, code)
-            for cell in getattr(function, "__closure__", None) or ():
-                digest.update(_told(cell.cell_contents).encode())
-        else:
-            digest.update(_told(function).encode())
+        _feed(digest, self.f, set())
         return digest.hexdigest()
 
 
@@ -172,19 +165,44 @@ def _form(f: Callable[..., Any]) -> tuple[bool, bool]:
     return takes_parameters, rest == 1
 
 
-def _feed(digest: Any, code: CodeType) -> None:
-    digest.update(code.co_code + repr((code.co_names, code.co_varnames, code.co_freevars)).encode())
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            _feed(digest, constant)
-        else:
-            digest.update(repr(constant).encode())
+def _feed(digest: Any, value: Any, seen: set[int]) -> None:
+    """Add to a digest what a value is, the same from process to process.
+
+    Of a function that is its code and all that it takes from around it: defaults, variables of
+    functions around it, globals, and the functions among these likewise.
+    """
+    value = getattr(value, "py_func", value)
+    if isinstance(value, int | float | complex | str | bytes | np.generic | None):
+        digest.update(f"{value!r};".encode())
+        return
+    digest.update(f"{type(value).__module__}.{type(value).__qualname__}:".encode())
+    if id(value) in seen:
+        return
+    seen.add(id(value))
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
+    elif isinstance(value, CodeType):
+        digest.update(value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode())
+        _feed(digest, value.co_consts, seen)
+    elif isinstance(value, FunctionType):
+        cells = [cell.cell_contents for cell in value.__closure__ or ()]
+        named = {
+            name: value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__
+        }
+        _feed(digest, [value.__code__, value.__defaults__, value.__kwdefaults__, cells, named], seen)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            _feed(digest, [key, item], seen)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _feed(digest, item, seen)
+    elif isinstance(value, ModuleType | type) or (callable(value) and hasattr(value, "__qualname__")):
+        digest.update(getattr(value, "__qualname__", value.__name__).encode())
+    else:
+        _feed(digest, getattr(value, "__dict__", None), seen)
 
 
-def _told(value: Any) -> str:
-    """Return a text that stays the same from process to process."""
-    if isinstance(value, int | float | complex | str | bytes | tuple | list | dict | None):
-        return repr(value)
-    if isinstance(value, np.ndarray):
-        return hashlib.sha256(value.tobytes()).hexdigest()
-    return f"{type(value).__module__}.{type(value).__qualname__} {getattr(value, '__qualname__', '')}"
+def _names(code: CodeType) -> list[str]:
+    """Return the names that code may look up, that of functions within it too."""
+    within = [name for inner in code.co_consts if isinstance(inner, CodeType) for name in _names(inner)]
+    return sorted({*code.co_names, *within})

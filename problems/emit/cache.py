@@ -139,7 +139,8 @@ def _written(name: str, text: str) -> Path:
     """Return a file that holds the source, in a folder that numba can write to as well."""
     folder, writable = _prepared(os.environ.get(VARIABLE), os.environ.get("XDG_CACHE_HOME"))
     error = None
-    for path in (folder / name, _own() / name) if writable else (_own() / name,):
+    for place in (lambda: folder, _own) if writable else (_own,):
+        path = place() / name
         # Left alone when it is right: numba takes a newer file for a changed one.
         if _holds(path, text):
             return path
@@ -149,7 +150,7 @@ def _written(name: str, text: str) -> Path:
             error = full_or_gone
         else:
             return path
-    raise InputError(f"cannot write generated code to {path.parent}: {error}; make room, or set {VARIABLE}.")
+    raise InputError(f"cannot write generated code to {folder}: {error}; make room, or set {VARIABLE}.")
 
 
 def _holds(path: Path, text: str) -> bool:

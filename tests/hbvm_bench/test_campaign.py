@@ -110,7 +110,7 @@ def test_an_id_changes_with_everything_that_matters(monkeypatch):
     monkeypatch.setattr("hbvm_bench.identity._version", lambda name: "0.0")
     others.append(_id())
     monkeypatch.undo()
-    monkeypatch.setattr("hbvm_bench.identity.source_digest", lambda method: "edited")
+    monkeypatch.setattr("hbvm_bench.identity.source_digest", lambda method, case: "edited")
     others.append(_id())
     monkeypatch.undo()
     assert len({_id(), *others}) == 8

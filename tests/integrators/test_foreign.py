@@ -195,6 +195,28 @@ def test_a_fingerprint_follows_from_the_code_and_what_it_takes_from_around_it():
     assert Foreign(in_place, dim=2).fingerprint != Foreign(parametric, dim=2).fingerprint
 
 
+DECAY = {"rate": np.array([1.0])}
+
+
+def rate():
+    return DECAY["rate"][0]
+
+
+def test_a_fingerprint_follows_from_globals_defaults_and_the_functions_it_calls(monkeypatch):
+    def of(f):
+        return Foreign(f, dim=1, name="same").fingerprint
+
+    def calling(t, y):
+        return [-rate() * y[0]]
+
+    before = of(calling)
+    assert of(calling) == before
+    monkeypatch.setitem(DECAY, "rate", np.array([1.0 + 1e-12]))
+    assert of(calling) != before
+    assert of(lambda t, y, a=1.0: [a * y[0]]) != of(lambda t, y, a=2.0: [a * y[0]])
+    assert of(lambda t, y, *, a=1.0: [a * y[0]]) != of(lambda t, y, *, a=2.0: [a * y[0]])
+
+
 def test_the_field_on_arrays_is_the_function_state_by_state():
     states = np.arange(6.0).reshape(2, 3)
     field = emit.numpy(WRITTEN["python with parameters"], "field")
