@@ -29,6 +29,7 @@ Made = TypeVar("Made", bytes, str)
 
 _lock = threading.RLock()
 _loaded: dict[str, "Native"] = {}
+_waited: list[float] = []  # seconds, for other processes
 _engines: list[Any] = []  # an engine owns its code: none may be collected
 
 
@@ -94,17 +95,23 @@ def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:
         if (known := _loaded.get(name)) is not None:
             return Native(known.address, known.note, True, 0.0)
         full = store.key(name, platform())
-        started = perf_counter()
+        started = clock()
         kept = store.get(full)
         if not kept:
+            before = perf_counter()
             with store.making(full):  # processes that start together need it made once
-                started = perf_counter()  # what another one compiled meanwhile was not our time
+                _waited.append(perf_counter() - before)
                 kept = store.get(full)
                 if not kept:
                     note, code = make()
                     store.put(full, note.encode("ascii") + code)
-                    return _keep(name, Native(load(code), note, False, perf_counter() - started))
-        return _keep(name, Native(load(kept[1:]), chr(kept[0]), True, perf_counter() - started))
+                    return _keep(name, Native(load(code), note, False, clock() - started))
+        return _keep(name, Native(load(kept[1:]), chr(kept[0]), True, clock() - started))
+
+
+def clock() -> float:
+    """Return seconds, but for those in which another process compiled what this one waited for."""
+    return perf_counter() - sum(_waited)
 
 
 def _keep(name: str, native: Native) -> Native:

@@ -30,7 +30,8 @@ OBTAIN = textwrap.dedent(
 
     native.load = len
     print("ready", flush=True)
-    print(native.obtain("some key", make).from_cache, flush=True)
+    started = native.clock()
+    print(native.obtain("some key", make).from_cache, native.clock() - started < 1.0, flush=True)
     """
 )
 
@@ -45,9 +46,10 @@ def starting(folder, seconds):
 
 
 def test_of_processes_that_need_the_same_code_one_compiles(tmp_path):
-    answers = [one.communicate(timeout=60)[0] for one in [starting(tmp_path, 1.0) for _ in range(4)]]
+    answers = [one.communicate(timeout=60)[0] for one in [starting(tmp_path, 1.5) for _ in range(4)]]
     assert (tmp_path / "log").read_text() == "made\n"
-    assert sorted(answers) == ["ready\nFalse\n", *3 * ["ready\nTrue\n"]]
+    # code from the cache in a moment, whatever the wait: 0.01 s measured beside other work
+    assert sorted(answers) == ["ready\nFalse False\n", *3 * ["ready\nTrue True\n"]]
 
 
 def test_one_that_dies_while_it_compiles_stops_nobody(tmp_path):
@@ -59,7 +61,7 @@ def test_one_that_dies_while_it_compiles_stops_nobody(tmp_path):
     assert second.stdout.readline() == "ready\n"
     first.kill()
     first.communicate()
-    assert second.communicate(timeout=60)[0] == "False\n"
+    assert second.communicate(timeout=60)[0] == "False True\n"
 
 
 def test_code_under_anothers_name_is_not_run(tmp_path, monkeypatch):

@@ -1,11 +1,10 @@
 """HBVM(k, s) with steps of varying length, compiled for one system."""
 
 import math
-from time import perf_counter
 
 from numpy.typing import ArrayLike
 
-from integrators.kernel import layout, tables
+from integrators.kernel import layout, native, tables
 from integrators.kernel.adaptive import engine
 from integrators.kernel.adaptive.stepper import AdaptiveStepper
 from integrators.kernel.program import HBVMProgram
@@ -66,7 +65,7 @@ class AdaptiveProgram(HBVMProgram):
         solver: str = "auto",
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
-        started = perf_counter()
+        started = native.clock()
         self.tol, self.defect, self.first = tol, defect, h
         made = engine.code()
         self.from_cache = self.from_cache and made.from_cache
@@ -84,7 +83,7 @@ class AdaptiveProgram(HBVMProgram):
         degrees = [0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1]
         self._estimators = aligned(len(degrees) * 8 * -(-k // 8))
         self._estimators.reshape(len(degrees), -1)[:, :k] = basis.T[degrees]
-        self.compile_seconds += perf_counter() - started
+        self.compile_seconds += native.clock() - started
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
         """Return a stepper at ``t0``; as `HBVMProgram.start`."""
