@@ -14,7 +14,7 @@ from hbvm_bench import listing, terminal
 from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import find
 from hbvm_bench.records import printable
-from hbvm_bench.store import Store, ensure_writable
+from hbvm_bench.store import Store, ensure_writable, write_all
 from problems.errors import InputError
 
 app = typer.Typer(
@@ -172,7 +172,7 @@ def reference(
     else:
         print(f"largest difference from the stored reference: {references.difference(stored, fresh):.1e}")
     if out is not None:
-        out.write_text(references.encode(fresh), encoding="ascii")
+        write_all({out: references.encode(fresh).encode("ascii")})
 
 
 if __name__ == "__main__":

@@ -128,7 +128,7 @@ def damaged(tmp_path_factory):
         if damage in SERIES:
             series = store.series(case_id)
             damage.do(series)
-            np.savez(series_path(store, case_id), **series)
+            np.savez(series_path(store, case_id), **series)  # pyright: ignore[reportArgumentType]
         else:
             edit(series_path(store, case_id).with_suffix(".json"), damage.do)
     edit(store.directory / "campaign.json", lambda data: data["campaign"].update(title="\x1b[2Jtitle"))
