@@ -98,6 +98,10 @@ class DiffraxStepper(FixedStepper):
     def _aside(self, part: float) -> Array:
         return self._solve(self._time(), part, 0, 1)[0]
 
+    def _shorten(self, part: float) -> None:
+        self._states, self._inner = self._solve(self._time(), part, 0, 1)
+        self._stats.evaluations = (self._stats.evaluations or 0) + self._program.method.evaluations
+
     def _save_steps(self) -> Any:
         # JAX's arrays are immutable.
         return self._way, self._states, self._inner

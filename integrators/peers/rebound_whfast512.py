@@ -105,7 +105,12 @@ class ScaledProgram(ReboundProgram):
 
 
 class Stepper512(ReboundStepper):
-    """A trajectory; the steps between two samples are taken in one go."""
+    """A trajectory; the steps between two samples are taken in one go.
+
+    REBOUND has it end with a whole step only, so there is no ``"land"``.
+    """
+
+    samplings = ("side", "steps")
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         super()._restart(t, y, h)
