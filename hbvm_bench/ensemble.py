@@ -6,6 +6,7 @@ of a few of them against 128-bit Taylor solutions, and the time of all.
 
 import gc
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -57,7 +58,13 @@ class Members:
     seconds: float
 
 
-def integrate(program: Program, starts: Array, problem: Problem, sample: str | None = None) -> Members:
+def integrate(
+    program: Program,
+    starts: Array,
+    problem: Problem,
+    sample: str | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Members:
     """Integrate every start to the end of the problem's span.
 
     Parameters
@@ -70,13 +77,15 @@ def integrate(program: Program, starts: Array, problem: Problem, sample: str | N
         Parameters and span.
     sample : str, optional
         How one trajectory meets the end; see `integrators.protocol.MethodBase.to_end`.
+    clock : callable
+        Returns seconds.
     """
     end = np.array([problem.t_end])
     batch = getattr(program, "batch", None)
     if batch is not None:
-        begin = time.perf_counter()
+        begin = clock()
         made: Any = batch(starts, problem.par, times=end, t0=problem.t0)
-        spent = time.perf_counter() - begin
+        spent = clock() - begin
         counts = getattr(made, "evaluations", None)
         return Members(
             y=made.y[:, -1],
@@ -92,9 +101,9 @@ def integrate(program: Program, starts: Array, problem: Problem, sample: str | N
     counted = True
     for i, start in enumerate(starts):
         stepper = program.start(start, problem.par, problem.t0)
-        begin = time.perf_counter()
+        begin = clock()
         samples = stepper.advance(end, sample=sample)
-        spent += time.perf_counter() - begin
+        spent += clock() - begin
         status.append(samples.status)
         reason = reason or samples.reason
         if samples.status is Status.FINISHED:
@@ -174,15 +183,17 @@ class EnsembleRun:
     problem: Problem
     sample: str | None
 
-    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
         collecting = gc.isenabled()
         gc.disable()
         try:
             spent = 0.0
             for _ in range(repeats - 1):
-                spent += integrate(self.program, self.starts, self.problem, self.sample).seconds
-            members = integrate(self.program, self.starts, self.problem, self.sample)
+                spent += integrate(self.program, self.starts, self.problem, self.sample, clock).seconds
+            members = integrate(self.program, self.starts, self.problem, self.sample, clock)
             spent += members.seconds
         finally:
             if collecting:

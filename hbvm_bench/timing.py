@@ -3,6 +3,7 @@
 import gc
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Protocol
@@ -67,7 +68,9 @@ class Run:
         end = problem.t_end if t_end is None else t_end
         return cls(program, problem.y0, problem.par, problem.t0, end, method.to_end)
 
-    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` runs one after the other, and what the last returned.
 
         Only ``advance`` is timed: making a stepper belongs to setting up. Garbage
@@ -80,9 +83,9 @@ class Run:
         try:
             for _ in range(repeats):
                 stepper = self.program.start(self.y0, self.par, self.t0)
-                start = time.perf_counter()
+                start = clock()
                 samples = stepper.advance(end, sample=self.sample)
-                spent += time.perf_counter() - start
+                spent += clock() - start
         finally:
             if collecting:
                 gc.enable()
