@@ -118,10 +118,7 @@ def duels(
 def _duel(key: str, problem: Problem, rounds: int) -> Duel:
     true = truth.known(problem)
     methods = [make_method(text) for text in (OURS, INSTEAD.get(key, THEIRS))]
-    runs = [
-        Run(method.compile(problem.system), problem.y0, problem.par, problem.t0, problem.t_end, sample=sample)
-        for method, sample in zip(methods, (None, "land"), strict=True)
-    ]
+    runs = [Run.of(problem, method) for method in methods]
     errors = [_errors(problem, method, run, true) for method, run in zip(methods, runs, strict=True)]
     seconds: list[list[float]] = [[], []]
     for _ in range(rounds):

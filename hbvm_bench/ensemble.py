@@ -6,6 +6,7 @@ of a few of them against 128-bit Taylor solutions, and the time of all.
 
 import gc
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -45,6 +46,8 @@ class Members:
         That of the first that failed.
     steps, evaluations : int or None
         Over all.
+    seconds : float
+        Of integrating; making a stepper for each start, where there is no batch, is left out.
     """
 
     y: Array
@@ -52,9 +55,16 @@ class Members:
     reason: str
     steps: int
     evaluations: int | None
+    seconds: float
 
 
-def integrate(program: Program, starts: Array, problem: Problem) -> Members:
+def integrate(
+    program: Program,
+    starts: Array,
+    problem: Problem,
+    sample: str | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Members:
     """Integrate every start to the end of the problem's span.
 
     Parameters
@@ -65,11 +75,17 @@ def integrate(program: Program, starts: Array, problem: Problem) -> Members:
         Where they start.
     problem : Problem
         Parameters and span.
+    sample : str, optional
+        How one trajectory meets the end; see `integrators.protocol.MethodBase.to_end`.
+    clock : callable
+        Returns seconds.
     """
     end = np.array([problem.t_end])
     batch = getattr(program, "batch", None)
     if batch is not None:
+        begin = clock()
         made: Any = batch(starts, problem.par, times=end, t0=problem.t0)
+        spent = clock() - begin
         counts = getattr(made, "evaluations", None)
         return Members(
             y=made.y[:, -1],
@@ -77,14 +93,17 @@ def integrate(program: Program, starts: Array, problem: Problem) -> Members:
             reason=next((reason for reason in made.reason if reason), ""),
             steps=int(made.steps.sum()),
             evaluations=None if counts is None else int(counts.sum()),
+            seconds=spent,
         )
     y = np.full(starts.shape, np.nan)
     status: list[Status] = []
-    reason, steps, evaluations = "", 0, 0
+    reason, steps, evaluations, spent = "", 0, 0, 0.0
     counted = True
     for i, start in enumerate(starts):
         stepper = program.start(start, problem.par, problem.t0)
-        samples = stepper.advance(end)
+        begin = clock()
+        samples = stepper.advance(end, sample=sample)
+        spent += clock() - begin
         status.append(samples.status)
         reason = reason or samples.reason
         if samples.status is Status.FINISHED:
@@ -92,7 +111,7 @@ def integrate(program: Program, starts: Array, problem: Problem) -> Members:
         steps += stepper.stats.steps
         counted = counted and stepper.stats.evaluations is not None
         evaluations += stepper.stats.evaluations or 0
-    return Members(y, status, reason, steps, evaluations if counted else None)
+    return Members(y, status, reason, steps, evaluations if counted else None, spent)
 
 
 def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Measured, Status, str]:
@@ -155,22 +174,27 @@ class EnsembleRun:
         Where the trajectories start.
     problem : Problem
         Parameters and span.
+    sample : str or None
+        How one trajectory meets the end.
     """
 
     program: Program
     starts: Array
     problem: Problem
+    sample: str | None
 
-    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
         collecting = gc.isenabled()
         gc.disable()
         try:
-            start = time.perf_counter()
+            spent = 0.0
             for _ in range(repeats - 1):
-                integrate(self.program, self.starts, self.problem)
-            members = integrate(self.program, self.starts, self.problem)
-            spent = time.perf_counter() - start
+                spent += integrate(self.program, self.starts, self.problem, self.sample, clock).seconds
+            members = integrate(self.program, self.starts, self.problem, self.sample, clock)
+            spent += members.seconds
         finally:
             if collecting:
                 gc.enable()
@@ -185,8 +209,8 @@ def time_round(
     """Take the samples of one round; see `hbvm_bench.timing.time_round`."""
     program = method.compile(problem.system)
     starts = cloud(problem, ensemble.count, ensemble.spread)
-    EnsembleRun(program, starts[:WARM_UP], problem).seconds()
-    return sampled(EnsembleRun(program, starts, problem), program, plan)
+    EnsembleRun(program, starts[:WARM_UP], problem, method.to_end).seconds()
+    return sampled(EnsembleRun(program, starts, problem, method.to_end), program, plan)
 
 
 def _errors(problem: Problem, starts: Array, y: Array) -> dict[str, Array]:

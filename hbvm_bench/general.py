@@ -206,22 +206,24 @@ def _outcome(name: str, case: Case, end: Array, text: str, limit: float) -> Outc
     ours = method.library == "hbvm-bench"
     limit = np.inf if ours else limit  # the first run of ours may compile the implicit solver on its way
     times = np.linspace(problem.t0, problem.t_end, PIECES + 1)[1:]
-    found = replace(_run(name, case, end, stepper(), times, limit), method=repr(method))
+    found = replace(_run(name, case, end, stepper(), times, limit, None), method=repr(method))
     if found.ending or (found.seconds > QUICK and not ours):
         return found
-    whole = [_run(name, case, end, stepper(), times[-1:], limit) for _ in range(REPEATS)]
+    whole = [_run(name, case, end, stepper(), times[-1:], limit, method.to_end) for _ in range(REPEATS)]
     last, seconds = whole[-1], min(run.seconds for run in whole)
     return replace(last, method=repr(method), energy=found.energy, seconds=seconds)
 
 
-def _run(name: str, case: Case, end: Array, stepper: Stepper, times: Array, limit: float) -> Outcome:
+def _run(
+    name: str, case: Case, end: Array, stepper: Stepper, times: Array, limit: float, sample: str | None
+) -> Outcome:
     """Return what one run comes to; its method is not named yet."""
     problem = case.problem
     keeps = "energy" in problem.system.invariant_names
     energy, spent, ending, y = 0.0, 0.0, "", problem.y0
     for t in times:
         begun = time.thread_time()
-        samples = stepper.advance(np.array([t]))
+        samples = stepper.advance(np.array([t]), sample=sample)
         spent += time.thread_time() - begun
         if samples.status is not Status.FINISHED:
             ending = f"{samples.status.value}: {samples.reason}"

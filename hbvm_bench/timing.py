@@ -3,7 +3,8 @@
 import gc
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Protocol
 
@@ -33,7 +34,7 @@ class Run:
     t0, t_end : float
         The span.
     sample : str or None
-        How the end time is met; see `integrators.protocol.Stepper.advance`.
+        How the end time is met; see `integrators.protocol.MethodBase.to_end`.
     """
 
     program: Program
@@ -41,9 +42,35 @@ class Run:
     par: NDArray[np.float64]
     t0: float
     t_end: float
-    sample: str | None = None
+    sample: str | None
 
-    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        method: MethodBase,
+        program: Program | None = None,
+        *,
+        t_end: float | None = None,
+    ) -> "Run":
+        """Return the run of a method on a problem, which meets its end as the method's library does.
+
+        Parameters
+        ----------
+        problem, method
+            What to integrate, and how.
+        program : Program, optional
+            What ``method.compile(problem.system)`` returned; made anew by default.
+        t_end : float, optional
+            The problem's own by default.
+        """
+        program = method.compile(problem.system) if program is None else program
+        end = problem.t_end if t_end is None else t_end
+        return cls(program, problem.y0, problem.par, problem.t0, end, method.to_end)
+
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` runs one after the other, and what the last returned.
 
         Only ``advance`` is timed: making a stepper belongs to setting up. Garbage
@@ -56,9 +83,9 @@ class Run:
         try:
             for _ in range(repeats):
                 stepper = self.program.start(self.y0, self.par, self.t0)
-                start = time.perf_counter()
+                start = clock()
                 samples = stepper.advance(end, sample=self.sample)
-                spent += time.perf_counter() - start
+                spent += clock() - start
         finally:
             if collecting:
                 gc.enable()
@@ -68,9 +95,7 @@ class Run:
 
     def until(self, share: float) -> "Run":
         """Return the run over the first ``share`` of the span."""
-        return Run(
-            self.program, self.y0, self.par, self.t0, self.t0 + share * (self.t_end - self.t0), self.sample
-        )
+        return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
 
 
 def repeats_for(seconds: float, shortest: float) -> int:
@@ -93,10 +118,9 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
     TimingRound or str
         A sentence where the integration does not reach the end.
     """
-    program = method.compile(problem.system)
-    run = Run(program, problem.y0, problem.par, problem.t0, problem.t_end)
+    run = Run.of(problem, method)
     run.until(WARM_UP).seconds()
-    return sampled(run, program, plan)
+    return sampled(run, run.program, plan)
 
 
 class Timeable(Protocol):

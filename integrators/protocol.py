@@ -15,7 +15,9 @@ A **method** is a description; it holds options and nothing else.
    the seconds that this took. Parameters are run-time values.
 5. ``program.start(y0, par, t0)`` returns a `Stepper` at ``t0``.
 6. A stepper's ``advance`` takes the bulk of the work in compiled code and
-   returns the samples it reached; ``step`` takes one step, for looking.
+   returns the samples it reached; ``step`` takes one step, for looking. The class
+   attribute ``to_end`` names the sampling by which the library itself goes to one
+   end time, where it is another than the method's best: that one is timed.
 7. A numerical failure is a `Status`, never an exception, never a silent NaN,
    never an endless loop; the samples computed before it are returned.
 8. ``checkpoint`` returns all that makes the continuation bit for bit the same;
@@ -183,11 +185,21 @@ class Program(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class MethodBase:
-    """Base of all methods: a frozen description that prints as the call that makes it."""
+    """Base of all methods: a frozen description that prints as the call that makes it.
+
+    Attributes
+    ----------
+    library, citation, family : str
+        The package that does the work, how its authors ask to be cited, what kind of method it is.
+    to_end : str or None
+        The sampling by which the library's own documentation goes to one end time, which is what
+        a clock runs for; ``None`` where that is the method's best, see `Stepper.advance`.
+    """
 
     library: ClassVar[str] = "hbvm-bench"
     citation: ClassVar[str] = ""
     family: ClassVar[str] = ""
+    to_end: ClassVar[str | None] = None
 
     @property
     def order(self) -> int | None:

@@ -235,6 +235,7 @@ def samplings_work_or_are_refused(method: MethodBase, problem: Problem) -> str |
     _raises(
         InputError, lambda: _start(method, problem).advance(grid, sample="no such"), "unknown samplings fail"
     )
+    _finished(_start(method, problem).advance(grid[-1:], sample=method.to_end), method)
     return None
 
 

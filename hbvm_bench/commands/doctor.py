@@ -1,6 +1,9 @@
 """The command ``hbvm-bench doctor``."""
 
+import sys
+import tempfile
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -10,6 +13,8 @@ from rich.text import Text
 
 from hbvm_bench import doctor as examining
 from hbvm_bench import terminal
+from hbvm_bench.store import ensure_writable
+from problems.errors import InputError
 
 UNHEALTHY = 1
 HEADINGS = {"installed": "What is installed", "timings": "Whether times measured here can be trusted"}
@@ -17,12 +22,25 @@ MARKS = {"ok": ("ok", "green"), "note": ("note", "yellow"), "bad": ("bad", "bold
 
 
 def doctor(
+    peers: Annotated[
+        bool, typer.Option("--peers", help="Time every peer through the bench and alone; some minutes.")
+    ] = False,
+    rounds: Annotated[int | None, typer.Option(min=2, help="Of --peers: times each, in turn.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Of --peers: a JSON file for the result.", dir_okay=False)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
 ) -> None:
     """Say what is missing on this machine, and whether times measured here can be trusted.
 
-    Exit code 0 when nothing is bad, 1 when a peer is missing or times are doubtful.
+    Exit code 0 when nothing is bad, 1 when a peer is missing or times are doubtful. With --peers: 1 when
+    the bench costs a peer more than a twentieth of its time, or one did not run.
     """
+    if peers:
+        _peers(rounds, out, as_json)
+        return
+    if rounds is not None or out is not None:
+        raise InputError("--rounds and --out belong to --peers: hbvm-bench doctor --peers --out FILE.")
     findings = examining.examine()
     healthy = examining.healthy(findings)
     if as_json:
@@ -31,6 +49,33 @@ def doctor(
     else:
         _print(findings)
     if not healthy:
+        raise typer.Exit(UNHEALTHY)
+
+
+def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
+    from hbvm_bench import peer_check, processes
+    from hbvm_bench.cells import on_terminal
+
+    if out is not None:
+        ensure_writable(out.parent)
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        made, request = Path(scratch) / "result.json", Path(scratch) / "request.json"
+        asked = peer_check.Request(out=str(made), rounds=rounds or peer_check.ROUNDS)
+        request.write_bytes(msgspec.json.encode(asked))
+        code = processes.wait([sys.executable, "-m", "hbvm_bench.peer_check", str(request)])
+        result = peer_check.load(made)
+    if code != 0 or result is None:
+        print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
+        raise typer.Exit(UNHEALTHY)
+    if out is not None:
+        peer_check.save(result, out)
+    if as_json:
+        print(msgspec.json.format(msgspec.json.encode(result), indent=1).decode())
+    else:
+        terminal.console().print(on_terminal(peer_check.table(result)))
+        for method, reason in result.refused.items():
+            print(f"{method} did not run: {reason}")
+    if result.refused or any(row.beyond for row in result.rows):
         raise typer.Exit(UNHEALTHY)
 
 

@@ -21,6 +21,7 @@ from hbvm_bench.report.png import small
 from hbvm_bench.report.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
 from hbvm_bench.spec import parse_spec
 from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.summaries import fairness
 from hbvm_bench.table import seconds
 
 Array = NDArray[np.float64]
@@ -41,7 +42,9 @@ def write(result: Endurance, directory: Path) -> Path:
     """
     look = looks(result)
     made = over_time(result, look)
-    content = {"result": result, "tables": tables(result), "picture": made, "figure": FIGURE}
+    peers = fairness.peers()
+    shown = [*tables(result), *([] if peers is None else [peers])]
+    content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
     environment = shell.environment("hbvm_bench.endure", autoescape=False)
     environment.filters |= {"code": code, "table": in_markdown}
     files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}

@@ -87,11 +87,7 @@ def prepare(problem: Problem, setting: Setting, true: Reference, t_end: float) -
         method = make_method(setting.method)
         if reason := method.accepts(problem):
             return _nothing(setting, "refused", reason)
-        program = method.compile(problem.system)
-        run = Run(
-            program, problem.y0, problem.par, problem.t0, t_end, sample=FAMILIES[setting.family].landing
-        )
-        return _measured(problem, setting, method, run, true)
+        return _measured(problem, setting, method, Run.of(problem, method, t_end=t_end), true)
     except InputError as error:  # a missing library among them
         return _nothing(setting, "refused", str(error))
     except Exception as error:  # a peer's adapter may raise anything; the race goes on

@@ -22,6 +22,7 @@ from hbvm_bench.report.plots import as_csv
 from hbvm_bench.report.png import small
 from hbvm_bench.report.style import Look
 from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.summaries import fairness
 
 FIGURES = "figures"
 BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful
@@ -162,6 +163,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "sections": sections,
         "top": top,
         "rules": RULES,
+        "peers": fairness.peers(),
         "families": [(family.title, family.code) for family in FAMILIES.values()],
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),

@@ -33,9 +33,6 @@ class Family:
         The method whose colour and marker it has.
     fixed : bool
         Whether its step is fixed, so that its samples are own steps.
-    landing : str or None
-        How a run meets its end time: by a shortened last step where that is the
-        library's own way.
     code : str
         What machine code runs.
     """
@@ -44,7 +41,6 @@ class Family:
     short: str
     lead: str
     fixed: bool
-    landing: str | None
     code: str
 
 
@@ -54,7 +50,6 @@ FAMILIES: dict[str, Family] = {
         "HBVM, Gauss",
         "HBVM",
         True,
-        None,
         "compiled here by numba for this processor, vector instructions as it has them",
     ),
     "heyoka": Family(
@@ -62,7 +57,6 @@ FAMILIES: dict[str, Family] = {
         "heyoka",
         "Taylor",
         False,
-        "land",
         "compiled here by heyoka's LLVM for this processor",
     ),
     "ias15": Family(
@@ -70,16 +64,14 @@ FAMILIES: dict[str, Family] = {
         "IAS15",
         "IAS15",
         False,
-        "land",
         "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
     ),
-    "whfast": Family("REBOUND, WHFast", "WHFast", "WHFast", True, None, "the wheel's, for any x86-64"),
+    "whfast": Family("REBOUND, WHFast", "WHFast", "WHFast", True, "the wheel's, for any x86-64"),
     "whfast512": Family(
         "REBOUND, WHFast512",
         "WHFast512",
         "WHFast512",
         True,
-        None,
         "the wheel's, in AVX-512 instructions; on other processors it does not run",
     ),
     "leapfrog": Family(
@@ -87,7 +79,6 @@ FAMILIES: dict[str, Family] = {
         "leapfrog",
         "Leapfrog",
         True,
-        None,
         "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
     ),
     "dop853": Family(
@@ -95,7 +86,6 @@ FAMILIES: dict[str, Family] = {
         "DOP853",
         "DOP853",
         False,
-        None,
         "a step loop in Python around a vector field compiled here by numba",
     ),
 }

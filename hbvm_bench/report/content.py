@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import Case
+from hbvm_bench.cells import Table
 from hbvm_bench.identity import make_problem
 from hbvm_bench.metrics import METRICS, Metric
 from hbvm_bench.records import Record
@@ -72,6 +73,8 @@ class Content:
         Of a fair comparison.
     settings : list
         See `words.settings_count`.
+    peers : Table or None
+        What the bench costs every peer; see `hbvm_bench.peer_check`.
     excluded : list of str
         What takes no part in the ranking, and why.
     versions, machine : list of (str, str)
@@ -93,6 +96,7 @@ class Content:
     records: list[Record]
     rules: tuple[str, ...]
     settings: list[tuple[str, str, dict[str, int]]]
+    peers: Table | None
     excluded: list[str]
     versions: list[tuple[str, str]]
     machine: list[tuple[str, str]]
@@ -167,6 +171,7 @@ def gather(stores: Sequence[Store]) -> Content:
         records=records,
         rules=(*words.RULES, *fairness.sentences(records)),
         settings=words.settings_count(records),
+        peers=fairness.peers(),
         excluded=words.excluded(records),
         versions=provenance.versions(records),
         machine=provenance.machines(records),

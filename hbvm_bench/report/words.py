@@ -36,7 +36,8 @@ Times are those of whole integrations without output, compiled before, with one 
 in a pass of their own with no other case running: every round visits every case once in a fresh
 process, so that a machine that changes its speed touches all alike. A sample lasts at least 20 ms.
 The table gives the median and the quartiles; all samples are in the store. Compilation is stated
-apart.
+apart. Each library goes to the end in the way of its own documentation; what the bench adds to its
+time is in a table below.
 
 heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels
 come, built for any processor of the kind. SciPy's solvers are Python and call a vector field

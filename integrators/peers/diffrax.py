@@ -35,6 +35,7 @@ class DiffraxMethod(MethodBase):
 
     evaluations: ClassVar[int]
     library = "diffrax"
+    to_end = "land"
     citation = KIDGER
 
     def accepts(self, problem: Problem) -> str | None:

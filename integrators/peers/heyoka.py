@@ -1,7 +1,6 @@
 """heyoka's adaptive Taylor integrator."""
 
 import copy
-import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,10 +24,8 @@ EPS = float(np.finfo(np.float64).eps)
 COLD = "HBVM_BENCH_COLD_COMPILE"
 """Environment variable: set to 1, heyoka compiles anew, using neither of its caches."""
 
-WORTHWHILE = 64
-"""Fewest steps for which the compiled loop is called; shorter ways are taken step by step."""
-
-TINY = float(np.finfo(np.float64).tiny)
+NEAR = 8
+"""Times its last step that a sample must be away for the compiled loop to be called."""
 
 CITATION = """\
 @article{BiscaniIzzo2021,
@@ -67,8 +64,10 @@ class Taylor(MethodBase):
     The right-hand sides are the traced operations in the user's order. heyoka gives
     the step's Taylor polynomial itself, so that a state between steps (``"side"``) is
     what a partial step would give, bit for bit and at no loss of order, and the
-    sequence of steps does not depend on the samples. ``"land"`` shortens steps onto
-    the samples. heyoka has no count of field evaluations.
+    sequence of steps does not depend on the samples. The step to a sample that is far ahead
+    is taken twice, for heyoka's compiled loop shortens its last one; these are counted apart,
+    in ``stats.extra["side_steps"]``. ``"land"`` shortens steps onto the samples, as
+    heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
     """
 
     tol: float = EPS
@@ -79,6 +78,7 @@ class Taylor(MethodBase):
     library = "heyoka"
     citation = CITATION
     family = "taylor"
+    to_end = "land"
 
     def __post_init__(self) -> None:
         number(self, "tol", below=1.0)
@@ -140,7 +140,8 @@ class TaylorProgram(PeerProgram):
         """Integrate many starts to the same times by heyoka's batch integrator.
 
         It is compiled when this is first called. Every lane has steps of its own; the
-        last one to each time is shortened onto it.
+        last one to each time is shortened onto it. A trajectory that fails or stalls has its
+        status, time and reason, and leaves the others alone.
 
         Parameters
         ----------
@@ -185,6 +186,7 @@ class TaylorStepper(PeerStepper):
 
     def __init__(self, integrator: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
+        self._stats.extra["side_steps"] = 0
         self._ta, self._sign = integrator, 1.0
         self._outcome = load("heyoka").taylor_outcome
         if par.size:
@@ -237,12 +239,12 @@ class TaylorStepper(PeerStepper):
         self._broken(t)
         return None
 
-    def _land(self, t: float) -> bool:
+    def _land(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
         watch = Crawl(self._ta.time, t)
         while True:
             before = self._ta.time
-            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS)
+            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS, write_tc=write_tc)
             self._stats.steps += steps
             if outcome == self._outcome.time_limit:
                 return True
@@ -256,34 +258,31 @@ class TaylorStepper(PeerStepper):
     def _pass(self, t: float, sign: float) -> bool:
         """Take own steps until one passes ``t``; return whether that succeeded.
 
-        heyoka's compiled loop shortens its last step to end at the time it is given,
-        which would make the steps depend on the samples. So it is given a number of
-        steps that falls short of the time; the rest is one step at a time.
+        heyoka's compiled loop shortens its last step to end at the time it is given, which would make
+        the steps depend on the samples. That one step is taken back and taken at its own length.
         (`propagate_grid` will not do: it forgets the low part of heyoka's clock.)
         """
-        ta, watch, longest = self._ta, Crawl(self._ta.time, t), math.inf
+        ta = self._ta
         while sign * (ta.time - t) < 0.0:
-            here = ta.time
-            count = int(min(0.5 * abs(t - here) / max(longest, TINY), CRAWL_STEPS))
-            if count < WORTHWHILE:
-                length = self._step()
-                if length is None:
+            if abs(t - ta.time) > NEAR * abs(ta.last_h):
+                if not self._land(t, write_tc=True):
                     return False
-                longest, steps = length, 1
-            else:
-                state, clock = ta.state.copy(), ta.dtime
-                outcome, _, longest, steps, *_ = ta.propagate_until(t, max_steps=count)
-                if outcome != self._outcome.step_limit:
-                    # It came to t after all, or broke: go back and come nearer by fewer steps.
-                    ta.state[:] = state
-                    ta.dtime = clock
-                    longest = 2.0 * abs(t - here) / count
-                    continue
-                self._stats.steps += steps
-            if stalled := watch.sees(ta.time, steps):
-                self._fail(Status.STALLED, ta.time, stalled)
+                self._take_back()
+            if self._step() is None:
                 return False
         return True
+
+    def _take_back(self) -> None:
+        """Go back to the start of the last step, whose state is the first of its Taylor coefficients."""
+        ta = self._ta
+        (high, low), h = ta.dtime, ta.last_h
+        start = high - h
+        back = start - high
+        lost = (high - (start - back)) - (h + back) + low  # what high - h was rounded by, and the low part
+        ta.state[:] = ta.tc[:, 0]
+        ta.dtime = start + lost, lost - ((start + lost) - start)
+        self._stats.steps -= 1
+        self._stats.extra["side_steps"] += 1
 
     def _broken(self, t: float) -> None:
         self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")

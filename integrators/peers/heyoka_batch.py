@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.options import load
 from integrators.protocol import Array, Status, check_state, check_times
 from integrators.trajectories import Counts, Trajectories
@@ -29,7 +30,6 @@ class Lanes:
         hy = load("heyoka")
         self.system = system
         self.size = int(hy.recommended_simd_size())
-        self._success = hy.taylor_outcome.time_limit
         started = perf_counter()
         self._ta = hy.taylor_adaptive_batch(
             emit.heyoka(system),
@@ -53,7 +53,7 @@ class Lanes:
             steps=np.zeros(n, dtype=np.int64),
         )
         for first in range(0, n, self.size):
-            # the last lanes repeat a trajectory, so that all have something to do
+            # the last lanes begin as a trajectory that is there; what they do is not looked at
             members = np.minimum(np.arange(first, first + self.size), n - 1)
             self._group(result, members[: min(self.size, n - first)], given[members], parameters[members], t0)
         return result
@@ -64,27 +64,56 @@ class Lanes:
         ta.state[:] = starts.T
         if par.shape[1]:
             ta.pars[:] = par.T
-        ended = [False for _ in lanes]
+        going = set(lanes)
         for place, time in enumerate(result.t.tolist()):
-            if time == t0:
-                result.y[members, place] = starts[: len(members)]
-                continue
-            ta.propagate_until(np.full(self.size, time))
-            for lane in lanes:
-                outcome, _, _, steps = ta.propagate_res[lane]
-                i = members[lane]
-                if ended[lane]:
-                    continue
-                result.steps[i] += steps
-                if outcome == self._success and np.isfinite(ta.state[:, lane]).all():
-                    result.y[i, place] = ta.state[:, lane]
-                    continue
-                ended[lane] = True
-                result.status[i] = Status.NOT_FINITE
-                result.t_stop[i] = ta.time[lane]
-                result.reason[i] = f"the state is not finite after t = {ta.time[lane]:.6g}"
-            if all(ended):
+            if time != t0:
+                self._towards(result, members, going, time)
+            for lane in going:
+                result.y[members[lane], place] = ta.state[:, lane]
+            if not going:
                 return
+
+    def _towards(self, result: Trajectories, members: Counts, going: set[int], time: float) -> None:
+        """Bring the lanes that are going to a time; those that fail go no more, and say why.
+
+        heyoka leaves a propagation as soon as one lane is not finite, wherever the others are then:
+        they are taken up again.
+        """
+        ta, end = self._ta, np.full(self.size, time)
+        watches = {lane: Crawl(float(ta.time[lane]), time) for lane in going}
+        ahead = set(going)
+        while ahead:
+            before = ta.time.copy()
+            ta.propagate_until(end, max_steps=CRAWL_STEPS)
+            for lane in sorted(ahead):
+                i, t, steps = members[lane], float(ta.time[lane]), ta.propagate_res[lane][3]
+                result.steps[i] += steps
+                if not (np.isfinite(t) and np.isfinite(ta.state[:, lane]).all()):
+                    t = t if np.isfinite(t) else float(before[lane])
+                    status, reason = Status.NOT_FINITE, f"the state is not finite after t = {t:.6g}"
+                elif t == time:
+                    ahead.discard(lane)
+                    continue
+                elif reason := watches[lane].sees(t, steps):
+                    status = Status.STALLED
+                else:
+                    continue
+                result.status[i], result.t_stop[i], result.reason[i] = status, t, reason
+                going.discard(lane)
+            ahead &= going
+            self._idle(going)
+
+    def _idle(self, going: set[int]) -> None:
+        """Have the lanes that are not going do what one that is does, so that they stop no other."""
+        ta = self._ta
+        idle = [lane for lane in range(self.size) if lane not in going]
+        if not (idle and going):
+            return
+        twin = min(going)
+        high, low = (part.copy() for part in ta.dtime)
+        for values in (high, low, ta.state.T, ta.pars.T):
+            values[idle] = values[twin]
+        ta.set_dtime(high, low)
 
     def _given(self, starts: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
         rows = np.atleast_2d(np.asarray(starts, dtype=np.float64))

@@ -109,6 +109,7 @@ class WHFast(ReboundMethod):
 
     citation = REBOUND + WHFAST
     family = "wisdom-holman"
+    to_end = "land"
 
     def __post_init__(self) -> None:
         number(self, "h")
@@ -204,6 +205,7 @@ class Leapfrog(ReboundMethod):
 
     citation = REBOUND + LEAPFROG
     family = "splitting"
+    to_end = "land"
 
     def __post_init__(self) -> None:
         number(self, "h")
@@ -256,13 +258,25 @@ class ReboundStepper(FixedStepper):
         with program.hooks.detached(self._simulation):
             aside = self._simulation.copy()
         program.hooks.attach(aside, self._spare, force=program.force)
-        with calls(self._stats):
-            if isinstance(program.method, WHFast):
-                aside.integrator.keep_unsynchronized = 0
-                aside.synchronize()
-            aside.t, aside.dt = self._time(), part
-            aside.steps(1)
+        self._part(aside, part)
         return program.state(self._layout, aside)
+
+    def _shorten(self, part: float) -> None:
+        simulation = self._simulation
+        self._part(simulation, part)
+        simulation.dt = self._h
+        if isinstance(self._program.method, WHFast):
+            simulation.integrator.keep_unsynchronized = 1
+        self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
+
+    def _part(self, simulation: Any, part: float) -> None:
+        """Synchronise a simulation and take one step of length ``part``."""
+        with calls(self._stats):
+            if isinstance(self._program.method, WHFast):
+                simulation.integrator.keep_unsynchronized = 0
+                simulation.synchronize()
+            simulation.t, simulation.dt = self._time(), part
+            simulation.steps(1)
 
     def _save_steps(self) -> bytes:
         return self._program.archive(self._simulation)

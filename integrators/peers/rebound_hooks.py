@@ -172,6 +172,12 @@ def forces(kernel: Any, dof: int, n_par: int) -> Any:
         par, scale = numbers[:n_par], numbers[n_par : n_par + dof]
         q, out = numbers[n_par + dof : n_par + 2 * dof], numbers[n_par + 2 * dof :]
         body = carray(_pointer(whole[PARTICLES]), (particles, stride), np.float64)
+        if dof <= 3:  # the coordinates of one particle lie side by side: nothing to copy
+            acceleration = body[0, 6 : 6 + dof]
+            kernel(carray(simulation, (128,), np.float64)[T], body[0, :dof], par, acceleration)
+            for i in range(dof):
+                acceleration[i] *= scale[i]
+            return
         for i in range(dof):
             q[i] = body[i // 3, i % 3]
         kernel(carray(simulation, (128,), np.float64)[T], q, par, out)

@@ -105,7 +105,12 @@ class ScaledProgram(ReboundProgram):
 
 
 class Stepper512(ReboundStepper):
-    """A trajectory; the steps between two samples are taken in one go."""
+    """A trajectory; the steps between two samples are taken in one go.
+
+    REBOUND has it end with a whole step only, so there is no ``"land"``.
+    """
+
+    samplings = ("side", "steps")
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         super()._restart(t, y, h)
@@ -128,12 +133,12 @@ class Stepper512(ReboundStepper):
         """Take ``count`` steps from ``t``, as one of REBOUND's."""
         simulation.t = t * math.sqrt(self._layout.G)
         simulation.integrator.concatenate_steps = count
-        with _same_arithmetic():
+        with same_arithmetic():
             simulation.integrate(simulation.t + (count - 0.5) * simulation.dt, exact_finish_time=0)
 
 
 @contextmanager
-def _same_arithmetic() -> Iterator[None]:
+def same_arithmetic() -> Iterator[None]:
     """Restore the processor's modes: WHFast512 leaves it flushing subnormal numbers to zero."""
     library, kept = _mathematics(), ctypes.create_string_buffer(ROOM)
     library.fegetenv(kept)

@@ -66,6 +66,7 @@ class _SciPyMethod(MethodBase):
 
     solver: ClassVar[str]
     library = "scipy"
+    to_end = "land"
 
     def __post_init__(self) -> None:
         number(self, "rtol", below=1.0)
@@ -169,11 +170,13 @@ class SciPyStepper(PeerStepper):
         evaluations are counted apart, in ``stats.extra["side_evaluations"]``.
     ``"steps"``
         The solver's own steps, up to the last time.
+    ``"land"``
+        The last step before each time is shortened onto it, as `solve_ivp` does at its end.
 
     SciPy's own interpolants are not offered: they are of lower order than the method.
     """
 
-    samplings = ("side", "steps")
+    samplings = ("side", "steps", "land")
 
     def __init__(self, program: SciPyProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
@@ -217,9 +220,11 @@ class SciPyStepper(PeerStepper):
         states = np.empty((grid.size, self._y.size))
         watch = Crawl(self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
+            self._solver.t_bound = t if how == "land" else sign * math.inf
             while sign * (self._solver.t - t) < 0.0:
                 if not self._step(watch):
                     return grid[:i], states[:i]
+            self._solver.status = "running"  # also where it came to its bound
             states[i] = self._solver.y if self._solver.t == t else self._aside(t)
             if not np.isfinite(states[i]).all():
                 return grid[: i + 1], states[: i + 1]
@@ -227,6 +232,7 @@ class SciPyStepper(PeerStepper):
 
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
+        self._solver.t_bound = sign * math.inf
         watch = Crawl(self._solver.t, end)
         times, states = [self._t], [self._y]
         while self._solver.t != times[-1] or self._step(watch):
@@ -237,6 +243,7 @@ class SciPyStepper(PeerStepper):
         return np.array(times[1:]), np.array(states)[1:]
 
     def _one(self) -> tuple[float, Array] | None:
+        self._solver.t_bound = self._solver.direction * math.inf
         if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
             return None
         return float(self._solver.t), self._solver.y

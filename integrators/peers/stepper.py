@@ -177,12 +177,14 @@ class FixedStepper(PeerStepper):
         takes one step of the missing length.
     ``"steps"``
         The own steps up to the last time.
+    ``"land"``
+        The last step before each time is shortened onto it; steps count from there then.
 
-    A subclass implements `_march`, `_state`, `_aside`, `_restart`, `_save_steps` and
-    `_load_steps`.
+    A subclass implements `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
+    ``"land"``), `_restart`, `_save_steps` and `_load_steps`.
     """
 
-    samplings = ("side", "steps")
+    samplings = ("side", "steps", "land")
 
     def __init__(self, y: Array, t: float, h: float):
         super().__init__(y, t)
@@ -206,11 +208,27 @@ class FixedStepper(PeerStepper):
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         self._towards(float(grid[-1]))
+        if how == "land":
+            return self._land(grid)
         counts, parts = plan(grid, np.full(grid.size, self._t0), self._h)
         states = np.empty((grid.size, self._y.size))
         for i, (n, part) in enumerate(zip(counts.tolist(), parts.tolist(), strict=True)):
             self._go(n)
             states[i] = self._aside(part) if part else self._state()
+            if not np.isfinite(states[i]).all():
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
+
+    def _land(self, grid: Array) -> tuple[Array, Array]:
+        states = np.empty((grid.size, self._y.size))
+        for i, t in enumerate(grid.tolist()):
+            count, part = plan(grid[i : i + 1], np.array([self._t0]), self._h)
+            self._go(int(count[0]))
+            if part[0]:
+                self._shorten(float(part[0]))
+                self._stats.steps += 1
+                self._t0, self._n = t, 0
+            states[i] = self._state()
             if not np.isfinite(states[i]).all():
                 return grid[: i + 1], states[: i + 1]
         return grid, states
@@ -248,6 +266,10 @@ class FixedStepper(PeerStepper):
 
     def _aside(self, part: float) -> Array:
         """Return the state a throw-away step of length ``part`` after the last own step."""
+        raise NotImplementedError
+
+    def _shorten(self, part: float) -> None:
+        """Take one step of length ``part`` after the last own step."""
         raise NotImplementedError
 
     def _restart(self, t: float, y: Array, h: float) -> None:

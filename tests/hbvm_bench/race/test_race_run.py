@@ -95,8 +95,7 @@ def test_timing_takes_the_integration_alone_and_restores_garbage_collection():
     from integrators import Gauss
 
     problem = make_problem("kepler(e=0.6, t_end=3.0)")
-    program = Gauss(s=4, h=0.1).compile(problem.system)
-    run = timing.Run(program, problem.y0, problem.par, 0.0, 3.0)
+    run = timing.Run.of(problem, Gauss(s=4, h=0.1))
     seconds, samples = run.seconds(3)
     assert seconds > 0
     assert samples.t.tolist() == [3.0]

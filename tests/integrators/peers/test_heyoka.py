@@ -1,7 +1,10 @@
+import copy
+
 import numpy as np
 import pytest
 
 import integrators.testing as testing
+import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka import COLD, EPS, Taylor
 from problems import Problem, VectorField
@@ -37,6 +40,45 @@ def test_samples_leave_the_steps_alone_bit_for_bit():
     assert alone.stats.steps == sampled.stats.steps > 500
     steps = program.start(problem.y0, problem.par).advance([300.0], sample="steps")
     assert alone.stats.steps - 1 <= steps.t.size <= alone.stats.steps
+
+
+class Counting:
+    """heyoka's integrator, with a count of all steps that it is made to take."""
+
+    def __init__(self, integrator):
+        vars(self).update(integrator=integrator, taken=0)
+
+    def __getattr__(self, name):
+        return getattr(self.integrator, name)
+
+    def __setattr__(self, name, value):
+        setattr(self.integrator, name, value)
+
+    def step(self, **options):
+        vars(self)["taken"] += 1
+        return self.integrator.step(**options)
+
+    def propagate_until(self, *arguments, **options):
+        made = self.integrator.propagate_until(*arguments, **options)
+        vars(self)["taken"] += made[3]
+        return made
+
+
+@pytest.mark.parametrize("times", [1, 100, 20_000])
+@pytest.mark.parametrize("sample", ["side", "land"])
+def test_every_step_that_heyoka_takes_is_counted(sample, times):
+    problem = problems.load("kepler", e=0.6)
+    program = Taylor().compile(problem.system)
+    stepper = program.start(problem.y0, problem.par)
+    stepper._ta = Counting(stepper._ta)
+    stepper.advance(np.linspace(0.0, problem.t_end, times + 1)[1:], sample=sample)
+    steps, aside = stepper.stats.steps, stepper.stats.extra["side_steps"]
+    assert stepper._ta.taken == steps + aside
+    assert aside <= times if sample == "side" else aside == 0
+    if times == 1:  # what heyoka takes alone
+        alone = copy.copy(program.template)
+        alone.state[:], alone.pars[:] = problem.y0, problem.par
+        assert steps == alone.propagate_until(problem.t_end)[3]
 
 
 def test_a_sample_is_what_a_partial_step_gives():

@@ -6,7 +6,7 @@ import pytest
 import problems
 from integrators import Taylor
 from integrators.protocol import Status
-from problems import Hamiltonian, Problem
+from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
 
 pytest.importorskip("heyoka")
@@ -65,3 +65,49 @@ def test_starts_of_the_wrong_shape_are_refused():
             program.batch(starts, times=[1.0])
     with pytest.raises(InputError, match="par must have shape"):
         program.batch([problem.y0] * 2, np.ones((3, 1)), times=[1.0])
+
+
+def poles() -> Problem:
+    """y' = r y^2 beside a slow oscillator: a pole at 1/(r y0), which costs the oscillator nothing."""
+    system = VectorField(
+        lambda y, par: [par.rate * y[0] * y[0], y[2], -y[1]], dim=3, parameters={"rate": 1.0}, name="poles"
+    )
+    return Problem(system, y0=[1.0, 1.0, 0.0], t_end=50.0, name="poles")
+
+
+@pytest.mark.parametrize("dead", [[0], [3, 9], [0, 1, 2, 3, 4, 5, 6]])
+def test_the_others_reach_every_time_after_one_met_a_pole(dead):
+    problem = poles()
+    program = Taylor(tol=1e-15).compile(problem.system)
+    starts, n = np.tile(problem.y0, (11, 1)), 11  # 11: the lanes of the second group are not all used
+    starts[:, 0] = -1.0 - np.arange(n)
+    starts[dead, 0] = 1.0 / (0.3 + np.arange(len(dead)))  # a pole at 0.3, 1.3, ...
+    times = np.linspace(0.0, 50.0, 26)
+    batch = program.batch(starts, times=times)
+    for i in range(n):
+        single = program.start(starts[i], problem.par).advance(times, sample="land")
+        assert batch.status[i] is (Status.NOT_FINITE if i in dead else Status.FINISHED)
+        reached = single.t.size
+        assert reached < times.size if i in dead else reached == times.size
+        # 0 measured: the same steps in the same arithmetic
+        assert np.abs(batch.y[i, :reached] - single.y).max() < 1e-13
+        assert np.isnan(batch.y[i, reached:]).all()
+    assert batch.t_stop[dead] == pytest.approx(0.3 + np.arange(len(dead)), abs=1e-9)
+    assert all(f"t = {batch.t_stop[i]:.6g}" in batch.reason[i] for i in dead)
+
+
+def test_a_trajectory_that_crawls_is_stalled_and_the_others_finish(monkeypatch):
+    for module in ("integrators.crawl", "integrators.peers.heyoka_batch"):
+        monkeypatch.setattr(f"{module}.CRAWL_STEPS", 500)  # 200,000 take seconds
+    system = VectorField(
+        lambda y, par, m: [m.cos(par.rate * y[1]) * par.rate, 1.0], dim=2, parameters={"rate": 1.0}
+    )
+    problem = Problem(system, y0=[0.0, 0.0], t_end=1.0)
+    program = Taylor().compile(system)
+    rates = [[1.0], [1e13], [2.0]]  # the second turns round 10^13 times in a unit of time
+    batch = program.batch(np.tile(problem.y0, (3, 1)), rates, times=[0.5, 1.0])
+    assert batch.status == [Status.FINISHED, Status.STALLED, Status.FINISHED]
+    assert "the steps have collapsed" in batch.reason[1]
+    assert 0.0 < batch.t_stop[1] < 1e-7
+    assert np.abs(batch.y[[0, 2], 1, 0] - np.sin([1.0, 2.0])).max() < 1e-14  # 1.1e-16
+    assert np.isnan(batch.y[1]).all()

@@ -1,0 +1,343 @@
+"""What the bench costs a peer: each is run through the harness, as campaigns time it, and alone.
+
+``python -m hbvm_bench.peer_check REQUEST.json`` runs it: the harness and the library in turn, round by
+round, in one process on one core, with compiling and setting up outside both clocks. The result that comes
+with the package (`KEPT`) is printed in every report; ``hbvm-bench doctor --peers --out`` makes it anew.
+"""
+
+import gc
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+import msgspec
+import numpy as np
+
+import problems
+from hbvm_bench import ensemble, machine, peers_alone, processes
+from hbvm_bench.cells import Table
+from hbvm_bench.identity import make_method
+from hbvm_bench.peers_alone import Script
+from hbvm_bench.store import atomic
+from hbvm_bench.table import seconds as in_words
+from hbvm_bench.timing import WARM_UP, Run
+from integrators.protocol import Array, Status
+from problems.errors import InputError
+from problems.hamiltonian import Hamiltonian
+from problems.problem import Problem
+
+ALLOWED = 1.05
+"""Largest median of the ratio harness over library."""
+
+SHORTEST = 0.02
+"""Seconds from which that holds; a call's overhead shows in shorter runs."""
+
+ROUNDS = 15
+CLOCK = time.process_time
+"""The processor's time, in which other work on the machine does not count."""
+
+KEPT = Path(__file__).with_name("peer_check.json")
+COMMAND = "hbvm-bench doctor --peers"
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A method on a problem, and the script of its library alone.
+
+    Attributes
+    ----------
+    problem : str
+        A key of `PROBLEMS`, with ``BATCH`` after it for one start in each lane.
+    t_end : float
+        Such that a run takes some tens of milliseconds.
+    method : str
+        As it is written on the command line.
+    alone : callable
+        From `hbvm_bench.peers_alone`.
+    call : str
+        What it calls.
+    """
+
+    problem: str
+    t_end: float
+    method: str
+    alone: Callable[..., Script]
+    call: str
+
+
+GEODESIC = "geodesic around a black hole"
+KEPLER = "kepler(e=0.6)"
+PLANETS = "outer_solar_system()"
+BATCH = " as a batch"
+UNTIL, INTEGRATE, SOLVE, IVP = "propagate_until", "sim.integrate", "diffeqsolve", "solve_ivp"
+
+PAIRS = (
+    Pair(KEPLER, 12000.0, "Taylor()", peers_alone.heyoka, UNTIL),
+    Pair(KEPLER, 12000.0, "Taylor(compact_mode=True, high_accuracy=True)", peers_alone.heyoka, UNTIL),
+    Pair(GEODESIC, 1500000.0, "Taylor()", peers_alone.heyoka, UNTIL),
+    Pair(KEPLER + BATCH, 6000.0, "Taylor()", peers_alone.heyoka_batch, "taylor_adaptive_batch"),
+    Pair(KEPLER, 1000.0, "IAS15()", peers_alone.rebound, INTEGRATE),
+    Pair(PLANETS, 600.0, "IAS15()", peers_alone.rebound, INTEGRATE),
+    Pair(KEPLER, 3000.0, "Leapfrog(h=0.01, order=4)", peers_alone.rebound, INTEGRATE),
+    Pair(PLANETS, 20000.0, "Leapfrog(h=0.1, order=4)", peers_alone.rebound, INTEGRATE),
+    Pair(PLANETS, 20000.0, "WHFast(h=0.3, corrector=17)", peers_alone.rebound, INTEGRATE),
+    Pair(KEPLER, 30.0, "DOP853(rtol=1e-12, atol=1e-12)", peers_alone.scipy, IVP),
+    Pair(KEPLER, 6.0, "Radau(rtol=1e-6, atol=1e-6)", peers_alone.scipy, IVP),
+    Pair(KEPLER, 300.0, "Dopri8(rtol=1e-12, atol=1e-12)", peers_alone.diffrax, SOLVE),
+    Pair(KEPLER, 60.0, "Dopri8(h=0.01)", peers_alone.diffrax, SOLVE),
+    Pair(KEPLER, 15000.0, "ReversibleHeun(h=0.01)", peers_alone.diffrax, SOLVE),
+    Pair(KEPLER, 15000.0, "LeapfrogMidpoint(h=0.01)", peers_alone.diffrax, SOLVE),
+    Pair(KEPLER, 15000.0, "SemiImplicitEuler(h=0.01)", peers_alone.diffrax, SOLVE),
+    Pair(PLANETS, 120000.0, "WHFast512(h=0.5)", peers_alone.rebound, INTEGRATE),
+)
+
+
+class Row(msgspec.Struct, frozen=True, kw_only=True):
+    """One method through the harness and alone.
+
+    Attributes
+    ----------
+    problem, method, call : str
+        What was integrated, how, and what the library alone is called by.
+    seconds, alone : list of float
+        Of the processor's time: of a run through the harness, and of the library alone, one of each round.
+    steps, alone_steps : int
+        That each took.
+    difference : float
+        Largest difference of the states at the end, over the largest component.
+    """
+
+    problem: str
+    method: str
+    call: str
+    seconds: list[float]
+    alone: list[float]
+    steps: int
+    alone_steps: int
+    difference: float
+
+    @property
+    def ratios(self) -> list[float]:
+        """Harness over library, round by round."""
+        return [a / b for a, b in zip(self.seconds, self.alone, strict=True)]
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the harness costs more than is allowed, or takes other steps."""
+        slow = median(self.ratios) > ALLOWED and median(self.alone) >= SHORTEST
+        return slow or self.steps != self.alone_steps
+
+
+class PeerCheck(msgspec.Struct, frozen=True, kw_only=True):
+    """The result.
+
+    Attributes
+    ----------
+    rows : list of Row
+        In the order of `PAIRS`.
+    refused : dict of str
+        Why a method did not run, by its text.
+    machine, versions : dict
+        Where, and with what.
+    measured : str
+        When.
+    """
+
+    rows: list[Row]
+    refused: dict[str, str]
+    machine: dict[str, str | int]
+    versions: dict[str, str]
+    measured: str
+
+
+def geodesic(t_end: float) -> Problem:
+    """Return a geodesic around a black hole of mass 1: H = g^ab p_a p_b / 2 in Schwarzschild's t, r, phi.
+
+    It starts at its pericentre r = 10 with angular momentum 4; the orbit is bound, and H = -1/2.
+    """
+
+    def H(q: Any, p: Any) -> Any:
+        f = 1 - 2 / q[1]
+        return (f * p[1] ** 2 + p[2] ** 2 / q[1] ** 2 - p[0] ** 2 / f) / 2
+
+    energy = np.sqrt(0.8 * 1.16)  # f (1 + L^2/r^2)
+    system = Hamiltonian(H, dof=3, name="schwarzschild")
+    return Problem(system, q0=[0.0, 10.0, 0.0], p0=[-energy, 0.0, 4.0], t_end=t_end)
+
+
+PROBLEMS: dict[str, Callable[[float], Problem]] = {
+    KEPLER: lambda t_end: problems.load("kepler", e=0.6, t_end=t_end),
+    PLANETS: lambda t_end: problems.load("outer_solar_system", t_end=t_end),
+    GEODESIC: geodesic,
+}
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the process that measures leaves its result, and how many rounds it takes."""
+
+    out: str
+    rounds: int = ROUNDS
+
+
+def check(
+    pairs: Sequence[Pair] = PAIRS,
+    rounds: int = ROUNDS,
+    share: float = 1.0,
+    tell: Callable[[str], None] = print,
+) -> PeerCheck:
+    """Run every pair.
+
+    Parameters
+    ----------
+    pairs : sequence of Pair
+        Which.
+    rounds : int
+        Samples of each side, in turn; at least 2.
+    share : float
+        Of each span.
+    tell : callable
+        Called with what is about to run.
+    """
+    rows: list[Row] = []
+    refused: dict[str, str] = {}
+    for pair in pairs:
+        tell(f"{pair.method} on {pair.problem}")
+        try:
+            rows.append(_row(pair, rounds, share))
+        except InputError as error:  # a missing library, or a processor that cannot
+            refused[pair.method] = str(error)
+    libraries = sorted({make_method(pair.method).library for pair in pairs if pair.method not in refused})
+    return PeerCheck(
+        rows=rows,
+        refused=refused,
+        machine=machine.describe(),
+        versions={name: version(name) for name in ("hbvm-bench", *libraries)},
+        measured=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+
+
+def _row(pair: Pair, rounds: int, share: float) -> Row:
+    problem = PROBLEMS[pair.problem.removesuffix(BATCH)](share * pair.t_end)
+    method = make_method(pair.method)
+    if reason := method.accepts(problem):
+        raise InputError(reason)
+    if pair.problem.endswith(BATCH):
+        starts = np.tile(problem.y0, (_lanes(), 1)) * (1 + 1e-3 * np.arange(_lanes()))[:, None]
+        harness: Any = ensemble.EnsembleRun(method.compile(problem.system), starts, problem, method.to_end)
+        script = pair.alone(problem, method, starts)
+        made = ensemble.integrate(harness.program, starts, problem, harness.sample)
+        steps, y, status = made.steps, made.y, max(made.status, key=lambda one: one is not Status.FINISHED)
+    else:
+        harness = Run.of(problem, method)
+        script = pair.alone(problem, method)
+        harness.until(WARM_UP).seconds()
+        stepper = harness.program.start(harness.y0, harness.par, harness.t0)
+        samples = stepper.advance(np.array([harness.t_end]), sample=harness.sample)
+        steps, y, status = stepper.stats.steps, stepper.y, samples.status
+    if status is not Status.FINISHED:
+        raise InputError(f"{pair.method} ended as {status.value}")
+    _, alone_steps, alone_y = _alone(script)  # its first run is not counted either
+    taken: list[tuple[float, float]] = []
+    for number in range(rounds):
+        if number % 2:  # so that neither is always the first
+            other, mine = _alone(script)[0], harness.seconds(clock=CLOCK)[0]
+        else:
+            mine, other = harness.seconds(clock=CLOCK)[0], _alone(script)[0]
+        taken.append((mine, other))
+    return Row(
+        problem=pair.problem,
+        method=repr(method),
+        call=pair.call,
+        seconds=[mine for mine, _ in taken],
+        alone=[other for _, other in taken],
+        steps=int(steps),
+        alone_steps=int(alone_steps),
+        difference=float(np.abs(y - alone_y).max() / np.abs(alone_y).max()),
+    )
+
+
+def _alone(script: Script) -> tuple[float, int, Array]:
+    """Return seconds, steps and the end of one run of a library alone, garbage collection off as in `Run`."""
+    run = script.begin()
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        start = CLOCK()
+        made = script.go(run)
+        spent = CLOCK() - start
+    finally:
+        if collecting:
+            gc.enable()
+    return spent, *script.end(run, made)
+
+
+def _lanes() -> int:
+    import heyoka
+
+    return int(heyoka.recommended_simd_size())
+
+
+def table(result: PeerCheck) -> Table:
+    """Return the result as a table; rows beyond what is allowed are marked."""
+    rows: list[tuple[str, ...]] = []
+    for row in result.rows:
+        low, middle, high = quantiles(row.ratios, n=4, method="inclusive")
+        mark = " (beyond)" if row.beyond else ""
+        rows.append(
+            (
+                row.method,
+                row.problem,
+                row.call,
+                f"{middle:.3f} [{low:.3f}, {high:.3f}]{mark}",
+                in_words(median(row.alone)),
+                str(row.steps),
+                str(row.alone_steps),
+                f"{row.difference:.0e}",
+            )
+        )
+    rounds = len(result.rows[0].seconds) if result.rows else 0
+    versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
+    return Table(
+        "Every peer through this bench, over the same library alone",
+        ("method", "problem", "alone", "time", "alone", "steps", "alone", "end states differ by"),
+        rows,
+        f"Median and quartiles of the ratio of the processor's times in each of {rounds} rounds, the two in "
+        f"turn in one process, compiled and set up before; {ALLOWED:g} is allowed in runs of "
+        f"{SHORTEST * 1e3:g} ms and more. Measured on {result.measured[:10]} on "
+        f"{result.machine['processor']}, with {versions}. To repeat it: {COMMAND}.",
+        words=(1, 2),
+    )
+
+
+def save(result: PeerCheck, path: Path) -> None:
+    """Write a result, all of it or nothing."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+
+
+def load(path: Path = KEPT) -> PeerCheck | None:
+    """Return a result, by default the one that comes with the package; ``None`` where there is none."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=PeerCheck)
+    except OSError:
+        return None
+
+
+def main(path: Path) -> None:
+    """Do what a request asks."""
+    processes.settle()
+    request = msgspec.json.decode(path.read_bytes(), type=Request)
+    save(
+        check(rounds=request.rounds, tell=lambda what: print(what, file=sys.stderr, flush=True)),
+        Path(request.out),
+    )
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
