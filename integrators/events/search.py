@@ -18,6 +18,7 @@ FIRST, MOST = 8, 256  # steps looked at together
 NUMBERS = 1_000_000  # held at once, at most
 DEGREES = (8, 24, 64)  # of g along a step: the least, where s is not known, the most to begin with
 CLOSE = 64  # units in the last place: nothing happens in a time as short
+SAME = 1e-5  # of a step: two touches as close are one
 RESULTS = ("steps", "evaluations", "iterations")
 
 
@@ -102,6 +103,7 @@ class Search:
         self._count = FIRST
         self._most = max(1, min(MOST, NUMBERS // ((self._degree + 1) * problem.system.dim)))
         self._finite = [False] * len(self._events)
+        self._touched = [np.nan] * len(self._events)  # where each was last seen to touch zero
         self._hits: list[Hit] = []
         self._terminal: str | None = None
         self._failed = False
@@ -244,11 +246,12 @@ class Search:
             near = before  # the probe goes on from the step that it was last sent to
             for row in np.flatnonzero(np.logical_or(roots.suspects(fine), unresolved)):
                 step = Step(self._probe, near, t[row], y[row], g)
-                hits += [
-                    Hit(at, state, i, direction)
-                    for at, state, direction in step.events(places, fine[row], bool(unresolved[row]))
-                    if self._events[i].direction in (0, direction)
-                ]
+                for at, state, direction in step.events(places, fine[row], bool(unresolved[row])):
+                    # A touch at the end of a step is seen from both sides.
+                    again = direction == 0 and abs(at - self._touched[i]) < SAME * abs(t[row, -1] - t[row, 0])
+                    self._touched[i] = at if direction == 0 else self._touched[i]
+                    if self._events[i].direction in (0, direction) and not again:
+                        hits.append(Hit(at, state, i, direction))
                 near = near if step.here is None else step.here
         self._take(sorted(hits, key=lambda hit: self._sign * hit.t))
 

@@ -38,6 +38,8 @@ class Step:
         while unresolved and degree < FINEST:
             degree = min(4 * degree, FINEST)
             places, fine, unresolved = self._closer(degree)
+        if unresolved:  # at a pole, a jump or a corner the polynomial between the samples means nothing
+            places, fine = places[:: roots.FINE], fine[:: roots.FINE]
         if not roots.suspects(fine[np.newaxis])[0]:
             return []
         span = float(self._t[-1] - self._t[0])
