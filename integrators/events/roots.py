@@ -249,7 +249,7 @@ class Finder:
         return self._values[x]
 
     def _solve(self, a: float, b: float, after: int) -> list[Zero]:
-        """Return the zero between two parts of the step at which g has different signs, none if it is a pole."""
+        """Return the zero between two parts of the step where g has different signs, none at a pole."""
         from scipy.optimize import brentq
 
         def continued(x: float) -> float:
@@ -263,7 +263,7 @@ class Finder:
         return [] if sides and not abs(self.value(x)) <= POLE * max(sides) else [Zero(x, after)]
 
     def _extremum(self, between: tuple[float, float], sign: int) -> tuple[float, float]:
-        """Return where ``sign * g`` is largest between two parts of the step, or the first found where it is positive.
+        """Return where ``sign * g`` is largest between two parts, or the first found where it is positive.
 
         Where it is largest at one of the two, the polynomial has misplaced them, and they are moved.
         """

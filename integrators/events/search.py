@@ -163,15 +163,21 @@ class Search:
         ]
 
     def _ask(self, stepper: Stepper, times: Array, sample: str) -> tuple[Array, Array]:
-        """Return the samples that could be made, or refuse a method that has none."""
+        """Return the samples that could be made, or refuse a method that has none.
+
+        Places within a step that is about as short as rounding of time are one and the same time.
+        """
+        new = np.append(True, np.diff(times) != 0.0)
         try:
-            made = stepper.advance(times, sample=sample)
+            made = stepper.advance(times[new], sample=sample)
         except InputError as error:
             raise InputError(
                 f"{self._method!r} cannot find events: it does not offer the states inside its steps that "
                 f"finding them takes (sample={sample!r}); use HBVM, Gauss or LineIntegral."
             ) from error
-        return made.t, made.y
+        place = np.cumsum(new) - 1
+        place = place[place < made.t.size]
+        return (made.t, made.y) if new.all() else (made.t[place], made.y[place])
 
     def _whole(self) -> tuple[Array, bool]:
         """Return the ends of the next own steps of one length, from the present on, and whether all."""

@@ -257,6 +257,18 @@ def test_a_failure_keeps_the_events_before_it():
     assert np.allclose(zeros.t, [np.pi / 4], rtol=0, atol=1e-13)  # measured 5.6e-16
 
 
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, tol=1e-10), HBVM(k=8, s=4, h=0.01)], ids=str)
+@pytest.mark.parametrize("terminal", [True, False])
+def test_an_event_before_a_singularity_is_returned(method, terminal):
+    kepler = Hamiltonian(lambda q, p, m: (p[0] ** 2 + p[1] ** 2) / 2 - 1 / m.sqrt(q[0] ** 2 + q[1] ** 2), dof=2)
+    fall = Problem(kepler, q0=[1.0, 0.0], p0=[0.0, 0.0], t_end=5.0)
+    solution, (half,) = happened(fall, method, Event(lambda q: q[0] - 0.5, terminal=terminal))
+    at = (np.pi / 4 + 0.5) / math.sqrt(2)  # r = cos(x)^2 at t = (x + sin(x) cos(x)) / sqrt(2)
+    assert np.allclose(half.t, [at], rtol=0, atol=1e-10)  # measured 2e-11
+    assert solution.status is Status.EVENT if terminal else solution.status.failed
+    assert solution.t_stop == half.t[0] if terminal else 1.0 < solution.t_stop < 1.12  # the fall ends at 1.1107
+
+
 def test_methods_without_states_inside_their_steps_refuse():
     with pytest.raises(InputError, match=r"cannot find events: .* use HBVM, Gauss or LineIntegral"):
         integrate(oscillator(), integrators.DOP853(rtol=1e-9, atol=1e-9), events=lambda q: q[0])
