@@ -225,7 +225,7 @@ class Finder:
 
     def _beside(self, x: float, distance: float) -> list[float]:
         """Return the values of g at a distance from a part of the step, where it has any."""
-        values = [self.value(min(max(x + d, 0.0), 1.0)) for d in (-distance, distance)]
+        values = [self.value(place) for place in (x - distance, x + distance) if 0.0 <= place <= 1.0]
         return [value for value in values if np.isfinite(value)]
 
     def _blur(self, x: float) -> float:

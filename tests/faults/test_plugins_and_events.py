@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from integrators import HBVM, Gauss
+from integrators import HBVM, Event, Gauss, integrate
+from problems import Problem, VectorField
 
 from .fault import Fault, is_met
 
@@ -46,6 +47,20 @@ FAULTS = (
     Fault("install(Gauss(h=, tol=))", lambda: installed(s=4, h=0.1, tol=1e-9), "tol=1e-09 .* give h="),
     Fault(
         "install(HBVM(solver=))", lambda: installed(k=8, s=4, h=0.1, solver="newton"), "'newton' .* leave it"
+    ),
+)
+
+
+def too_fast() -> object:
+    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
+    return integrate(slow, HBVM(k=8, s=4, h=1.0), events=Event(lambda t, m: m.sin(1e7 * t), name="fast"))
+
+
+FAULTS += (
+    Fault(
+        "an event that no samples of a step can follow",
+        too_fast,
+        r"'fast' varies too fast .* from t = 0\.0 to t = 0\.00\d+, .* shorter steps",
     ),
 )
 
