@@ -10,6 +10,7 @@ from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
 from integrators.events.step import Step
+from integrators.integrate import user_error
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper
 from problems import Problem
 from problems.errors import InputError
@@ -51,6 +52,8 @@ class Found:
         One sentence, unless it is ``FINISHED``.
     stats : Stats
         Counters of the work done.
+    error : Exception or None
+        What a function of the user raised.
     """
 
     events: dict[str, Occurrences]
@@ -59,6 +62,7 @@ class Found:
     status: Status
     reason: str
     stats: Stats
+    error: Exception | None = None
 
 
 class Search:
@@ -107,16 +111,19 @@ class Search:
         self._hits: list[Hit] = []
         self._terminal: str | None = None
         self._failed = False
+        self._error: Exception | None = None
+        self._looked = problem.t0
         self._zero = self._rests(problem)
 
     def run(self) -> Found:
         """Search to the end, the first terminal event, or a failure of the method."""
         while self._t != self._end and self._terminal is None and not self._failed:
-            before = self._walker.checkpoint()
-            ends, last = self._whole() if self._h is not None else self._varying()
-            for t, y in self._sampled(before, ends, last):
-                if self._terminal is None and t.size:
-                    self._look(before, t, y)
+            try:
+                self._go_on()
+            except InputError:
+                raise
+            except Exception as error:  # of a function of the user
+                self._error, self._failed = error, True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
         steppers = (self._walker, self._probe)
@@ -127,7 +134,17 @@ class Search:
             t_stop=stop,
             **self._outcome(stop),
             stats=replace(self._walker.stats, **work),
+            error=self._error,
         )
+
+    def _go_on(self) -> None:
+        """Take some steps, and look for events in them."""
+        before = self._walker.checkpoint()
+        ends, last = self._whole() if self._h is not None else self._varying()
+        for t, y in self._sampled(before, ends, last):
+            if self._terminal is None and t.size:
+                self._looked = float(t[0, 0])
+                self._look(before, t, y)
 
     def _outcome(self, stop: float) -> dict[str, Any]:
         """Return status and reason by name."""
@@ -135,6 +152,12 @@ class Search:
         if self._terminal is not None:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
             return {"status": Status.EVENT, "reason": reason}
+        if self._error is not None:
+            said = user_error(self._error)
+            return {
+                "status": Status.USER_ERROR,
+                "reason": f"{said}: events are known up to t = {self._looked!r} only.",
+            }
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
                 return {"status": stepper.status, "reason": stepper.reason}

@@ -63,9 +63,9 @@ class Step:
             places, fine = places[:: roots.FINE], fine[:: roots.FINE]
             if np.count_nonzero(np.diff(np.sign(fine))) > ISOLATED:
                 raise InputError(
-                    f"the event {self._g.name!r} varies too fast to be followed from t = {float(self._t[0])!r} "
-                    f"to t = {float(self._t[-1])!r}, where {FINEST} samples do not show how: give the method "
-                    "shorter steps, or the event a smoother function."
+                    f"the event {self._g.name!r} varies too fast to be followed between t = "
+                    f"{float(self._t[0])!r} and {float(self._t[-1])!r}, where {FINEST} samples do not show "
+                    "how: give the method shorter steps, or the event a smoother function."
                 )
         if not roots.suspects(fine[np.newaxis])[0]:
             return []

@@ -60,7 +60,7 @@ FAULTS += (
     Fault(
         "an event that no samples of a step can follow",
         too_fast,
-        r"'fast' varies too fast .* from t = 0\.0 to t = 0\.00\d+, .* shorter steps",
+        r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps",
     ),
 )
 
