@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_times
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, Stepper, check_times
 from problems.errors import InputError
 from problems.foreign import Foreign
 from problems.problem import Problem
@@ -46,6 +46,8 @@ class Solution:
         What was integrated, and how.
     events : dict of str to Occurrences
         Times, states and directions of the events that were asked for, by name.
+    error : Exception or None
+        What a function of the user raised, where ``status`` is ``USER_ERROR``.
     """
 
     t: Array
@@ -59,6 +61,7 @@ class Solution:
     problem: Problem
     method: MethodBase
     events: "Mapping[str, Occurrences]" = field(default_factory=dict)
+    error: Exception | None = None
 
     @property
     def v(self) -> Array | None:
@@ -114,6 +117,9 @@ def integrate(
     problems.errors.InputError
         If the method does not accept the problem, or for times, samplings, events and
         initial states that cannot be used.
+    Exception
+        What a `problems.Foreign` field raises in the very first step. Later ones, and those of an event's
+        function, end the integration as ``USER_ERROR``, with the trajectory up to there.
     """
     if method is None:
         method = registry.create("HBVM")
@@ -134,8 +140,15 @@ def integrate(
             grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
     stepper = program.start(problem.y0, problem.par, problem.t0)
     samples = Samples(grid, np.empty((0, problem.system.dim)), Status.FINISHED)
+    error: Exception | None = None
     if grid.size:
-        samples = stepper.advance(grid, sample=sample)
+        try:
+            samples = stepper.advance(grid, sample=sample)
+        except Exception as raised:
+            if not isinstance(problem.system, Foreign) or stepper.t == problem.t0:
+                raise
+            error, stop = raised, stepper.t
+            samples = _before(raised, stop, program.start(problem.y0, problem.par, problem.t0), grid, sample)
     finished = samples.status is Status.FINISHED
     stats = replace(stepper.stats)
     if isinstance(problem.system, Foreign):
@@ -151,8 +164,31 @@ def integrate(
         from_cache=program.from_cache,
         problem=problem,
         method=method,
+        error=error,
     )
     return solution if found is None else _with_events(solution, found)
+
+
+def _before(error: Exception, stop: float, stepper: Stepper, grid: Array, sample: str | None) -> Samples:
+    """Return the samples up to the time ``stop``, after which a function raised ``error``."""
+    status, reason = Status.USER_ERROR, f"{user_error(error)} in the step from t = {stop!r}."
+    direction = np.sign(grid[-1] - stepper.t)
+    reached = grid[(grid - stop) * direction <= 0.0]
+    if sample == "steps" and (not reached.size or reached[-1] != stop):
+        reached = np.append(reached, stop)
+    if not reached.size:
+        return Samples(reached, np.empty((0, stepper.y.size)), status, reason)
+    try:
+        made = stepper.advance(reached, sample=sample)
+    except Exception:  # a function that does not do the same twice
+        raise error from None
+    return Samples(made.t, made.y, status, reason)
+
+
+def user_error(error: Exception) -> str:
+    """Return the beginning of a sentence on what a function of the user raised."""
+    said = " ".join(str(error).split())
+    return f"a function of yours raised {type(error).__name__}{f' ({said})' if said else ''}"
 
 
 def check(problem: Problem, method: MethodBase) -> None:
@@ -176,7 +212,7 @@ def _with_events(solution: Solution, found: "Found") -> Solution:
     if found.status is Status.FINISHED or solution.status.failed:
         return solution
     stop = found.t_stop if found.terminal else solution.t_stop
-    return replace(solution, status=found.status, reason=found.reason, t_stop=stop)
+    return replace(solution, status=found.status, reason=found.reason, t_stop=stop, error=found.error)
 
 
 def _grid(problem: Problem, times: ArrayLike | None) -> Array:

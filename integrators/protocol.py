@@ -54,6 +54,7 @@ class Status(StrEnum):
     STALLED = "stalled"
     NOT_INVARIANT = "not_invariant"
     MAX_STEPS = "max_steps"
+    USER_ERROR = "user_error"
 
     @property
     def failed(self) -> bool:

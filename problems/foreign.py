@@ -47,7 +47,8 @@ class Foreign(System):
     -----
     Where f divides by zero or leaves a function's domain (`ArithmeticError`,
     `ValueError`), it is not a number there and the integration ends with that status.
-    Other errors of a Python function are raised; numba's are printed, and make it not a
+    Other errors of a Python function are raised in the first step, and end the integration with the status
+    ``user_error`` later; numba's are printed, and make it not a
     number. Jacobians are taken by differences. Methods that need formulas (LineIntegral, Taylor,
     those of diffrax) refuse.
 

@@ -19,7 +19,11 @@ NEAR = 0.1  # of the largest value in the step: an extremum below this may reach
 SURE = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
 UNRESOLVED = 1e-3  # of the largest coefficient: a tail as large says that there are too few samples
 FLAT = 1e-3  # of the largest slope: g has no slope here
-EXTREMUM = 1e-10  # of the step: where an extremum is
+EXTREMUM = 1e-10  # of the step: where an extremum is, if the values near it can be told apart
+BLUR = 1e-7  # of the step: how well a minimizer that compares values finds an extremum, with room
+BESIDE = 1e-6  # of the step: extrema as close to its end are looked for from both sides
+EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
+POLE = 1e3  # where g is as many times larger than BESIDE it, its sign changes through infinity
 
 
 @dataclass(frozen=True)
@@ -129,17 +133,21 @@ class Finder:
         touches: list[Zero] = []
         for first, last in self._runs():
             self._mark_run(first, last, marks, touches)
+        for i in (np.flatnonzero(self.p[1:-1] == 0.0) + 1).tolist():
+            before, after = np.sign(self.p[i - 1]), np.sign(self.p[i + 1])
+            if before == after != 0.0:  # a sample right at a touch
+                self._mark_low(i, int(before), marks, touches)
         if self.x[0] == 0.0 and self.p[0] != 0.0:
             marks.append((0.0, int(np.sign(self.p[0]))))
         marks.sort()
         found = touches
         for (a, before), (b, after) in pairwise(marks):
             if before != after:
-                found.append(Zero(self._solve(a, b), after))
+                found += self._solve(a, b, after)
         if self.x[-1] == 1.0 and self.p[-1] == 0.0 and marks:
             found.append(Zero(1.0, self._at_end(marks[-1][1])))
         elif marks and self.x[-1] == 1.0 and marks[-1][1] != np.sign(self.p[-1]):
-            found.append(Zero(self._solve(marks[-1][0], 1.0), int(np.sign(self.p[-1]))))
+            found += self._solve(marks[-1][0], 1.0, int(np.sign(self.p[-1])))
         return sorted(found, key=lambda zero: zero.x)
 
     def _runs(self) -> list[tuple[int, int]]:
@@ -163,8 +171,10 @@ class Finder:
             x = float(self.x[a + int(np.argmax(size[a : b + 1]))])
             if 0.0 < x < 1.0:
                 value = self.value(x)
-                if np.sign(value) == -sign:  # the polynomial errs: g may still get there nearby
+                if np.sign(value) in (0, -sign):  # the polynomial errs: g may still get there nearby
                     x, value = self._extremum(self._around(a, b), sign)
+                    if np.sign(value) != sign and abs(value) <= self._blur(x):
+                        touches.append(Zero(x, 0))
                 if np.isfinite(value) and value != 0.0:
                     marks.append((x, int(np.sign(value))))
             if i < len(lows):
@@ -174,14 +184,17 @@ class Finder:
         """Note what g does at an extremum where the polynomial comes near zero and turns back."""
         x, p = float(self.x[low]), float(self.p[low])
         value = self.value(x)
-        reach = 2.0 * abs(p - self._vertex(low)) + SURE * abs(value - p)
+        near = self.p[
+            max(low - 1, 0) : low + 2
+        ]  # between these it may fall by as much as it rises, at a corner
+        reach = float(np.abs(near - p).max()) + SURE * abs(value - p)
         if not np.isfinite(value) or (np.sign(value) == sign and abs(value) > reach):
             return
         if np.sign(value) != -sign:
-            x, value = self._extremum((float(self.x[low - 1]), float(self.x[low + 1])), -sign)
+            x, value = self._extremum(self._around(low, low), -sign)
         if np.sign(value) == -sign and abs(value) > self._noise(x):
             marks.append((x, -sign))
-        elif np.isfinite(value) and abs(value) <= self._noise(x):
+        elif np.isfinite(value) and abs(value) <= max(self._noise(x), self._blur(x)):
             touches.append(Zero(x, 0))
 
     def _near_zero(self, first: int, last: int) -> list[int]:
@@ -190,18 +203,35 @@ class Finder:
         if size.size < 3:
             return []
         inner = size[1:-1]
-        turns = (inner <= size[:-2]) & (inner < size[2:]) & (inner < NEAR * np.abs(self.p).max())
-        return (first + 1 + np.flatnonzero(turns)).tolist()
+        least = NEAR * np.abs(self.p).max()
+        turns = (inner <= size[:-2]) & (inner < size[2:]) & (inner < least)
+        lows = (first + 1 + np.flatnonzero(turns)).tolist()
+        end = self.x.size - 1
+        if first == 0 and size[0] < least and self._turns_between(1, -BESIDE, float(self.x[1])):
+            lows.insert(0, 0)
+        if last == end and size[-1] < least and self._turns_between(end - 1, float(self.x[-2]), 1.0 + BESIDE):
+            lows.append(end)
+        return lows
 
-    def _vertex(self, i: int) -> float:
-        """Return the extremum of the parabola through three neighbouring places."""
+    def _turns_between(self, i: int, a: float, b: float) -> bool:
+        """Whether the parabola through place i and its neighbours turns back from zero between two parts."""
         x, p = self.x[i - 1 : i + 2], self.p[i - 1 : i + 2]
         left, right = (p[1] - p[0]) / (x[1] - x[0]), (p[2] - p[1]) / (x[2] - x[1])
         bend = (right - left) / (x[2] - x[0])
-        if bend == 0.0:
-            return float(p[1])
+        if bend * p[1] <= 0.0:
+            return False
         slope = left + bend * (x[1] - x[0])
-        return float(p[1] - slope * slope / (4.0 * bend))
+        return bool(a < x[1] - slope / (2.0 * bend) < b)
+
+    def _beside(self, x: float, distance: float) -> list[float]:
+        """Return the values of g at a distance from a part of the step, where it has any."""
+        values = [self.value(place) for place in (x - distance, x + distance) if 0.0 <= place <= 1.0]
+        return [value for value in values if np.isfinite(value)]
+
+    def _blur(self, x: float) -> float:
+        """Return by how much the value at an extremum of g may differ from that where a minimizer ended."""
+        here = self.value(x)
+        return max((abs(value - here) for value in self._beside(x, BLUR)), default=0.0)
 
     def _around(self, a: int, b: int) -> tuple[float, float]:
         return float(self.x[max(a - 1, 0)]), float(self.x[min(b + 1, self.x.size - 1)])
@@ -218,8 +248,8 @@ class Finder:
             self._values[x] = float(self._g(x))
         return self._values[x]
 
-    def _solve(self, a: float, b: float) -> float:
-        """Return the zero between two parts of the step at which g has different signs."""
+    def _solve(self, a: float, b: float, after: int) -> list[Zero]:
+        """Return the zero between two parts of the step where g has different signs, none at a pole."""
         from scipy.optimize import brentq
 
         def continued(x: float) -> float:
@@ -228,10 +258,15 @@ class Finder:
             return value if np.isfinite(value) else self.value(b)
 
         options: dict[str, Any] = {"xtol": self._resolution, "rtol": 1e-15, "maxiter": 200}
-        return float(brentq(continued, a, b, **options))  # type: ignore[arg-type]
+        x = float(brentq(continued, a, b, **options))  # type: ignore[arg-type]
+        sides = [abs(value) for value in self._beside(x, BESIDE)]
+        return [] if sides and not abs(self.value(x)) <= POLE * max(sides) else [Zero(x, after)]
 
     def _extremum(self, between: tuple[float, float], sign: int) -> tuple[float, float]:
-        """Return where ``sign * g`` is largest, or the first place found where it is positive."""
+        """Return where ``sign * g`` is largest between two parts, or the first found where it is positive.
+
+        Where it is largest at one of the two, the polynomial has misplaced them, and they are moved.
+        """
         from scipy.optimize import minimize_scalar
 
         def falling(x: float) -> float:
@@ -241,11 +276,20 @@ class Finder:
             return -value if np.isfinite(value) else np.inf
 
         options = {"xatol": EXTREMUM}
+        a, b = between
+        x = a
         try:
-            least: Any = minimize_scalar(falling, bounds=between, method="bounded", options=options)
+            for _ in range(MOVES):
+                least: Any = minimize_scalar(falling, bounds=(a, b), method="bounded", options=options)
+                x, width = float(least.x), b - a
+                if min(x - a, b - x) > EDGE * width:
+                    break
+                a, b = (a - width, a + width) if x - a < b - x else (b - width, b + width)
+                a, b = max(a, 0.0), min(b, 1.0)
+                if x - a <= EDGE * width or b - x <= EDGE * width:  # the end of the step
+                    break
         except _Crossed as crossed:
             return crossed.x, crossed.value
-        x = float(least.x)
         return x, self.value(x)
 
 

@@ -10,6 +10,7 @@ from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
 from integrators.events.step import Step
+from integrators.integrate import user_error
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper
 from problems import Problem
 from problems.errors import InputError
@@ -18,6 +19,7 @@ FIRST, MOST = 8, 256  # steps looked at together
 NUMBERS = 1_000_000  # held at once, at most
 DEGREES = (8, 24, 64)  # of g along a step: the least, where s is not known, the most to begin with
 CLOSE = 64  # units in the last place: nothing happens in a time as short
+SAME = 1e-5  # of a step: two touches as close are one
 RESULTS = ("steps", "evaluations", "iterations")
 
 
@@ -50,6 +52,8 @@ class Found:
         One sentence, unless it is ``FINISHED``.
     stats : Stats
         Counters of the work done.
+    error : Exception or None
+        What a function of the user raised.
     """
 
     events: dict[str, Occurrences]
@@ -58,6 +62,7 @@ class Found:
     status: Status
     reason: str
     stats: Stats
+    error: Exception | None = None
 
 
 class Search:
@@ -102,19 +107,23 @@ class Search:
         self._count = FIRST
         self._most = max(1, min(MOST, NUMBERS // ((self._degree + 1) * problem.system.dim)))
         self._finite = [False] * len(self._events)
+        self._touched = [np.nan] * len(self._events)  # where each was last seen to touch zero
         self._hits: list[Hit] = []
         self._terminal: str | None = None
         self._failed = False
+        self._error: Exception | None = None
+        self._looked = problem.t0
         self._zero = self._rests(problem)
 
     def run(self) -> Found:
         """Search to the end, the first terminal event, or a failure of the method."""
         while self._t != self._end and self._terminal is None and not self._failed:
-            before = self._walker.checkpoint()
-            ends, last = self._whole() if self._h is not None else self._varying()
-            for t, y in self._sampled(before, ends, last):
-                if self._terminal is None and t.size:
-                    self._look(before, t, y)
+            try:
+                self._go_on()
+            except InputError:
+                raise
+            except Exception as error:  # of a function of the user
+                self._error, self._failed = error, True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
         steppers = (self._walker, self._probe)
@@ -125,7 +134,17 @@ class Search:
             t_stop=stop,
             **self._outcome(stop),
             stats=replace(self._walker.stats, **work),
+            error=self._error,
         )
+
+    def _go_on(self) -> None:
+        """Take some steps, and look for events in them."""
+        before = self._walker.checkpoint()
+        ends, last = self._whole() if self._h is not None else self._varying()
+        for t, y in self._sampled(before, ends, last):
+            if self._terminal is None and t.size:
+                self._looked = float(t[0, 0])
+                self._look(before, t, y)
 
     def _outcome(self, stop: float) -> dict[str, Any]:
         """Return status and reason by name."""
@@ -133,6 +152,12 @@ class Search:
         if self._terminal is not None:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
             return {"status": Status.EVENT, "reason": reason}
+        if self._error is not None:
+            said = user_error(self._error)
+            return {
+                "status": Status.USER_ERROR,
+                "reason": f"{said}: events are known up to t = {self._looked!r} only.",
+            }
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
                 return {"status": stepper.status, "reason": stepper.reason}
@@ -161,15 +186,21 @@ class Search:
         ]
 
     def _ask(self, stepper: Stepper, times: Array, sample: str) -> tuple[Array, Array]:
-        """Return the samples that could be made, or refuse a method that has none."""
+        """Return the samples that could be made, or refuse a method that has none.
+
+        Places within a step that is about as short as rounding of time are one and the same time.
+        """
+        new = np.append(True, np.diff(times) != 0.0)
         try:
-            made = stepper.advance(times, sample=sample)
+            made = stepper.advance(times[new], sample=sample)
         except InputError as error:
             raise InputError(
                 f"{self._method!r} cannot find events: it does not offer the states inside its steps that "
                 f"finding them takes (sample={sample!r}); use HBVM, Gauss or LineIntegral."
             ) from error
-        return made.t, made.y
+        place = np.cumsum(new) - 1
+        place = place[place < made.t.size]
+        return (made.t, made.y) if new.all() else (made.t[place], made.y[place])
 
     def _whole(self) -> tuple[Array, bool]:
         """Return the ends of the next own steps of one length, from the present on, and whether all."""
@@ -244,11 +275,12 @@ class Search:
             near = before  # the probe goes on from the step that it was last sent to
             for row in np.flatnonzero(np.logical_or(roots.suspects(fine), unresolved)):
                 step = Step(self._probe, near, t[row], y[row], g)
-                hits += [
-                    Hit(at, state, i, direction)
-                    for at, state, direction in step.events(places, fine[row], bool(unresolved[row]))
-                    if self._events[i].direction in (0, direction)
-                ]
+                for at, state, direction in step.events(places, fine[row], bool(unresolved[row])):
+                    # A touch at the end of a step is seen from both sides.
+                    again = direction == 0 and abs(at - self._touched[i]) < SAME * abs(t[row, -1] - t[row, 0])
+                    self._touched[i] = at if direction == 0 else self._touched[i]
+                    if self._events[i].direction in (0, direction) and not again:
+                        hits.append(Hit(at, state, i, direction))
                 near = near if step.here is None else step.here
         self._take(sorted(hits, key=lambda hit: self._sign * hit.t))
 

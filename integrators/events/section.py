@@ -79,4 +79,5 @@ def section(
         problem=problem,
         method=method,
         events=found.events,
+        error=found.error,
     )

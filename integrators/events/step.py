@@ -7,8 +7,12 @@ import numpy as np
 from integrators.events import roots
 from integrators.events.function import EventFunction
 from integrators.protocol import Array, Stepper
+from problems.errors import InputError
 
-FINEST = 256  # samples in a step that are not exceeded
+FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
+DEEPEST = 8  # times that a step is halved where they do not resolve g
+ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
+SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
 
 
 class Step:
@@ -24,26 +28,61 @@ class Step:
         Samples of the step's polynomial.
     g : EventFunction
         What may vanish.
+    whole : Step, optional
+        The step that this is a part of.
     """
 
-    def __init__(self, probe: Stepper, before: Any, t: Array, y: Array, g: EventFunction):
+    def __init__(
+        self, probe: Stepper, before: Any, t: Array, y: Array, g: EventFunction, whole: "Step | None" = None
+    ):
         self._probe, self._before = probe, before
         self._t, self._y, self._g = t, y, g
+        self._whole = whole or self
         self.here: Any = None
         self._states: dict[float, tuple[float, Array]] = {}
 
-    def events(self, places: Array, fine: Array, unresolved: bool) -> list[tuple[float, Array, int]]:
-        """Return times, states and directions of the zeros, from `roots.refined` values."""
-        degree = self._t.size - 1
-        while unresolved and degree < FINEST:
-            degree = min(4 * degree, FINEST)
-            places, fine, unresolved = self._closer(degree)
-        if not roots.suspects(fine[np.newaxis])[0]:
-            return []
+    def events(
+        self, places: Array, fine: Array, unresolved: bool, depth: int = 0
+    ) -> list[tuple[float, Array, int]]:
+        """Return times, states and directions of the zeros, from `roots.refined` values.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If g varies too fast for as many samples as are taken in a step.
+        """
+        degree = places.size // roots.FINE
         span = float(self._t[-1] - self._t[0])
         resolution = float(np.spacing(max(abs(self._t[0]), abs(self._t[-1])))) / abs(span)
+        while unresolved and degree < FINEST and resolution < SHORTEST:
+            degree = min(4 * degree, FINEST)
+            places, fine, unresolved = self._closer(degree)
+        if unresolved and depth < DEEPEST and resolution < SHORTEST:
+            return self._halves(depth)
+        if unresolved:  # at a pole, a jump or a corner the polynomial between the samples means nothing
+            places, fine = places[:: roots.FINE], fine[:: roots.FINE]
+            if np.count_nonzero(np.diff(np.sign(fine))) > ISOLATED:
+                raise InputError(
+                    f"the event {self._g.name!r} varies too fast to be followed between t = "
+                    f"{float(self._t[0])!r} and {float(self._t[-1])!r}, where {FINEST} samples do not show "
+                    "how: give the method shorter steps, or the event a smoother function."
+                )
+        if not roots.suspects(fine[np.newaxis])[0]:
+            return []
         found = roots.Finder(places, fine, self._value, self._noise, resolution).zeros()
         return [(*self._state(zero.x), zero.direction) for zero in found]
+
+    def _halves(self, depth: int) -> list[tuple[float, Array, int]]:
+        """Return what `events` does from both halves."""
+        middle, y = self._state(0.5)
+        found: list[tuple[float, Array, int]] = []
+        for t, states in (
+            ([self._t[0], middle], [self._y[0], y]),
+            ([middle, self._t[-1]], [y, self._y[-1]]),
+        ):
+            part = Step(self._probe, self._before, np.array(t), np.array(states), self._g, self._whole)
+            found += part.events(*part._closer(FINEST), depth + 1)
+        return found
 
     def _closer(self, degree: int) -> tuple[Array, Array, bool]:
         """Return what `roots.refined` does for more samples."""
@@ -57,8 +96,10 @@ class Step:
         return places, fine[0], bool(unresolved[0])
 
     def _go(self) -> None:
-        """Put the probe at the beginning of this step."""
-        if self.here is None:
+        """Put the probe at the beginning of this step, the whole one."""
+        if self._whole is not self:
+            self._whole._go()
+        elif self.here is None:
             self._probe.restore(self._before)
             if self._probe.t != self._t[0]:
                 self._probe.advance(self._t[:1], sample="side")

@@ -21,7 +21,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.hbvm import HBVM, TOLERANCE
 from integrators.kernel import native, store
 from integrators.legendre import legendre, tables
 from integrators.plugins import rebound_layout as layout
@@ -49,12 +49,22 @@ FIELDS = (
     ("", DOUBLE, "length", layout.LENGTH, None),
     ("Iterations so far.", UINT64, "iterations", layout.ITERATIONS, None),
     ("Force evaluations so far.", UINT64, "evaluations", layout.EVALUATIONS, None),
+    (
+        "Estimated local error of a step, relative to a body's velocity, beyond which the integration ends "
+        "with an error. Default is 1e-3; inf: never.",
+        DOUBLE,
+        "largest_error",
+        layout.LARGEST_ERROR,
+        None,
+    ),
 )
 
 MESSAGES = {
     layout.UNKNOWN_METHOD: "HBVM needs whole numbers k >= s >= 1: set sim.integrator.k and sim.integrator.s.",
     layout.ROUGH: "HBVM solves to round-off, for smooth forces; a tree's are not: set sim.gravity = 'basic'.",
     layout.DIVERGED: "The iteration for a step of HBVM did not converge; take a smaller sim.dt.",
+    layout.UNRESOLVED: "A step of HBVM is too long for an encounter: its estimated error exceeds "
+    "sim.integrator.largest_error times a body's velocity; take a smaller sim.dt, or ias15.",
 }
 
 # REBOUND keeps addresses of what is in here.
@@ -63,28 +73,45 @@ _tables: dict[tuple[int, int], Any] = {}
 
 
 def install(simulation: Any, method: HBVM | Gauss) -> None:
-    """Make ``method`` the integrator of a simulation, and its h the timestep.
+    """Make ``method`` the integrator of a simulation, and its h, where it has one, the timestep.
 
     Parameters
     ----------
     simulation : rebound.Simulation
         The simulation.
     method : HBVM or Gauss
-        As for `integrators.integrate`.
+        As for `integrators.integrate`, with k and s. Without h, ``HBVM(k=8, s=8)``, the timestep
+        remains ``simulation.dt``.
 
     Raises
     ------
     problems.errors.InputError
-        If it is another method.
+        If it is another method, or one with options that are not to be had here: ``tol``, since
+        steps are of one length, or a ``solver``, since the equations are solved by fixed-point iteration.
     """
     if isinstance(method, Gauss):
         method = method.as_hbvm()
     if not isinstance(method, HBVM):
         raise InputError(f"install takes HBVM(k=, s=, h=) or Gauss(s=, h=), not {method!r}.")
+    if method.k is None or method.s is None:
+        raise InputError(
+            f"{method!r} chooses k and s itself, REBOUND's plugin does not: give HBVM(k=8, s=8)."
+        )
+    if method.tol is not None and (method.h is not None or method.tol != TOLERANCE):
+        raise InputError(
+            f"tol={method.tol!r} asks for steps of varying length, which the plugin does not take: give h= "
+            "instead, or neither of them and set sim.dt."
+        )
+    if method.solver not in ("auto", "fixed_point"):
+        raise InputError(
+            f"solver={method.solver!r} is not to be had in REBOUND, where steps are solved by fixed-point "
+            "iteration: leave it out."
+        )
     simulation.integrator = NAME
     options: Any = simulation.integrator  # not the name, but what holds its options
     options.k, options.s = method.k, method.s
-    simulation.dt = method.h
+    if method.h is not None:
+        simulation.dt = method.h
 
 
 def _table(k: int, s: int) -> int:
@@ -98,9 +125,12 @@ def _table(k: int, s: int) -> int:
 
 
 def _fail(simulation: int, code: int) -> None:
-    """Tell REBOUND why a step failed."""
-    message = ctypes.c_char_p(MESSAGES[code].encode())
-    rebound.clibrebound.reb_simulation_error(ctypes.c_void_p(simulation), message)
+    """Tell REBOUND when and why a step failed."""
+    t, dt = (
+        (ctypes.c_double * layout.SIMULATION).from_address(simulation)[i] for i in (layout.TIME, layout.DT)
+    )
+    message = f"{MESSAGES[code]} This was at t = {t!r}, dt = {dt!r}."
+    rebound.clibrebound.reb_simulation_error(ctypes.c_void_p(simulation), ctypes.c_char_p(message.encode()))
 
 
 def _make_table(k: int, s: int) -> np.ndarray:
@@ -131,6 +161,7 @@ def _create() -> int:
     address = calloc(layout.WORDS, 8)
     state = (ctypes.c_int64 * layout.WORDS).from_address(address)
     state[layout.K], state[layout.S] = 8, 8
+    ctypes.c_double.from_address(address + 8 * layout.LARGEST_ERROR).value = layout.LARGEST
     return address
 
 

@@ -7,8 +7,8 @@ from integrators.peers.options import load
 rebound = load("rebound")
 
 # The state of the integrator, in words of eight bytes: what REBOUND saves, and then what it does not.
-K, S, REST, REST_COUNT, FORCES, FORCES_COUNT, LENGTH, ITERATIONS, EVALUATIONS = range(9)
-SAVED = 9
+K, S, REST, REST_COUNT, FORCES, FORCES_COUNT, LENGTH, ITERATIONS, EVALUATIONS, LARGEST_ERROR = range(10)
+SAVED = 10
 TABLES, TABLES_K, TABLES_S, WORK, WORK_COUNT, MEGNO = range(SAVED, SAVED + 6)
 WORDS = SAVED + 6
 
@@ -31,8 +31,10 @@ TREE = 3  # of REBOUND's kinds of gravity
 
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 
+LARGEST = 1e-3  # local error that a step may have, relative to a body's velocity, where nobody says otherwise
+
 # Why a step fails.
-UNKNOWN_METHOD, DIVERGED, ROUGH = range(3)
+UNKNOWN_METHOD, DIVERGED, ROUGH, UNRESOLVED = range(4)
 
 # Machine code compiled for other places is other machine code.
 IDENTITY = repr({name: value for name, value in sorted(globals().items()) if name.isupper()})

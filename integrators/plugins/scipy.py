@@ -219,7 +219,9 @@ class Gauss(_LineIntegral):
     """Gauss(s), collocation at the Gauss nodes, which is HBVM(s, s): ``solve_ivp(..., method=Gauss)``.
 
     Symplectic with constant steps, ``h=...``; with adaptive ones it keeps the energy no
-    better than other methods of its order. Parameters as for `HBVM`, without k.
+    better than other methods of its order. Its s nodes do not show gamma_s, by which HBVM's steps are
+    judged: gamma_{s-1} takes its place, so that steps are shorter than HBVM's, by far where s < 4, for a
+    Python function as in the kernel. Parameters as for `HBVM`, without k.
     """
 
     def __init__(

@@ -84,6 +84,8 @@ class PythonSteps:
             )  # fmt: skip
         else:
             self.h_abs = first_step
+        # Of the estimate of a step's error; without gamma_s it is one of a lower order.
+        self._order = 2 * s - 1 if self.k == s > 1 else 2 * s + 1
         self._stages: Stages | None = None
         self._jacobian = Jacobian(solver.fun_vectorized, y.size, self._dtype, self._atol, jac, jac_sparsity)
         self._newton: Newton | None = None
@@ -134,7 +136,7 @@ class PythonSteps:
                 continue
             error = self._error(t, h, y, solved)
             if not error <= 1.0:
-                wanted = SAFETY * error ** (-1.0 / (2 * self._s + 1)) if np.isfinite(error) else SHRINK
+                wanted = SAFETY * error ** (-1.0 / self._order) if np.isfinite(error) else SHRINK
                 h_abs, rejected = h_abs * max(SHRINK, wanted), True
                 continue
             if self._automatic and not self._seen(solved):
@@ -171,7 +173,7 @@ class PythonSteps:
 
     def _factor(self, h_abs: float, error: float, rate: float, rejected: bool) -> float:
         """Return by how much the next step is longer: predictive control, and what the solver needs."""
-        order = 2 * self._s + 1
+        order = self._order
         factor = SAFETY * error ** (-1.0 / order) if error > 0.0 else GROW
         if self._error_old > 0.0 and error > 0.0 and self._h:
             factor = min(factor, factor * h_abs / abs(self._h) * (self._error_old / error) ** (1.0 / order))
@@ -227,13 +229,13 @@ class PythonSteps:
         return f
 
     def _error(self, t: float, h: float, y: Array, solved: Solved) -> float:
-        """Return the size of ``h |gamma_s|^2 / |gamma_0|`` in units of the tolerance."""
+        """Return the size of ``h |gamma|^2 / |gamma_0|``, gamma the last known, in units of the tolerance."""
         stages = self._stages
         assert stages is not None
-        beyond = stages.next_coefficient(solved, h * self._slope(t, y) if self.k == self._s else None)
+        last = stages.last_coefficient(solved, h * self._slope(t, y) if self.k == 1 else None)
         scale = self._atol + np.maximum(np.abs(y), np.abs(y + solved.G[0])) * self._rtol
         with np.errstate(divide="ignore", invalid="ignore"):
-            top, bottom = common.norm(beyond / scale), common.norm(solved.G[0] / scale)
+            top, bottom = common.norm(last / scale), common.norm(solved.G[0] / scale)
             return 0.0 if top == 0.0 else float(top * top / bottom)
 
     def _seen(self, solved: Solved) -> bool:

@@ -21,6 +21,7 @@ MAX_ITERATIONS = 100
 FLOOR = 1e-3  # of the largest size: where rounding of the field may hide a small component
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
+SQRT3 = float(np.sqrt(3.0))
 
 Complex = NDArray[Any]
 Function = Callable[[Any, Complex], Complex]
@@ -72,9 +73,8 @@ class Stages:
             table.projection.hi,
         )
         self.modes = min(s, MODES)
-        # P_s at the nodes; at k = s it vanishes there, and what is missed at c = 0 takes its place.
+        # P_s at the nodes, where it vanishes with k = s.
         self.beyond = tables(k, s + 1).projection.hi[s] if k > s else None
-        self.at_start = (-1.0) ** np.arange(s + 1) * np.sqrt(2.0 * np.arange(s + 1) + 1.0)
 
     def with_nodes(self, k: int) -> "Stages":
         """Return the same with another number of nodes; the count goes on."""
@@ -172,12 +172,18 @@ class Stages:
         """Return the coefficients of the first ``part`` of a step's polynomial, of coefficients G."""
         return part * (self.projection @ (legendre(part * self.nodes, self.s) @ G))
 
-    def next_coefficient(self, solved: Solved, start: Complex | None) -> Complex:
-        """Return h gamma_s, the next Legendre coefficient; for k = s from h f at the start of the step."""
-        if start is None:
-            assert self.beyond is not None
+    def last_coefficient(self, solved: Solved, start: Complex | None) -> Complex:
+        """Return the last Legendre coefficient by which a step may be judged, times h.
+
+        gamma_s where k > s. With k = s the nodes do not show it, and gamma_{s-1} serves, as in the kernel:
+        what the field at the start tells of gamma_s is too little at long steps. One node leaves nothing
+        else: h f at the start of the step is then ``start``, and ``None`` otherwise.
+        """
+        if self.beyond is not None:
             return self.beyond @ solved.values
-        return (start - self.at_start[:-1] @ solved.G) / self.at_start[-1]
+        if start is None:
+            return solved.G[-1]
+        return (solved.G[0] - start) / SQRT3  # P_1 is -sqrt(3) at the start
 
     def coefficients(self, values: Complex) -> Complex:
         """Return all k Legendre coefficients that k stage values determine, shape (k, n)."""

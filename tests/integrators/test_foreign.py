@@ -1,13 +1,14 @@
 """Fields that are not traced: numba functions and any Python functions."""
 
 import math
+import re
 
 import numba
 import numpy as np
 import pytest
 
 import integrators
-from integrators import HBVM, Gauss, LineIntegral, integrate
+from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.protocol import Status
 from problems import Foreign, InputError, Problem, VectorField, emit
 
@@ -130,14 +131,44 @@ def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
 
 def test_any_other_error_is_the_users_to_see():
     def broken(t, y):
-        if t > 1.0:
+        if t > last:
             raise LookupError("no such table")
         return [1.0]
 
     problem = Problem(Foreign(broken, dim=1), y0=[0.0], t_end=9.0)
     for method in (HBVM(k=4, s=2, h=0.1), HBVM(k=4, s=2, tol=1e-6), Gauss(s=2, h=0.1, solver="newton")):
-        with pytest.raises(LookupError, match="no such table"):
+        last = -1.0
+        with pytest.raises(LookupError, match="no such table"):  # nothing is reached that could be kept
             integrate(problem, method)
+        last = 8.0
+        for sample in ("side", "steps"):
+            made = integrate(problem, method, np.linspace(0.0, 9.0, 91), sample=sample)
+            assert made.status is Status.USER_ERROR
+            assert made.status.failed
+            assert isinstance(made.error, LookupError)
+            assert made.reason.startswith(
+                "a function of yours raised LookupError (no such table) in the step"
+            )
+            assert 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
+            assert made.t[-1] <= made.t_stop
+            assert made.t[-1] > made.t_stop - 0.11
+            assert np.abs(made.y[:, 0] - made.t).max() < 1e-13  # measured 2e-15
+
+
+@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), HBVM()], ids=str)
+def test_an_error_of_an_events_function_keeps_the_trajectory_and_the_events_before(method):
+    def g(t, y):
+        if t > 50.0:
+            raise LookupError("no such table")
+        return float(y[0])
+
+    turn = Problem(Foreign(lambda t, y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=60.0)
+    made = integrate(turn, method, events=Event(g, name="g"))
+    assert made.status is Status.USER_ERROR
+    assert isinstance(made.error, LookupError)
+    assert re.search(r"LookupError \(no such table\): events are known up to t = \d+", made.reason)
+    assert made.t[-1] == 60.0
+    assert len(made.events["g"]) >= 1
 
 
 def test_a_result_of_a_wrong_length_is_refused():

@@ -101,6 +101,54 @@ def test_a_touch_is_one_event_without_direction():
     assert len(up) == len(down) == 0
 
 
+METHODS = [HBVM(k=6, s=4, h=0.5), HBVM(k=6, s=4, h=0.1), HBVM()]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+@pytest.mark.parametrize(
+    "g",
+    [
+        lambda q: q[0] ** 2,
+        lambda q: q[0] ** 2 * (2 + q[0]),
+        lambda q: -(q[0] ** 4),
+        lambda t, m: (1 - m.cos(2 * (t - 0.25))) / 2,  # at the ends of some steps to within rounding
+    ],
+    ids=["square", "uneven", "fourth power", "time"],
+)
+def test_a_double_zero_is_a_touch_wherever_it_lies_in_a_step(method, g):
+    _, (zeros,) = happened(oscillator(phase=-0.25), method, Event(g))
+    assert np.allclose(zeros.t, 0.25 + np.pi * np.arange(7), rtol=0, atol=1e-6)  # measured 3e-8
+    assert not zeros.direction.any()
+
+
+@pytest.mark.parametrize("h", [0.25, 0.5, 0.1])
+def test_a_touch_at_the_end_of_a_step_is_one(h):
+    method = HBVM(k=6, s=4, h=h)
+    for at in (7.25, 7.3, 7.5, np.nextafter(7.5, 0.0), np.nextafter(7.5, 8.0), 7.5 + 1e-8, 7.5 - 1e-8):
+        _, (zeros,) = happened(oscillator(), method, Event(lambda t, at=at: (t - at) ** 2))
+        assert np.allclose(zeros.t, [at], rtol=0, atol=1e-7), at
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_a_pole_is_no_event(method):
+    _, (pole, even, tangent) = happened(
+        oscillator(phase=-0.25, t_end=5.0),
+        method,
+        Event(lambda q: 1 / q[0], name="pole"),
+        Event(lambda q: 1 / q[0] ** 2, name="even"),
+        Event(lambda q, p: q[0] / p[0], name="tangent"),
+    )
+    assert len(pole) == len(even) == 0
+    assert np.allclose(tangent.t, 0.25 + np.pi * np.arange(2), rtol=0, atol=1e-8)  # q = 0; p = 0 between
+    assert (tangent.direction == 1).all()
+
+
+def test_a_jump_across_zero_is_where_the_sign_changes():
+    jump = Event(lambda q: 1.0 if float(q[0]) > 0.5 else -1.0)
+    _, (zeros,) = happened(oscillator(t_end=3.0), HBVM(k=10, s=8, h=0.5), jump)
+    assert np.allclose(zeros.t, [np.pi / 6, 5 * np.pi / 6], rtol=0, atol=1e-12)
+
+
 def test_a_terminal_event_ends_the_integration_there():
     times = np.linspace(0.0, 20.0, 41)
     solution, (zeros,) = happened(oscillator(), WHOLE, Event(lambda q: q[0], terminal=True), times=times)
@@ -155,6 +203,14 @@ def test_a_function_of_time_alone_may_vary_faster_than_the_steps():
     assert solution.status is Status.FINISHED
 
 
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, h=10.0)], ids=str)
+def test_steps_that_are_long_for_the_event_are_divided_until_they_show_it(method):
+    slow = Problem(VectorField(lambda y: [y[1], -0.01 * y[0]], dim=2, name="slow"), y0=[1.0, 0.0], t_end=10.0)
+    _, (zeros,) = happened(slow, method, Event(lambda t, m: m.sin(200 * t)))
+    assert len(zeros) == 636
+    assert np.allclose(zeros.t, np.pi / 200 * np.arange(1, 637), rtol=0, atol=1e-13)  # measured 2e-15
+
+
 def test_a_start_at_zero_is_no_event_but_a_return_to_it_is():
     problem = oscillator(phase=0.3, t_end=10.0)
     start = math.sin(0.3)
@@ -207,6 +263,21 @@ def test_a_failure_keeps_the_events_before_it():
     assert solution.status.failed
     assert solution.t_stop < np.pi / 2 + 0.1
     assert np.allclose(zeros.t, [np.pi / 4], rtol=0, atol=1e-13)  # measured 5.6e-16
+
+
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=4, tol=1e-10), HBVM(k=8, s=4, h=0.01)], ids=str)
+@pytest.mark.parametrize("terminal", [True, False])
+def test_an_event_before_a_singularity_is_returned(method, terminal):
+    kepler = Hamiltonian(
+        lambda q, p, m: (p[0] ** 2 + p[1] ** 2) / 2 - 1 / m.sqrt(q[0] ** 2 + q[1] ** 2), dof=2
+    )
+    fall = Problem(kepler, q0=[1.0, 0.0], p0=[0.0, 0.0], t_end=5.0)
+    solution, (half,) = happened(fall, method, Event(lambda q: q[0] - 0.5, terminal=terminal))
+    at = (np.pi / 4 + 0.5) / math.sqrt(2)  # r = cos(x)^2 at t = (x + sin(x) cos(x)) / sqrt(2)
+    assert np.allclose(half.t, [at], rtol=0, atol=1e-10)  # measured 2e-11
+    assert solution.status is Status.EVENT if terminal else solution.status.failed
+    # The fall ends at 1.1107.
+    assert solution.t_stop == half.t[0] if terminal else 1.0 < solution.t_stop < 1.12
 
 
 def test_methods_without_states_inside_their_steps_refuse():

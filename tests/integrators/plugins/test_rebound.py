@@ -134,6 +134,49 @@ def test_particles_may_be_added_and_removed_on_the_way() -> None:
     assert np.abs(state(simulation) - state(other)).max() < 1e-13  # measured 1e-15: a massless guest
 
 
+def eccentric(h: float) -> Any:
+    simulation = rebound.Simulation()
+    simulation.add(m=1.0)
+    simulation.add(m=1e-3, a=1.0, e=0.99, f=np.pi)
+    simulation.move_to_com()
+    install(simulation, HBVM(k=8, s=8, h=h))
+    return simulation
+
+
+@pytest.mark.parametrize("h", [0.01, 0.003])
+def test_a_pericentre_that_the_steps_do_not_resolve_is_not_stepped_over(h: float) -> None:
+    # The equations of the step are solved, and it makes a = 5.97 after three pericentres, or 1.13.
+    simulation = eccentric(h)
+    with pytest.raises(RuntimeError, match=r"too long for an encounter.* t = 3\.1\d+"):
+        simulation.integrate(20.0)
+    orbit = simulation.particles[1].orbit(primary=simulation.particles[0])
+    assert simulation.t < np.pi
+    assert orbit.a == pytest.approx(1.0, abs=1e-7)  # measured 3e-11 and 7e-9: it stands before the encounter
+    simulation.dt = 0.0005
+    simulation.integrate(5.0)
+    orbit = simulation.particles[1].orbit(primary=simulation.particles[0])
+    assert orbit.a == pytest.approx(1.0, abs=1e-7)  # measured 2e-11 and 7e-9
+
+
+def test_the_largest_error_of_a_step_is_the_users() -> None:
+    simulation = eccentric(0.01)
+    simulation.integrator.largest_error = np.inf
+    simulation.integrate(5.0)
+    orbit = simulation.particles[1].orbit(primary=simulation.particles[0])
+    assert abs(orbit.a - 1.0) > 1e-3  # measured 1.4e-2
+    simulation = eccentric(0.001)
+    simulation.integrator.largest_error = 1e-12
+    with pytest.raises(RuntimeError, match="largest_error"):  # estimated 6e-10
+        simulation.integrate(5.0)
+
+
+def test_without_h_the_timestep_is_the_simulations() -> None:
+    simulation = rebound.Simulation()
+    simulation.dt = 0.02
+    install(simulation, HBVM(k=10, s=6))
+    assert (simulation.dt, simulation.integrator.k, simulation.integrator.s) == (0.02, 10, 6)
+
+
 def test_what_cannot_be_done_is_said() -> None:
     simulation = two_bodies(Gauss(s=4, h=0.1))
     with pytest.raises(InputError, match="install takes HBVM"):

@@ -1,0 +1,70 @@
+"""Faults with our methods inside other libraries, and with events."""
+
+from typing import Any
+
+import pytest
+
+from integrators import HBVM, Event, Gauss, integrate
+from problems import Problem, VectorField
+
+from .fault import Fault, is_met
+
+
+def installed(**options: Any) -> object:
+    rebound = pytest.importorskip("rebound")
+    from integrators.plugins.rebound import install
+
+    method = HBVM(**options) if "k" in options or not options else Gauss(**options)
+    return install(rebound.Simulation(), method)
+
+
+def encounter(h: float) -> object:
+    rebound = pytest.importorskip("rebound")
+    from integrators.plugins.rebound import install
+
+    simulation = rebound.Simulation()
+    simulation.add(m=1.0)
+    simulation.add(m=1e-3, a=1.0, e=0.99, f=3.14159)
+    install(simulation, HBVM(k=8, s=8, h=h))
+    return simulation.integrate(20.0)
+
+
+FAULTS = (
+    Fault(
+        "REBOUND, a pericentre that the steps do not resolve",
+        lambda: encounter(0.01),
+        r"too long for an encounter.* smaller sim\.dt.* t = 3\.1\d+, dt = 0\.01\.",
+        RuntimeError,
+    ),
+    Fault(
+        "REBOUND, a pericentre that cannot be solved",
+        lambda: encounter(0.1),
+        r"did not converge; take a smaller sim\.dt\. This was at t = 3\.1",
+        RuntimeError,
+    ),
+    Fault("install(HBVM())", installed, r"chooses k and s .* HBVM\(k=8, s=8\)"),
+    Fault("install(HBVM(tol=))", lambda: installed(k=8, s=4, tol=1e-9), "tol=1e-09 .* give h="),
+    Fault("install(Gauss(h=, tol=))", lambda: installed(s=4, h=0.1, tol=1e-9), "tol=1e-09 .* give h="),
+    Fault(
+        "install(HBVM(solver=))", lambda: installed(k=8, s=4, h=0.1, solver="newton"), "'newton' .* leave it"
+    ),
+)
+
+
+def too_fast() -> object:
+    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
+    return integrate(slow, HBVM(k=8, s=4, h=1.0), events=Event(lambda t, m: m.sin(1e7 * t), name="fast"))
+
+
+FAULTS += (
+    Fault(
+        "an event that no samples of a step can follow",
+        too_fast,
+        r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps",
+    ),
+)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=str)
+def test_a_fault_gets_its_sentence(fault: Fault) -> None:
+    is_met(fault)
