@@ -283,6 +283,8 @@ def failure_is_a_status(method: MethodBase, problem: Problem) -> str | None:
     _require(samples.y.shape == (n, hopeless.system.dim), "a state for each time")
     _require(bool(np.isfinite(samples.y).all()), "what is returned is finite")
     _require(bool(np.isfinite(stepper.t)), "the time of the failure is known")
+    late = n and samples.t[-1] > stepper.t + 4.0 * np.spacing(stepper.t)
+    _require(not late, "no state comes back that lies after the failure")
     return None
 
 

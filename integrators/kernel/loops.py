@@ -117,9 +117,12 @@ def sample(ctx, side, between, t, part, out):
         if outcome == at.DONE:
             interpolate(ctx, part / get_float(ctx, at.H), out)
         return outcome
-    # Ahead of its time: the part starts from it. Should it fail, the part may not.
-    if between == at.SIDE and solve(ctx) == at.BUDGET:
-        return at.BUDGET
+    if between == at.SIDE:
+        # Ahead of its time: the part starts from it. Where it fails, nothing in it is reached: near a
+        # singularity the equations of a part may have a solution, far from the trajectory.
+        outcome = solve(ctx)
+        if outcome != at.DONE:
+            return outcome
     outcome = part_step(ctx, side, part)
     add_counters(ctx, side)
     if outcome == at.DONE:

@@ -303,6 +303,11 @@ def failure(outcome: int, t: float, reals: Array, solver: str = "fixed-point") -
     """Return the status that an outcome of the kernel stands for, and the reason as a sentence."""
     if outcome == layout.NOT_FINITE:
         return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
+    if outcome == layout.SCATTERED:
+        return Status.NONLINEAR_DIVERGENCE, (
+            f"the equations of the step from t = {t!r}, h = {float(reals[layout.H])!r} have no solution near "
+            "the trajectory: the one found oscillates within the step; take a smaller h."
+        )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "
         f"h = {float(reals[layout.H])!r} (last relative change {reals[layout.LAST]:.1e}); take a smaller h."

@@ -215,6 +215,10 @@ class LineStepper:
         while outcome == at.BUDGET:
             outcome = self._call(what, between, times, targets, parts, made, out, CHUNK)
             made = int(self._count[at.MADE])
+        if outcome != at.DONE and between == at.SIDE and targets is not None and parts is not None:
+            # Near a singularity a part of the step that failed may have a solution, far from the trajectory.
+            inside = (targets[:made] == self._count[at.N]) & (parts[:made] != 0.0)
+            made -= int(inside.sum())
         return self._samples(times[:made], out[:made], outcome)
 
     def walk(
