@@ -175,8 +175,9 @@ class HBVMProgram:
         if side not in self._fresh:
             scaled = self.scaled(self.h)
             shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
-            self._fresh[side] = Context(self.shape, {**self._fixed, **shared})
-            self._fresh[side].reals[layout.TOLERANCE] = TOLERANCE
+            made = Context(self.shape, {**self._fixed, **shared})
+            made.reals[layout.TOLERANCE] = TOLERANCE
+            self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
     def load(self, context: Context, par: Array) -> None:
@@ -190,10 +191,11 @@ class HBVMProgram:
         if not self.second:
             return np.ones(0)
         key = par.tobytes()
-        if self._known_velocity[0] != key:
-            found = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
-            self._known_velocity = (key, found)
-        return self._known_velocity[1]
+        known, velocity = self._known_velocity  # read once: another thread may replace it
+        if known != key:
+            velocity = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+            self._known_velocity = (key, velocity)
+        return velocity
 
 
 def blocks(system: System) -> tuple[Counts, Counts]:

@@ -1,5 +1,6 @@
 """One trajectory of HBVM(k, s) under way: a `Stepper` over the compiled kernel."""
 
+import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 
@@ -63,6 +65,7 @@ class HBVMStepper:
     """
 
     def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
+        self._at_work = threading.RLock()
         self._program = program
         self._context = program.context()
         self._side = program.context(side=True)
@@ -82,6 +85,7 @@ class HBVMStepper:
         self._context.reals[layout.T0] = t0
         engine.call(engine.RESET, self._context.address, y.ctypes.data)
 
+    @one_thread
     def single(self, y: ArrayLike, t0: float, t: float) -> Samples:
         """Begin anew at (t0, y) and return the state at ``t``, made by a single step of that length.
 
@@ -106,6 +110,7 @@ class HBVMStepper:
         return float(reals[layout.T0]) + int(words[layout.N]) * float(reals[layout.H])
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
         return self._context.state()
@@ -188,18 +193,21 @@ class HBVMStepper:
         words[layout.HELD] = words[layout.LEFT] = FIRST_HELD
         words[layout.SWITCHES] += int(self._program.solver.strategy == layout.AUTO)
 
+    @one_thread
     def step(self) -> Status:
         """Take one step of length h; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         reals, targets = self._context.reals, int(self._context.words[layout.N]) + np.arange(1, count + 1)
         times = np.asarray(float(reals[layout.T0]) + targets * float(reals[layout.H]), dtype=np.float64)
         return self._run(layout.SIDE, times, targets, np.zeros(count))
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -236,6 +244,7 @@ class HBVMStepper:
         self._context.point(self._program.scaled(h))
         self._context.set_factors(h)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         context = self._context
@@ -250,6 +259,7 @@ class HBVMStepper:
             self._reason,
         )
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; the counters keep counting.
 

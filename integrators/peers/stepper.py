@@ -1,5 +1,6 @@
 """What all peers' programs and steppers share: the book-keeping around a library's own stepping."""
 
+import threading
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.grid import plan
+from integrators.one_thread import one_thread
 from integrators.protocol import Array, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 from problems.problem import System
@@ -64,6 +66,7 @@ class PeerStepper:
     samplings: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, y: Array, t: float):
+        self._at_work = threading.RLock()
         self._t, self._y = t, y
         self._status, self._reason = Status.RUNNING, ""
         self._stats = Stats()
@@ -74,6 +77,7 @@ class PeerStepper:
         return self._t
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the present state."""
         return self._y.copy()
@@ -93,6 +97,7 @@ class PeerStepper:
         """Counters of the work done."""
         return self._stats
 
+    @one_thread
     def step(self) -> Status:
         """Take one step of the method's own length; after a failure, do nothing."""
         if not self._status.failed:
@@ -101,6 +106,7 @@ class PeerStepper:
                 self._arrive(*reached)
         return self._status
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         how = self.samplings[0] if sample is None else sample
@@ -123,10 +129,12 @@ class PeerStepper:
         status = self._status if self._status.failed else Status.FINISHED
         return Samples(t, y, status, self._reason)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save())
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; the counters keep counting."""
         self._t, self._y = checkpoint.t, checkpoint.y.copy()

@@ -12,6 +12,7 @@ from integrators.crawl import Crawl
 from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper, failure
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from problems.errors import unknown
 
@@ -68,17 +69,20 @@ class AdaptiveStepper(HBVMStepper):
             extra={**stats.extra, "k": c.k, "s": c.s},
         )
 
+    @one_thread
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         ahead = self._context.reals[layout.NEXT_LENGTH] > 0.0
         return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see `HBVMStepper` for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -92,6 +96,7 @@ class AdaptiveStepper(HBVMStepper):
         between = {"land": layout.LAND, "dense": layout.DENSE}.get(sample or "side", layout.SIDE)
         return self._to(grid, between)
 
+    @one_thread
     def checkpoint(self) -> AdaptiveCheckpoint:
         """Return a copy of all that the continuation depends on."""
         context = self._context
@@ -100,6 +105,7 @@ class AdaptiveStepper(HBVMStepper):
         ahead = tuple(context.array(slot).copy() for slot in (layout.NEXT_STATE, layout.NEXT_ERROR))
         return AdaptiveCheckpoint(**base, ahead=(ahead[0], ahead[1]))
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; as `HBVMStepper.restore`."""
         own = len(WORDS)
@@ -148,6 +154,7 @@ class AdaptiveStepper(HBVMStepper):
                 crawl = watch.sees(self.t, int(words[layout.STEPS]) - before)
         return self._samples(grid[:made], out[:made], outcome, crawl)
 
+    @one_thread
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
     ) -> Samples:

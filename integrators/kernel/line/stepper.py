@@ -1,5 +1,6 @@
 """One trajectory of a line integral method: a `Stepper` over the compiled steps."""
 
+import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike
 from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from problems.errors import InputError, unknown
 
@@ -53,6 +55,7 @@ class LineStepper:
 
     def __init__(self, program: "LineProgram", y: Array, par: Array, t0: float):
         self._entry = engine.entry()
+        self._at_work = threading.RLock()
         self._program = program
         sizes, self._m = program.memory(y, par, t0)
         self._words = np.array([*sizes, *(array.ctypes.data for array in self._m.values())], dtype=np.int64)
@@ -75,6 +78,7 @@ class LineStepper:
         return float(real[at.T0] + (real[at.LOW] if self._varying else self._count[at.N] * real[at.H]))
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
         return self._m["y"].copy()
@@ -116,12 +120,14 @@ class LineStepper:
     def _varying(self) -> bool:
         return self._program.tol is not None
 
+    @one_thread
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         if self._varying:
@@ -130,6 +136,7 @@ class LineStepper:
         times = self._real[at.T0] + targets * self._real[at.H]
         return self._run(at.SIDE, times, targets, np.zeros(count))
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -158,6 +165,7 @@ class LineStepper:
             self._turn()
         return self._run(between, grid, targets, parts)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(
@@ -168,6 +176,7 @@ class LineStepper:
             self._reason,
         )
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; the counters keep counting.
 
@@ -221,6 +230,7 @@ class LineStepper:
             made -= int(inside.sum())
         return self._samples(times[:made], out[:made], outcome)
 
+    @one_thread
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = np.inf, present: bool = False
     ) -> Samples:
