@@ -50,7 +50,7 @@ class HBVMProgram:
         started = perf_counter()
         self.system = system
         self.h = h
-        self.solver = SOLVERS[solver]
+        self.solver, self._named = SOLVERS[solver], solver
         self.second = (system.separable and solver != "blended") if form is None else form == "second"
         if self.second and not system.separable:
             raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
@@ -88,6 +88,12 @@ class HBVMProgram:
         if rows > fields.FUSED_ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
         return fields.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
+
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        c, form = self.constants, "second" if self.second else "first"
+        return f"HBVM(k={c.k}, s={c.s}, h={self.h!r}, form={form!r}, solver={self._named!r})"
 
     @property
     def lanes(self) -> bool:

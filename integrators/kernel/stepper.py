@@ -2,18 +2,19 @@
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
 from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
 from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
@@ -33,7 +34,7 @@ ARRAYS = ("F", "STRICT", "FLOORED")
 class Checkpoint:
     """All that the continuation of an `HBVMStepper` depends on."""
 
-    identity: tuple[str, int, int, bool]
+    identity: Identity
     words: Integers
     state: Array
     e: Array
@@ -63,6 +64,8 @@ class HBVMStepper:
         The polynomial of the step: free, but of order s + 1 only, and it does not
         keep the energy.
     """
+
+    _kind: ClassVar[type[Checkpoint]] = Checkpoint
 
     def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
         self._at_work = threading.RLock()
@@ -266,10 +269,10 @@ class HBVMStepper:
         Raises
         ------
         problems.errors.InputError
-            If the checkpoint is that of another system or method.
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
         """
-        if checkpoint.identity != self._identity:
-            raise InputError("this checkpoint belongs to another method or system.")
+        self._identity.check(checkpoint, self._kind)
         context = self._context
         context.words[list(WORDS)] = checkpoint.words
         self._set_step(float(context.reals[layout.H]))
@@ -282,9 +285,8 @@ class HBVMStepper:
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
-    def _identity(self) -> tuple[str, int, int, bool]:
-        constants = self._program.constants
-        return self._program.system.fingerprint, constants.k, constants.s, self._program.second
+    def _identity(self) -> Identity:
+        return Identity.of(self._program.description, self._program.system, self._context["PAR"])
 
     def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
         """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""

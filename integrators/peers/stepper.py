@@ -2,16 +2,19 @@
 
 import threading
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
 from integrators.grid import plan
 from integrators.one_thread import one_thread
-from integrators.protocol import Array, Samples, Stats, Status, check_state, check_times
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 from problems.problem import System
+
+Stepped = TypeVar("Stepped", bound="PeerStepper")
 
 
 class PeerProgram:
@@ -20,8 +23,13 @@ class PeerProgram:
     compile_seconds: float = 0.0
     from_cache: bool | None = None
 
-    def __init__(self, system: System):
-        self.system = system
+    def __init__(self, system: System, method: MethodBase):
+        self.system, self.method = system, method
+
+    def started(self, stepper: Stepped, par: Array) -> Stepped:
+        """Return a new stepper, which now knows what its checkpoints belong to."""
+        stepper.identity = Identity.of(repr(self.method), self.system, par)
+        return stepper
 
     def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
         """Return copies of a start's arguments, checked.
@@ -49,6 +57,7 @@ class Checkpoint:
     status: Status
     reason: str
     inner: Any
+    identity: Identity
 
 
 class PeerStepper:
@@ -64,6 +73,7 @@ class PeerStepper:
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
+    identity: Identity
 
     def __init__(self, y: Array, t: float):
         self._at_work = threading.RLock()
@@ -132,11 +142,19 @@ class PeerStepper:
     @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
-        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save())
+        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
 
     @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; the counters keep counting."""
+        """Go back to a checkpoint of the same program; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
+        """
+        self.identity.check(checkpoint, Checkpoint)
         self._t, self._y = checkpoint.t, checkpoint.y.copy()
         self._status, self._reason = checkpoint.status, checkpoint.reason
         self._load(checkpoint.inner)

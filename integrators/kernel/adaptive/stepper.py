@@ -3,7 +3,7 @@
 import math
 import sys
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +46,7 @@ class AdaptiveStepper(HBVMStepper):
     """
 
     _program: "AdaptiveProgram"
+    _kind = AdaptiveCheckpoint
 
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
@@ -108,6 +109,7 @@ class AdaptiveStepper(HBVMStepper):
     @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; as `HBVMStepper.restore`."""
+        self._identity.check(checkpoint, self._kind)
         own = len(WORDS)
         super().restore(replace(checkpoint, words=checkpoint.words[:own]))
         assert isinstance(checkpoint, AdaptiveCheckpoint)
@@ -115,10 +117,6 @@ class AdaptiveStepper(HBVMStepper):
         context.words[list(MORE_WORDS)] = checkpoint.words[own:]
         for slot, kept in zip((layout.NEXT_STATE, layout.NEXT_ERROR), checkpoint.ahead, strict=True):
             context.array(slot)[:] = kept
-
-    @property
-    def _identity(self) -> Any:
-        return *super()._identity, self._program.tol, self._program.defect
 
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)

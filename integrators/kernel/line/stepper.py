@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
 from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
 from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.line.program import LineProgram
@@ -27,7 +28,7 @@ NUMBERS = (at.N, at.ACCEPTED)
 class Checkpoint:
     """All that the continuation of a `LineStepper` depends on."""
 
-    identity: tuple[str, str, int, int]
+    identity: Identity
     arrays: tuple[Array, ...]
     numbers: tuple[int, ...]
     status: Status
@@ -183,10 +184,10 @@ class LineStepper:
         Raises
         ------
         problems.errors.InputError
-            If the checkpoint is that of another system or method.
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
         """
-        if checkpoint.identity != self._identity:
-            raise InputError("this checkpoint belongs to another method or system.")
+        self._identity.check(checkpoint, Checkpoint)
         for name, array in zip(STATE, checkpoint.arrays, strict=True):
             self._m[name][:] = array
         for i, number in zip(NUMBERS, checkpoint.numbers, strict=True):
@@ -195,9 +196,8 @@ class LineStepper:
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
-    def _identity(self) -> tuple[str, str, int, int]:
-        program = self._program
-        return program.system.fingerprint, ", ".join(program.components), program.k, program.s
+    def _identity(self) -> Identity:
+        return Identity.of(self._program.description, self._program.system, self._m["par"])
 
     def _face(self, end: float) -> None:
         """Turn steps of varying length towards a time."""
