@@ -66,6 +66,7 @@ class HBVMStepper:
     """
 
     _kind: ClassVar[type[Checkpoint]] = Checkpoint
+    stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
         self._at_work = threading.RLock()
@@ -288,6 +289,10 @@ class HBVMStepper:
     def _identity(self) -> Identity:
         return Identity.of(self._program.description, self._program.system, self._context["PAR"])
 
+    def _heed_stop(self) -> None:
+        if self.stop is not None and self.stop.is_set():
+            raise KeyboardInterrupt
+
     def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
         """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""
         context = self._context
@@ -302,6 +307,7 @@ class HBVMStepper:
                 *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
             )  # fmt: skip
             made = int(context.words[layout.MADE])
+            self._heed_stop()
             for workspace in self._implicit or ():
                 workspace.raise_what_is_no_failure()
         status = Status.FINISHED

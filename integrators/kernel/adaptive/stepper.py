@@ -193,6 +193,7 @@ class AdaptiveStepper(HBVMStepper):
         if self._context.words[layout.WANTED]:
             self._take_implicit()
         outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+        self._heed_stop()
         for workspace in self._implicit or ():
             workspace.raise_what_is_no_failure()
         return outcome

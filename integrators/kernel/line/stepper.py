@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
+from integrators.crawl import Crawl
 from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
@@ -220,15 +221,24 @@ class LineStepper:
         """Make the samples, in chunks so that Ctrl-C is heard between them."""
         out = np.empty((times.size, self._m["y"].size))
         what = at.VARY if targets is None else at.ADVANCE
-        outcome, made = at.BUDGET, 0
-        while outcome == at.BUDGET:
+        outcome, made, crawl = at.BUDGET, 0, ""
+        watch = Crawl(self.t, float(times[-1]))
+        while outcome == at.BUDGET and not crawl:
+            before = int(self._count[at.STEPS])
             outcome = self._call(what, between, times, targets, parts, made, out, CHUNK)
             made = int(self._count[at.MADE])
-        if outcome != at.DONE and between == at.SIDE and targets is not None and parts is not None:
+            if outcome == at.BUDGET and self._varying:
+                crawl = watch.sees(self.t, int(self._count[at.STEPS]) - before)
+        if (
+            outcome not in (at.DONE, at.BUDGET)
+            and between == at.SIDE
+            and targets is not None
+            and parts is not None
+        ):
             # Near a singularity a part of the step that failed may have a solution, far from the trajectory.
             inside = (targets[:made] == self._count[at.N]) & (parts[:made] != 0.0)
             made -= int(inside.sum())
-        return self._samples(times[:made], out[:made], outcome)
+        return self._samples(times[:made], out[:made], outcome, crawl)
 
     @one_thread
     def walk(
@@ -237,8 +247,9 @@ class LineStepper:
         """Take own steps of varying length; as `integrators.kernel.adaptive.stepper.AdaptiveStepper.walk`."""
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
-        outcome, steps = at.BUDGET, 0
-        while outcome == at.BUDGET and (limit is None or steps < limit):
+        outcome, steps, crawl = at.BUDGET, 0, ""
+        watch = Crawl(self.t, end)
+        while outcome == at.BUDGET and (limit is None or steps < limit) and not crawl:
             n = limit or CHUNK
             if longest < np.inf:
                 n = 1
@@ -248,12 +259,17 @@ class LineStepper:
             made = int(self._count[at.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
+            if outcome == at.BUDGET and limit is None:
+                crawl = watch.sees(self.t, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome)
+        return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome, crawl)
 
-    def _samples(self, t: Array, y: Array, outcome: int) -> Samples:
+    def _samples(self, t: Array, y: Array, outcome: int, crawl: str) -> Samples:
         status = Status.FINISHED
-        if outcome != at.DONE:
+        if crawl:
+            status, self._reason = Status.STALLED, crawl
+            self._status = status
+        elif outcome != at.DONE:
             status, self._reason = self._failure(outcome)
             self._status = status
         return Samples(t, y, status, self._reason)
