@@ -63,8 +63,8 @@ def test_a_batch_hears_ctrl_c(case):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     try:
-        out, _ = child.communicate(timeout=25)
+        out, _ = child.communicate(timeout=240)
     finally:
         child.kill()
-    # Measured 0.02 to 0.1 s; not within 25 s before. A busy machine may take longer.
+    # Measured below 0.2 s; not within 25 s before. A busy machine may take longer.
     assert float(out) < 2.0
