@@ -20,8 +20,9 @@ A **method** is a description; it holds options and nothing else.
    end time, where it is another than the method's best: that one is timed.
 7. A numerical failure is a `Status`, never an exception, never a silent NaN,
    never an endless loop; the samples computed before it are returned.
-8. ``checkpoint`` returns all that makes the continuation bit for bit the same;
-   ``restore`` takes it back.
+8. ``checkpoint`` returns all that makes the continuation bit for bit the same, and
+   what it belongs to (`integrators.checkpoints.Identity`); ``restore`` takes it back, and
+   nothing else.
 9. Register the class under the entry point group ``hbvm_bench.integrators``;
    `integrators.testing` then checks it against these sentences.
 """
@@ -166,7 +167,18 @@ class Stepper(Protocol):
         ...
 
     def restore(self, checkpoint: Any) -> None:
-        """Go back to a checkpoint of this program; the continuation is bit for bit the same."""
+        """Go back to a checkpoint of this program; the continuation is bit for bit the same.
+
+        The checkpoint may be that of another stepper of the program, or of another program of the
+        same method and system. It brings no parameters along: the stepper must have been started
+        with the same.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For anything else: the checkpoint of another method, of other options, of another
+            system, of other parameters. The stepper stays where it is.
+        """
         ...
 
 

@@ -12,6 +12,7 @@ rule does not apply to the method. `check_method` runs them all.
 """
 
 import ast
+import dataclasses
 import pickle
 from collections.abc import Callable
 from typing import Any
@@ -206,6 +207,43 @@ def checkpoints_continue_bit_for_bit(method: MethodBase, problem: Problem) -> st
     return None
 
 
+def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | None:
+    """Check that no checkpoint but those of this method, system and parameters is taken."""
+    grid = _irregular(problem)
+    stepper = _start(method, problem)
+    stepper.advance(grid[:7])
+    others: dict[str, Any] = {"None": None, "a number": 1.5, "an empty tuple": (), "an array": problem.y0}
+    for name, value in method.options(defaults=True).items():
+        if isinstance(value, float):
+            try:
+                changed = dataclasses.replace(method, **{name: value / 2.0})
+            except InputError:
+                continue
+            if changed.accepts(problem) is None:
+                others[f"that of {changed!r}"] = _start(changed, problem).checkpoint()
+                break
+    for other in (pendulum(), two_bodies(), blow_up()):
+        if other.system.fingerprint != problem.system.fingerprint and method.accepts(other) is None:
+            others[f"that of {other.system.name}"] = _start(method, other).checkpoint()
+    if problem.par.size:
+        twice = method.compile(problem.system).start(problem.y0, problem.par * 2.0, problem.t0)
+        others["that of other parameters"] = twice.checkpoint()
+    there = (stepper.t, stepper.y, stepper.status)
+    for what, checkpoint in others.items():
+        _raises(InputError, lambda c=checkpoint: stepper.restore(c), f"{what} is refused as a checkpoint")
+        _require(
+            (stepper.t, stepper.status) == (there[0], there[2]) and np.array_equal(stepper.y, there[1]),
+            f"the refusal of {what} leaves the stepper where it was",
+        )
+    twin = _start(method, problem)
+    twin.advance(grid[:7])
+    _require(
+        np.array_equal(stepper.advance(grid[7:]).y, twin.advance(grid[7:]).y),
+        "refused checkpoints do not change what follows",
+    )
+    return None
+
+
 def energy_stays_sane(method: MethodBase, problem: Problem) -> str | None:
     """Check that the relative energy error stays below `ENERGY_BOUND`."""
     if "energy" not in problem.invariants(problem.y0[None, :]):
@@ -284,6 +322,8 @@ def failure_is_a_status(method: MethodBase, problem: Problem) -> str | None:
     _require(samples.y.shape == (n, hopeless.system.dim), "a state for each time")
     _require(bool(np.isfinite(samples.y).all()), "what is returned is finite")
     _require(bool(np.isfinite(stepper.t)), "the time of the failure is known")
+    late = n and samples.t[-1] > stepper.t + 4.0 * np.spacing(stepper.t)
+    _require(not late, "no state comes back that lies after the failure")
     return None
 
 
@@ -298,6 +338,7 @@ CHECKS: tuple[Check, ...] = (
     repeats_itself,
     pieces_equal_the_whole,
     checkpoints_continue_bit_for_bit,
+    refuses_other_checkpoints,
     energy_stays_sane,
     samplings_work_or_are_refused,
     refuses_bad_times,

@@ -13,8 +13,14 @@ GROUP = "hbvm_bench.problems"
 
 
 @functools.cache
-def _entries() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+def _entries() -> dict[str, list[EntryPoint]]:
+    """Return what is offered under each name, different things only."""
+    found: dict[str, list[EntryPoint]] = {}
+    for entry in entry_points(group=GROUP):
+        offered = found.setdefault(entry.name, [])
+        if all(entry.value != other.value for other in offered):
+            offered.append(entry)
+    return found
 
 
 def names() -> list[str]:
@@ -29,11 +35,16 @@ def factory(name: str) -> Callable[..., Problem]:
     ------
     problems.errors.UnknownNameError
         For a name that is not installed, with the nearest ones.
+    problems.errors.InputError
+        For a name under which two distributions offer different problems.
     """
-    entry = _entries().get(name)
-    if entry is None:
+    offered = _entries().get(name)
+    if offered is None:
         raise unknown("problem", name, _entries())
-    return entry.load()
+    if len(offered) > 1:
+        who = " and ".join(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in offered)
+        raise InputError(f"the problem {name!r} is offered by {who}; uninstall one of them, or rename one.")
+    return offered[0].load()
 
 
 def load(name: str, **arguments: Any) -> Problem:

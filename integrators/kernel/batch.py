@@ -5,9 +5,12 @@ and divisions. A few trajectories taken through their steps together fill that
 time; each sees exactly the operations that it would see alone.
 """
 
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from threading import Event
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +26,8 @@ from problems.errors import InputError, unknown
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
 
-CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+FEWEST, CHUNK = 16, 1 << 14  # steps between two looks at Ctrl-C: as many as take SOON
+SOON = 0.05  # seconds
 SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
 
 
@@ -76,22 +80,12 @@ def run_batch(
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
     work = _Work(program, result, starts, parameters, t0, h, sample or "side", *plan(grid, bases, h))
-    if program.varying:
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(work.alone, range(n)))
-        return result
-    if program.solver.strategy == layout.ALWAYS_IMPLICIT:
-        for i in range(n):
-            work.alone(i)
+    if program.varying or program.solver.strategy == layout.ALWAYS_IMPLICIT:
+        work.share(work.alone, range(n), threads)
         return result
     size = min(n, members_for(program.shape.rows, program.constants.route))
     groups = [range(first, min(first + size, n)) for first in range(0, n, size)]
-    if threads == 1:
-        work.run(groups)
-    else:
-        with ThreadPoolExecutor(threads) as pool:
-            for done in [pool.submit(work.run, groups[i::threads]) for i in range(threads)]:
-                done.result()
+    work.share(work.run, [groups[i::threads] for i in range(threads)], threads)
     return result
 
 
@@ -108,6 +102,24 @@ class _Work:
     sample: str
     targets: Counts
     parts: Array
+    stop: Event = field(default_factory=Event)
+
+    def share(self, do: Callable[[Any], None], jobs: Iterable[Any], threads: int) -> None:
+        """Do all jobs, on several threads or in this one; Ctrl-C stops the threads' work too."""
+        if threads == 1:
+            for job in jobs:
+                do(job)
+            return
+        with ThreadPoolExecutor(threads) as pool:
+            waiting = [pool.submit(do, job) for job in jobs]
+            try:
+                for done in waiting:
+                    done.result()
+            except BaseException:
+                self.stop.set()
+                for done in waiting:
+                    done.cancel()
+                raise
 
     def run(self, groups: list[range]) -> None:
         """Integrate groups of trajectories one after another, in memory of their own."""
@@ -119,21 +131,25 @@ class _Work:
             context.point(program.scaled(self.h))
         addresses = np.array([context.address for context in contexts])
         y, times = self.result.y, self.result.t
-        stops = self._stops(size)
+        budget = FEWEST
         for group in groups:
             here = np.concatenate([addresses[: len(group)], addresses[size : size + len(group)]])
             for member, i in enumerate(group):
                 for context in (contexts[member], contexts[size + member]):
                     program.load(context, self.parameters[i])
                 self._reset(contexts[member], self.starts[i])
-            first = 0
-            for last in stops:
-                engine.call(
+            made = 0
+            while made < times.size:
+                started = perf_counter()
+                made = engine.call(
                     engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample], times.size,
                     times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
-                    first, last, y[group[0] :].ctypes.data,
+                    made, y[group[0] :].ctypes.data, budget,
                 )  # fmt: skip
-                first = last
+                if self.stop.is_set():
+                    return
+                soon = perf_counter() - started < SOON
+                budget = min(4 * budget, CHUNK) if soon else max(budget // 2, 1)
             for member, i in enumerate(group):
                 if contexts[member].words[layout.WANTED]:
                     self.alone(i)
@@ -144,6 +160,7 @@ class _Work:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
         result = self.result
         stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
+        stepper.stop = self.stop
         samples = stepper.advance(result.t, sample=self.sample)
         result.y[i, : samples.t.size], result.y[i, samples.t.size :] = samples.y, np.nan
         result.status[i], result.reason[i] = samples.status, samples.reason
@@ -151,12 +168,6 @@ class _Work:
         stats = stepper.stats
         result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
         result.evaluations[i] = stats.evaluations or 0
-
-    def _stops(self, size: int) -> list[int]:
-        """Cut the samples into runs of about `CHUNK` steps, between which Ctrl-C is heard."""
-        done = np.cumsum(self.targets) if self.sample == "land" else self.targets
-        cuts = np.flatnonzero(np.diff((done + 1) * size // CHUNK, prepend=0)) + 1
-        return np.unique(np.append(cuts, self.targets.size)).tolist()
 
     def _reset(self, context: Context, start: Array) -> None:
         for slot in (layout.STEPS, layout.ITERATIONS, layout.EVALUATIONS, layout.RESTARTS, layout.PARTIAL):

@@ -6,6 +6,7 @@ let through are kept here until the kernel has returned.
 """
 
 import ctypes
+import threading
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
@@ -17,7 +18,14 @@ from integrators.kernel.field import ONE_BY_ONE, compile_field
 from problems.foreign import Foreign
 from problems.system import System
 
-_raised: list[BaseException] = []
+
+class _Raised(threading.local):
+    """What a user's function has raised; a callback runs in the thread that has called the kernel."""
+
+    error: BaseException | None = None
+
+
+_raised = _Raised()
 
 
 def field_of(system: System, what: str, lanes: int) -> native.Native:
@@ -33,17 +41,18 @@ def field_of(system: System, what: str, lanes: int) -> native.Native:
     if not isinstance(system, Foreign) or what != "field":
         return compile_field(system, what, lanes)
     started = perf_counter()
-    known = lanes in system.native
-    if not known:
-        system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
-    address, _ = system.native[lanes]
+    with native.lock:  # two of them would leave one thread with the address of what the other throws away
+        known = lanes in system.native
+        if not known:
+            system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
+        address, _ = system.native[lanes]
     return native.Native(address, ONE_BY_ONE, known, perf_counter() - started)
 
 
 def raise_error() -> None:
-    """Raise what a function of a user has raised since the last call."""
-    if _raised:
-        error, _raised[:] = _raised[0], []
+    """Raise what a function of a user has raised in this thread since the last call."""
+    if _raised.error is not None:
+        error, _raised.error = _raised.error, None
         raise error
 
 
@@ -124,7 +133,7 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
     def field(t: int, stages: int, par: int, values: int) -> None:
         out = view(block, values).reshape(dim, lanes)
         out[:] = np.nan
-        if _raised:
+        if _raised.error is not None:
             return
         try:
             times = view(line, t)
@@ -138,7 +147,7 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
                 system.evaluate(float(times[l]), rows[:, l].copy(), given, derivative)
                 out[:, l] = derivative
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
-            _raised.append(error)
+            _raised.error = error
 
     kind: Callable[..., Any] = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
     made: Any = kind(field)

@@ -155,7 +155,8 @@ BY_INCREMENT = 2
 FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 
 # How a step, or an advance, ended.
-RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW = range(6)
+# SCATTERED: the iteration has converged, but not to the trajectory.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED = range(7)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)

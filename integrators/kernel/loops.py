@@ -117,9 +117,12 @@ def sample(ctx, side, between, t, part, out):
         if outcome == at.DONE:
             interpolate(ctx, part / get_float(ctx, at.H), out)
         return outcome
-    # Ahead of its time: the part starts from it. Should it fail, the part may not.
-    if between == at.SIDE and solve(ctx) == at.BUDGET:
-        return at.BUDGET
+    if between == at.SIDE:
+        # Ahead of its time: the part starts from it. Where it fails, nothing in it is reached: near a
+        # singularity the equations of a part may have a solution, far from the trajectory.
+        outcome = solve(ctx)
+        if outcome != at.DONE:
+            return outcome
     outcome = part_step(ctx, side, part)
     add_counters(ctx, side)
     if outcome == at.DONE:
@@ -226,24 +229,29 @@ def together(contexts, count):
 
 
 @compiled
-def advance_batch(contexts, members, between, count, times, targets, parts, first, last, out):
-    """Make the samples first .. last-1 of all living members of a batch; see `advance`.
+def advance_batch(contexts, members, between, count, times, targets, parts, first, out, budget):
+    """Make the samples from ``first`` on of all living members of a batch; see `advance`.
 
     ``contexts`` points to the addresses of the members' contexts and then of those for
     their partial steps; ``out`` holds (members, count, dim) doubles. A member that fails stops living,
     with its OUTCOME and MADE; the others go on. One that needs the implicit solver stops so
-    as well, with WANTED set.
+    as well, with WANTED set. Returns the sample that is next after ``budget`` steps, or ``count``.
     """
     ctx = get_int(contexts, 0)
     dim = get_int(ctx, at.ROWS) * (2 if get_int(ctx, at.SECOND) else 1)
-    for i in range(first, last):
-        n = 0
+    for i in range(first, count):
+        n, living = 0, False
         for m in range(members):
             ctx = get_int(contexts, m)
             if get_int(ctx, at.ALIVE):
                 put_int(ctx, at.MADE, i)
-                n = get_int(ctx, at.N)
+                n, living = get_int(ctx, at.N), True
+        if not living:
+            return count
         for _ in range(n, get_int(targets, i)):
+            if budget == 0:
+                return i
+            budget -= 1
             together(contexts, members)
         for m in range(members):
             ctx = get_int(contexts, m)
@@ -254,6 +262,7 @@ def advance_batch(contexts, members, between, count, times, targets, parts, firs
                 put_int(ctx, at.OUTCOME, outcome)
                 put_int(ctx, at.ALIVE, 1 if outcome == at.DONE else 0)
                 put_int(ctx, at.MADE, i + 1 if outcome == at.DONE else i)
+    return count
 
 
 @compiled
@@ -283,9 +292,8 @@ def entry(what, a, b, c, d, e, f, g, h, i, j):
     if what == ADVANCE:
         return advance(a, b, c, d, e, f, g, h, i, j)
     if what == ADVANCE_BATCH:
-        advance_batch(a, b, c, d, e, f, g, h, i, j)
-    else:
-        reset(a, b)
+        return advance_batch(a, b, c, d, e, f, g, h, i, j)
+    reset(a, b)
     return at.DONE
 
 

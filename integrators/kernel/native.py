@@ -8,6 +8,7 @@ numba, which costs more than everything else it does before its first step.
 
 import ctypes.util
 import hashlib
+import logging  # noqa: F401 -- its lock must be taken after ours at a fork: whoever compiles may log
 import os
 import threading
 from collections.abc import Callable, Sequence
@@ -27,7 +28,11 @@ ENTRY = "hbvm_entry"
 
 Made = TypeVar("Made", bytes, str)
 
-_lock = threading.RLock()
+lock = threading.RLock()
+"""Held while code is compiled or loaded, and during a fork, which waits for that: LLVM's and numba's own
+locks would stay locked for ever in the child, where the thread that holds them does not exist."""
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
 _loaded: dict[str, "Native"] = {}
 _waited: list[float] = []  # seconds, for other processes
 _engines: list[Any] = []  # an engine owns its code: none may be collected
@@ -91,7 +96,7 @@ def obtain(name: str, make: Callable[[], tuple[str, bytes]]) -> Native:
     make : callable
         Returns a note of one character and the object file.
     """
-    with _lock:
+    with lock:
         if (known := _loaded.get(name)) is not None:
             return Native(known.address, known.note, True, 0.0)
         full = store.key(name, platform())
@@ -162,7 +167,7 @@ def _compiled(
     emit: Callable[[Any, Any], Made],
     around: Callable[[str], str] | None = None,
 ) -> Made:
-    with _lock:
+    with lock:
         kinds = tuple(kind for kind, _ in arguments)
         function.compile(kinds)
         inner = function.overloads[kinds].fndesc.llvm_func_name
@@ -185,7 +190,7 @@ def processor() -> str:
 
 def load(code: bytes) -> int:
     """Put an object file into this process; return the address of its `ENTRY`."""
-    with _lock:
+    with lock:
         _initialize()
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))

@@ -48,7 +48,7 @@ class HBVMProgram:
         started = native.clock()
         self.system = system
         self.h = h
-        self.solver = SOLVERS[solver]
+        self.solver, self._named = SOLVERS[solver], solver
         self.second = (system.separable and solver != "blended") if form is None else form == "second"
         if self.second and not system.separable:
             raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
@@ -86,6 +86,12 @@ class HBVMProgram:
         if rows > fields.FUSED_ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
         return fields.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
+
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        c, form = self.constants, "second" if self.second else "first"
+        return f"HBVM(k={c.k}, s={c.s}, h={self.h!r}, form={form!r}, solver={self._named!r})"
 
     @property
     def lanes(self) -> bool:
@@ -173,8 +179,9 @@ class HBVMProgram:
         if side not in self._fresh:
             scaled = self.scaled(self.h)
             shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
-            self._fresh[side] = Context(self.shape, {**self._fixed, **shared})
-            self._fresh[side].reals[layout.TOLERANCE] = TOLERANCE
+            made = Context(self.shape, {**self._fixed, **shared})
+            made.reals[layout.TOLERANCE] = TOLERANCE
+            self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
     def load(self, context: Context, par: Array) -> None:
@@ -188,10 +195,11 @@ class HBVMProgram:
         if not self.second:
             return np.ones(0)
         key = par.tobytes()
-        if self._known_velocity[0] != key:
-            found = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
-            self._known_velocity = (key, found)
-        return self._known_velocity[1]
+        known, velocity = self._known_velocity  # read once: another thread may replace it
+        if known != key:
+            velocity = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+            self._known_velocity = (key, velocity)
+        return velocity
 
 
 def blocks(system: System) -> tuple[Counts, Counts]:

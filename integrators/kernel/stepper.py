@@ -1,17 +1,20 @@
 """One trajectory of HBVM(k, s) under way: a `Stepper` over the compiled kernel."""
 
+import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
 from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
@@ -31,7 +34,7 @@ ARRAYS = ("F", "STRICT", "FLOORED")
 class Checkpoint:
     """All that the continuation of an `HBVMStepper` depends on."""
 
-    identity: tuple[str, int, int, bool]
+    identity: Identity
     words: Integers
     state: Array
     e: Array
@@ -62,7 +65,11 @@ class HBVMStepper:
         keep the energy.
     """
 
+    _kind: ClassVar[type[Checkpoint]] = Checkpoint
+    stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
+
     def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
+        self._at_work = threading.RLock()
         self._program = program
         self._context = program.context()
         self._side = program.context(side=True)
@@ -82,6 +89,7 @@ class HBVMStepper:
         self._context.reals[layout.T0] = t0
         engine.call(engine.RESET, self._context.address, y.ctypes.data)
 
+    @one_thread
     def single(self, y: ArrayLike, t0: float, t: float) -> Samples:
         """Begin anew at (t0, y) and return the state at ``t``, made by a single step of that length.
 
@@ -106,6 +114,7 @@ class HBVMStepper:
         return float(reals[layout.T0]) + int(words[layout.N]) * float(reals[layout.H])
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
         return self._context.state()
@@ -188,18 +197,21 @@ class HBVMStepper:
         words[layout.HELD] = words[layout.LEFT] = FIRST_HELD
         words[layout.SWITCHES] += int(self._program.solver.strategy == layout.AUTO)
 
+    @one_thread
     def step(self) -> Status:
         """Take one step of length h; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         reals, targets = self._context.reals, int(self._context.words[layout.N]) + np.arange(1, count + 1)
         times = np.asarray(float(reals[layout.T0]) + targets * float(reals[layout.H]), dtype=np.float64)
         return self._run(layout.SIDE, times, targets, np.zeros(count))
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -236,6 +248,7 @@ class HBVMStepper:
         self._context.point(self._program.scaled(h))
         self._context.set_factors(h)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         context = self._context
@@ -250,16 +263,17 @@ class HBVMStepper:
             self._reason,
         )
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; the counters keep counting.
 
         Raises
         ------
         problems.errors.InputError
-            If the checkpoint is that of another system or method.
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
         """
-        if checkpoint.identity != self._identity:
-            raise InputError("this checkpoint belongs to another method or system.")
+        self._identity.check(checkpoint, self._kind)
         context = self._context
         context.words[list(WORDS)] = checkpoint.words
         self._set_step(float(context.reals[layout.H]))
@@ -272,9 +286,12 @@ class HBVMStepper:
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
-    def _identity(self) -> tuple[str, int, int, bool]:
-        constants = self._program.constants
-        return self._program.system.fingerprint, constants.k, constants.s, self._program.second
+    def _identity(self) -> Identity:
+        return Identity.of(self._program.description, self._program.system, self._context["PAR"])
+
+    def _heed_stop(self) -> None:
+        if self.stop is not None and self.stop.is_set():
+            raise KeyboardInterrupt
 
     def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
         """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""
@@ -290,6 +307,7 @@ class HBVMStepper:
                 *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
             )  # fmt: skip
             made = int(context.words[layout.MADE])
+            self._heed_stop()
             for workspace in self._implicit or ():
                 workspace.raise_what_is_no_failure()
         status = Status.FINISHED
@@ -303,6 +321,11 @@ def failure(outcome: int, t: float, reals: Array, solver: str = "fixed-point") -
     """Return the status that an outcome of the kernel stands for, and the reason as a sentence."""
     if outcome == layout.NOT_FINITE:
         return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
+    if outcome == layout.SCATTERED:
+        return Status.NONLINEAR_DIVERGENCE, (
+            f"the equations of the step from t = {t!r}, h = {float(reals[layout.H])!r} have no solution near "
+            "the trajectory: the one found oscillates within the step; take a smaller h."
+        )
     return Status.NONLINEAR_DIVERGENCE, (
         f"the {solver} iteration did not converge in the step from t = {t!r}, "
         f"h = {float(reals[layout.H])!r} (last relative change {reals[layout.LAST]:.1e}); take a smaller h."

@@ -25,7 +25,7 @@ class DiffraxProgram(PeerProgram):
     """
 
     def __init__(self, system: System, method: DiffraxMethod):
-        super().__init__(system)
+        super().__init__(system, method)
         reason = method.refuses(system)
         if reason is not None:
             raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
@@ -44,7 +44,8 @@ class DiffraxProgram(PeerProgram):
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
         """Return a stepper at ``t0``; see the protocol."""
         arguments = self.arguments(y0, par, t0)
-        return AdaptiveStepper(self, *arguments) if self.adaptive else DiffraxStepper(self, *arguments)
+        kind = AdaptiveStepper if self.adaptive else DiffraxStepper
+        return self.started(kind(self, *arguments), arguments[1])
 
 
 class _Direction:

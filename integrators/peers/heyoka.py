@@ -107,7 +107,7 @@ class TaylorProgram(PeerProgram):
     """
 
     def __init__(self, system: System, method: Taylor):
-        super().__init__(system)
+        super().__init__(system, method)
         hy = load("heyoka")
         from problems import emit
 
@@ -161,7 +161,8 @@ class TaylorProgram(PeerProgram):
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "TaylorStepper":
         """Return a stepper at ``t0``; see the protocol."""
-        return TaylorStepper(copy.copy(self.template), *self.arguments(y0, par, t0))
+        arguments = self.arguments(y0, par, t0)
+        return self.started(TaylorStepper(copy.copy(self.template), *arguments), arguments[1])
 
 
 @contextmanager

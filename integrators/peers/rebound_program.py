@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from integrators.peers.options import load
-from integrators.peers.stepper import PeerProgram
+from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Stats, Stepper
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -65,7 +65,7 @@ class ReboundMethod(MethodBase):
         """Return which body is REBOUND's first, second, ..."""
         return list(range(n))
 
-    def stepper(self, program: "ReboundProgram", layout: "Layout", y: Array, t: float) -> Stepper:
+    def stepper(self, program: "ReboundProgram", layout: "Layout", y: Array, t: float) -> PeerStepper:
         """Return a trajectory."""
         raise NotImplementedError
 
@@ -81,7 +81,7 @@ class ReboundProgram(PeerProgram):
     """
 
     def __init__(self, system: System, method: ReboundMethod):
-        super().__init__(system)
+        super().__init__(system, method)
         reason = method.refuses(system, system.pack({}))
         if reason is not None:
             raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
@@ -113,7 +113,7 @@ class ReboundProgram(PeerProgram):
         layout = Layout(self.system, values, self.method)
         if layout.bodies is not None:
             self._check_gravity(layout, t, y)
-        return self.method.stepper(self, layout, y, t)
+        return self.started(self.method.stepper(self, layout, y, t), values)
 
     def simulation(self, layout: "Layout", t: float, y: Array) -> Any:
         """Return a simulation at ``t`` in the state ``y``, without callbacks."""

@@ -144,7 +144,7 @@ class SciPyProgram(PeerProgram):
     """A vector field compiled for SciPy's solvers."""
 
     def __init__(self, system: System, method: _SciPyMethod):
-        super().__init__(system)
+        super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
         from problems import emit
 
@@ -158,7 +158,8 @@ class SciPyProgram(PeerProgram):
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "SciPyStepper":
         """Return a stepper at ``t0``; see the protocol."""
-        return SciPyStepper(self, *self.arguments(y0, par, t0))
+        arguments = self.arguments(y0, par, t0)
+        return self.started(SciPyStepper(self, *arguments), arguments[1])
 
 
 class SciPyStepper(PeerStepper):

@@ -1,15 +1,20 @@
 """What all peers' programs and steppers share: the book-keeping around a library's own stepping."""
 
+import threading
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
 from integrators.grid import plan
-from integrators.protocol import Array, Samples, Stats, Status, check_state, check_times
+from integrators.one_thread import one_thread
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_state, check_times
 from problems.errors import InputError, unknown
 from problems.problem import System
+
+Stepped = TypeVar("Stepped", bound="PeerStepper")
 
 
 class PeerProgram:
@@ -18,8 +23,13 @@ class PeerProgram:
     compile_seconds: float = 0.0
     from_cache: bool | None = None
 
-    def __init__(self, system: System):
-        self.system = system
+    def __init__(self, system: System, method: MethodBase):
+        self.system, self.method = system, method
+
+    def started(self, stepper: Stepped, par: Array) -> Stepped:
+        """Return a new stepper, which now knows what its checkpoints belong to."""
+        stepper.identity = Identity.of(repr(self.method), self.system, par)
+        return stepper
 
     def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
         """Return copies of a start's arguments, checked.
@@ -47,6 +57,7 @@ class Checkpoint:
     status: Status
     reason: str
     inner: Any
+    identity: Identity
 
 
 class PeerStepper:
@@ -62,8 +73,10 @@ class PeerStepper:
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
+    identity: Identity
 
     def __init__(self, y: Array, t: float):
+        self._at_work = threading.RLock()
         self._t, self._y = t, y
         self._status, self._reason = Status.RUNNING, ""
         self._stats = Stats()
@@ -74,6 +87,7 @@ class PeerStepper:
         return self._t
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the present state."""
         return self._y.copy()
@@ -93,6 +107,7 @@ class PeerStepper:
         """Counters of the work done."""
         return self._stats
 
+    @one_thread
     def step(self) -> Status:
         """Take one step of the method's own length; after a failure, do nothing."""
         if not self._status.failed:
@@ -101,6 +116,7 @@ class PeerStepper:
                 self._arrive(*reached)
         return self._status
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         how = self.samplings[0] if sample is None else sample
@@ -123,12 +139,22 @@ class PeerStepper:
         status = self._status if self._status.failed else Status.FINISHED
         return Samples(t, y, status, self._reason)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
-        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save())
+        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; the counters keep counting."""
+        """Go back to a checkpoint of the same program; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
+        """
+        self.identity.check(checkpoint, Checkpoint)
         self._t, self._y = checkpoint.t, checkpoint.y.copy()
         self._status, self._reason = checkpoint.status, checkpoint.reason
         self._load(checkpoint.inner)

@@ -10,6 +10,7 @@ from time import perf_counter
 import numba
 import numpy as np
 
+from integrators.checkpoints import Identity
 from integrators.protocol import MethodBase, Samples, Stats, Status, check_state, check_times
 from problems import InputError, emit
 
@@ -81,12 +82,20 @@ class _Program:
         return _Stepper(self, check_state(y0, self.system.dim), par, float(t0))
 
 
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    identity: Identity
+    n: int
+    y: np.ndarray
+
+
 class _Stepper:
     def __init__(self, program, y, par, t0):
         self._program, self._par, self._t0, self._y = program, par, t0, y
         self._scale = program.scale(0.0, y, par)
         self._slope = np.empty(program.system.dof)
         self._n, self._h = 0, program.method.h
+        self._identity = Identity.of(repr(program.method), program.system, par)
         self.status, self.reason = Status.RUNNING, ""
 
     @property
@@ -134,8 +143,9 @@ class _Stepper:
         return Samples(grid, states, Status.FINISHED)
 
     def checkpoint(self):
-        return self._n, self._y.copy()
+        return Checkpoint(self._identity, self._n, self._y.copy())
 
     def restore(self, checkpoint):
-        self._n, self._y = checkpoint[0], checkpoint[1].copy()
+        self._identity.check(checkpoint, Checkpoint)  # of another method, system or parameters: refused
+        self._n, self._y = checkpoint.n, checkpoint.y.copy()
         self.status, self.reason = Status.RUNNING, ""

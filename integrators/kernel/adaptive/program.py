@@ -85,6 +85,15 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators.reshape(len(degrees), -1)[:, :k] = basis.T[degrees]
         self.compile_seconds += native.clock() - started
 
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        c = self.constants
+        return (
+            f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
+            f"solver={self._named!r})"
+        )
+
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
         """Return a stepper at ``t0``; as `HBVMProgram.start`."""
         return AdaptiveStepper(self, check_state(y0, self.system.dim), self.parameters(par), float(t0))

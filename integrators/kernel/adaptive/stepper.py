@@ -3,7 +3,7 @@
 import math
 import sys
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from integrators.crawl import Crawl
 from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper, failure
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from problems.errors import unknown
 
@@ -45,6 +46,7 @@ class AdaptiveStepper(HBVMStepper):
     """
 
     _program: "AdaptiveProgram"
+    _kind = AdaptiveCheckpoint
 
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
@@ -68,17 +70,20 @@ class AdaptiveStepper(HBVMStepper):
             extra={**stats.extra, "k": c.k, "s": c.s},
         )
 
+    @one_thread
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         ahead = self._context.reals[layout.NEXT_LENGTH] > 0.0
         return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see `HBVMStepper` for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -92,6 +97,7 @@ class AdaptiveStepper(HBVMStepper):
         between = {"land": layout.LAND, "dense": layout.DENSE}.get(sample or "side", layout.SIDE)
         return self._to(grid, between)
 
+    @one_thread
     def checkpoint(self) -> AdaptiveCheckpoint:
         """Return a copy of all that the continuation depends on."""
         context = self._context
@@ -100,8 +106,10 @@ class AdaptiveStepper(HBVMStepper):
         ahead = tuple(context.array(slot).copy() for slot in (layout.NEXT_STATE, layout.NEXT_ERROR))
         return AdaptiveCheckpoint(**base, ahead=(ahead[0], ahead[1]))
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; as `HBVMStepper.restore`."""
+        self._identity.check(checkpoint, self._kind)
         own = len(WORDS)
         super().restore(replace(checkpoint, words=checkpoint.words[:own]))
         assert isinstance(checkpoint, AdaptiveCheckpoint)
@@ -109,10 +117,6 @@ class AdaptiveStepper(HBVMStepper):
         context.words[list(MORE_WORDS)] = checkpoint.words[own:]
         for slot, kept in zip((layout.NEXT_STATE, layout.NEXT_ERROR), checkpoint.ahead, strict=True):
             context.array(slot)[:] = kept
-
-    @property
-    def _identity(self) -> Any:
-        return *super()._identity, self._program.tol, self._program.defect
 
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)
@@ -148,6 +152,7 @@ class AdaptiveStepper(HBVMStepper):
                 crawl = watch.sees(self.t, int(words[layout.STEPS]) - before)
         return self._samples(grid[:made], out[:made], outcome, crawl)
 
+    @one_thread
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
     ) -> Samples:
@@ -188,6 +193,7 @@ class AdaptiveStepper(HBVMStepper):
         if self._context.words[layout.WANTED]:
             self._take_implicit()
         outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+        self._heed_stop()
         for workspace in self._implicit or ():
             workspace.raise_what_is_no_failure()
         return outcome

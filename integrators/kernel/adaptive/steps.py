@@ -219,7 +219,7 @@ def ready(ctx):
             failure = outcome
             put_float(ctx, at.LENGTH, 0.0)
             put_float(ctx, at.LENGTH_LIMIT, RETREAT * abs(h))
-            if outcome == at.DIVERGED:
+            if outcome in (at.DIVERGED, at.SCATTERED):
                 factor = RETREAT
         put_float(ctx, at.NEXT_LENGTH, h * min(factor, SAFETY))
         put_int(ctx, at.REJECTIONS, get_int(ctx, at.REJECTIONS) + 1)

@@ -194,7 +194,7 @@ def solve_step(ctx, m, method, source, factors, started):
     if which != KEPT:
         m.count[of.STALE] = 1
         if outcome == at.DONE and is_scattered(m):
-            outcome = at.DIVERGED
+            outcome = at.SCATTERED
     if outcome == at.DONE:
         if not started:
             m.count[of.PREDICT] = 1 if extrapolated == 0 or nearer(ctx, m) else 0

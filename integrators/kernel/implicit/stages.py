@@ -23,7 +23,7 @@ from integrators.kernel.products import change, multiply, offset
 
 LOW = 3  # columns of a stage table that hold the low parts of the first ones
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
-LARGE = 1e200
+SMALLEST, LARGE = 1e-200, 1e200  # a block smaller than that has no size to divide by
 STRICT, FLOORED = range(2)  # relative to a block, and relative to a block that is raised if it is small
 
 
@@ -165,8 +165,8 @@ def end_sizes(ctx, rows, strict, floored):
         b = get_int(get_int(ctx, at.BLOCK), d)
         own = get_float(get_int(ctx, at.SIZE), b)
         floor = max(own, FLOOR * get_float(get_int(ctx, at.LARGEST), get_int(get_int(ctx, at.GROUP), b)))
-        put_float(strict, d, 1.0 / own if own > 0.0 else LARGE)
-        put_float(floored, d, 1.0 / floor if floor > 0.0 else LARGE)
+        put_float(strict, d, 1.0 / own if own > SMALLEST else LARGE)
+        put_float(floored, d, 1.0 / floor if floor > SMALLEST else LARGE)
 
 
 @compiled

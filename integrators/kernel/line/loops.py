@@ -41,6 +41,11 @@ def advance(m, between, times, targets, parts, made, out, budget):
         if between == at.LAND:
             real[at.T0], count[at.N] = times[i], 0
     count[at.MADE] = times.size
+    if between == at.SIDE and times.size > made and parts[times.size - 1] != 0.0 and not count[at.SOLVED]:
+        # Samples inside a step that cannot be solved are worth nothing; the stepper drops them.
+        outcome = solve(m, real[at.T0] + count[at.N] * h, h)
+        count[at.SOLVED] = outcome == at.DONE
+        return outcome
     return at.DONE
 
 

@@ -79,6 +79,12 @@ class LineProgram:
         self.from_cache = all(part.from_cache for part in parts)
         self.compile_seconds = native.clock() - started
 
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        kept = f"invariants={self.components!r}" if self.components else "Poisson form"
+        return f"LineIntegral(k={self.k}, s={self.s}, h={self.h!r}, tol={self.tol!r}, {kept})"
+
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> LineStepper:
         """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
 

@@ -1,16 +1,20 @@
 """One trajectory of a line integral method: a `Stepper` over the compiled steps."""
 
+import threading
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.checkpoints import Identity
+from integrators.crawl import Crawl
 from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
+from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.line.program import LineProgram
@@ -25,7 +29,7 @@ NUMBERS = (at.N, at.ACCEPTED)
 class Checkpoint:
     """All that the continuation of a `LineStepper` depends on."""
 
-    identity: tuple[str, str, int, int]
+    identity: Identity
     arrays: tuple[Array, ...]
     numbers: tuple[int, ...]
     status: Status
@@ -53,6 +57,7 @@ class LineStepper:
 
     def __init__(self, program: "LineProgram", y: Array, par: Array, t0: float):
         self._entry = engine.entry()
+        self._at_work = threading.RLock()
         self._program = program
         sizes, self._m = program.memory(y, par, t0)
         self._words = np.array([*sizes, *(array.ctypes.data for array in self._m.values())], dtype=np.int64)
@@ -75,6 +80,7 @@ class LineStepper:
         return float(real[at.T0] + (real[at.LOW] if self._varying else self._count[at.N] * real[at.H]))
 
     @property
+    @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
         return self._m["y"].copy()
@@ -116,12 +122,14 @@ class LineStepper:
     def _varying(self) -> bool:
         return self._program.tol is not None
 
+    @one_thread
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
         if not self._status.failed:
             self.take(1)
         return self._status
 
+    @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         if self._varying:
@@ -130,6 +138,7 @@ class LineStepper:
         times = self._real[at.T0] + targets * self._real[at.H]
         return self._run(at.SIDE, times, targets, np.zeros(count))
 
+    @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
         if sample is not None and sample not in SAMPLINGS:
@@ -158,6 +167,7 @@ class LineStepper:
             self._turn()
         return self._run(between, grid, targets, parts)
 
+    @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(
@@ -168,16 +178,17 @@ class LineStepper:
             self._reason,
         )
 
+    @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint of the same program; the counters keep counting.
 
         Raises
         ------
         problems.errors.InputError
-            If the checkpoint is that of another system or method.
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
         """
-        if checkpoint.identity != self._identity:
-            raise InputError("this checkpoint belongs to another method or system.")
+        self._identity.check(checkpoint, Checkpoint)
         for name, array in zip(STATE, checkpoint.arrays, strict=True):
             self._m[name][:] = array
         for i, number in zip(NUMBERS, checkpoint.numbers, strict=True):
@@ -186,9 +197,8 @@ class LineStepper:
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
-    def _identity(self) -> tuple[str, str, int, int]:
-        program = self._program
-        return program.system.fingerprint, ", ".join(program.components), program.k, program.s
+    def _identity(self) -> Identity:
+        return Identity.of(self._program.description, self._program.system, self._m["par"])
 
     def _face(self, end: float) -> None:
         """Turn steps of varying length towards a time."""
@@ -211,20 +221,35 @@ class LineStepper:
         """Make the samples, in chunks so that Ctrl-C is heard between them."""
         out = np.empty((times.size, self._m["y"].size))
         what = at.VARY if targets is None else at.ADVANCE
-        outcome, made = at.BUDGET, 0
-        while outcome == at.BUDGET:
+        outcome, made, crawl = at.BUDGET, 0, ""
+        watch = Crawl(self.t, float(times[-1]))
+        while outcome == at.BUDGET and not crawl:
+            before = int(self._count[at.STEPS])
             outcome = self._call(what, between, times, targets, parts, made, out, CHUNK)
             made = int(self._count[at.MADE])
-        return self._samples(times[:made], out[:made], outcome)
+            if outcome == at.BUDGET and self._varying:
+                crawl = watch.sees(self.t, int(self._count[at.STEPS]) - before)
+        if (
+            outcome not in (at.DONE, at.BUDGET)
+            and between == at.SIDE
+            and targets is not None
+            and parts is not None
+        ):
+            # Near a singularity a part of the step that failed may have a solution, far from the trajectory.
+            inside = (targets[:made] == self._count[at.N]) & (parts[:made] != 0.0)
+            made -= int(inside.sum())
+        return self._samples(times[:made], out[:made], outcome, crawl)
 
+    @one_thread
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = np.inf, present: bool = False
     ) -> Samples:
         """Take own steps of varying length; as `integrators.kernel.adaptive.stepper.AdaptiveStepper.walk`."""
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
-        outcome, steps = at.BUDGET, 0
-        while outcome == at.BUDGET and (limit is None or steps < limit):
+        outcome, steps, crawl = at.BUDGET, 0, ""
+        watch = Crawl(self.t, end)
+        while outcome == at.BUDGET and (limit is None or steps < limit) and not crawl:
             n = limit or CHUNK
             if longest < np.inf:
                 n = 1
@@ -234,12 +259,17 @@ class LineStepper:
             made = int(self._count[at.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
+            if outcome == at.BUDGET and limit is None:
+                crawl = watch.sees(self.t, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome)
+        return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome, crawl)
 
-    def _samples(self, t: Array, y: Array, outcome: int) -> Samples:
+    def _samples(self, t: Array, y: Array, outcome: int, crawl: str) -> Samples:
         status = Status.FINISHED
-        if outcome != at.DONE:
+        if crawl:
+            status, self._reason = Status.STALLED, crawl
+            self._status = status
+        elif outcome != at.DONE:
             status, self._reason = self._failure(outcome)
             self._status = status
         return Samples(t, y, status, self._reason)

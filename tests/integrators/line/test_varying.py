@@ -124,3 +124,19 @@ def test_steps_do_not_outgrow_the_iteration_where_fast_modes_are_at_rest():
     solution = run(problem, 1e-9, [200.0], names=["energy"])
     assert solution.stats.iterations / solution.stats.steps <= 50  # measured 35; 232 without a bound
     assert solution.stats.rejections <= 10  # measured 4
+
+
+@pytest.mark.parametrize("sample", ["side", "steps"])
+def test_steps_that_have_collapsed_are_a_status_with_time_and_reason(monkeypatch, sample):
+    monkeypatch.setattr("integrators.crawl.CRAWL_STEPS", 8000)
+
+    def f(t, y, m):
+        return [1.0 + 0.5 * m.sin(1e9 * t), 0.0 * y[0]]
+
+    system = problems.VectorField(f, dim=2, invariants={"second": lambda y, m: y[1]})
+    problem = problems.Problem(system, y0=[0.0, 1.0], t_end=1e6)
+    method = LineIntegral(k=4, s=2, tol=1e-10, invariants=["second"])
+    found = integrators.integrate(problem, method, [0.0, 1e6], sample=sample)
+    assert found.status is Status.STALLED
+    assert "the steps have collapsed" in found.reason
+    assert 0.0 < found.t_stop < 1e-3
