@@ -7,6 +7,8 @@ from msgspec import Meta
 
 from hbvm_bench.grid import Grid
 from hbvm_bench.sweep import Scalar
+from problems import limits
+from problems.errors import InputError, shown
 
 Settings = Literal["default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
@@ -78,7 +80,7 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Every number of the start is multiplied by 1 + ``spread`` x, |x| <= 1.
     """
 
-    count: Annotated[int, Meta(ge=1, le=10_000_000)]
+    count: Count
     spread: Positive = 1e-2
 
 
@@ -149,6 +151,11 @@ class EnsembleEntry(
     count: int
     methods: Annotated[list[MethodEntry], Meta(min_length=1)]
     spread: Positive = 1e-2
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise InputError(f"count={shown(self.count)} of an ensemble must be at least 1.")
+        limits.check(f"an ensemble with count={shown(self.count)}", "TRAJECTORIES", self.count)
 
     @property
     def ensemble(self) -> Ensemble:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.grid import plan
-from integrators.protocol import Array, Samples, Stats, Status, check_state, check_times
+from integrators.protocol import Array, Samples, Stats, Status, check_start, check_state, check_times
 from problems.errors import InputError, unknown
 from problems.problem import System
 
@@ -35,7 +35,7 @@ class PeerProgram:
             raise InputError(f"par must have shape {default.shape}, not {values.shape}.")
         if not np.isfinite(t0):
             raise InputError(f"t0 must be a finite number, not {t0!r}.")
-        return check_state(y0, self.system.dim), values, float(t0)
+        return check_state(y0, self.system.dim), values, check_start(t0)
 
 
 @dataclass(frozen=True, eq=False)
