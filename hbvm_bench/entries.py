@@ -13,7 +13,7 @@ from problems.errors import InputError, shown
 Settings = Literal["default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
-Positive = Annotated[float, Meta(gt=0)]
+Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
 
 
@@ -47,8 +47,8 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Seconds of sampling per case and round; at least one sample is taken.
     """
 
-    rounds: Annotated[int, Meta(ge=0)] = 3
-    samples: Count = 2
+    rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
+    samples: Annotated[int, Meta(ge=1, le=10_000)] = 2
     shortest: Positive = 0.02
     budget: Positive = 8.0
 

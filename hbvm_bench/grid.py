@@ -22,7 +22,7 @@ from problems.problem import Problem
 GOLDEN = (5**0.5 - 1) / 2
 FIRST = 1e-2  # of the span: where samples in log time begin
 
-Positive = Annotated[float, Meta(gt=0)]
+Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
 Spacing = Literal["equal", "irregular", "log"]
 
