@@ -306,7 +306,7 @@ def test_numbers_of_numpy_are_numbers(code, printed):
 
 @pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), Gauss(s=2, tol=1e-6)], ids=repr)
 def test_methods_are_copied_and_pickled(method):
-    assert copy.copy(method) == copy.deepcopy(method) == pickle.loads(pickle.dumps(method)) == method  # noqa: S301
+    assert copy.copy(method) == copy.deepcopy(method) == pickle.loads(pickle.dumps(method)) == method
     assert dataclasses.replace(method, s=3).s == 3
 
 

@@ -236,7 +236,7 @@ RUN --out x --report /dev/null/x                           | cannot write to the
 """
 
 ROWS = [Typed(*(part.strip() for part in line.rsplit(" | ", 1))) for line in TABLE.strip().splitlines()]
-IN_A_PROCESS = ("lst", "run sitnikof", "show nowhere", "race -p nosuch", "RUN --step 0")
+IN_A_PROCESS = ("lst", "show nowhere", "RUN --step 0")
 
 
 @pytest.fixture

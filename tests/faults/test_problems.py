@@ -390,10 +390,10 @@ Problem(V2, y0=[0, 1], t_end=1j)                             | t0 and t_end must
 Problem(V2, y0=[0, 1], t0='a', t_end=1.)                     | t0 and t_end must be numbers, not ['a', 1.0]
 Problem(V2, y0=[0, 1], t0=None, t_end=1.)                    | t0 and t_end must be finite, not [nan, 1.0]
 Problem(V2, y0=[0, 1], t0=1., t_end=1.)                      | t_end=1.0 must differ from t0=1.0
-Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 3})        | unknown parameter of osc 'k'; there are
+Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 3})        | unknown parameter of system 'k'; there are
 Problem(V2, y0=[0, 1], t_end=1., parameters=[3])             | parameters=[3] must be a dictionary by name,
 Problem(V2, y0=[0, 1], t_end=1., parameters=None)            | parameters=None must be a dictionary by name,
-Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 'a'})      | unknown parameter of osc 'k'; there are
+Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 'a'})      | unknown parameter of system 'k'; there are
 Problem(V2, y0=[0, 1], t_end=1., times='a')                  | times must be numbers, not 'a'
 Problem(V2, y0=[0, 1], t_end=1., times=[nan])                | times must be finite, not [nan]
 Problem(V2, y0=[0, 1], t_end=1., times=[[0, 1]])             | times must be a flat list, not an array of

@@ -2,6 +2,7 @@
 
 import math
 import re
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,28 @@ def names() -> dict[str, Any]:
     pendulum = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 - m.cos(q[0]), dof=1)
     return {
         **{name: registry.get(name) for name in registry.names()},
-        **dict(nan=math.nan, inf=math.inf, huge=10**400, np=np, math=math),
-        **dict(integrators=integrators, problems=problems, registry=registry, emit=emit),
-        **dict(Event=Event, integrate=integrate, section=section, load=load),
-        **dict(Hamiltonian=Hamiltonian, VectorField=VectorField, Poisson=Poisson, Foreign=Foreign),
-        **dict(Problem=Problem, Bodies=Bodies, deep=deep, horner=horner, osc=osc),
+        "nan": math.nan,
+        "inf": math.inf,
+        "huge": 10**400,
+        "np": np,
+        "math": math,
+        "integrators": integrators,
+        "problems": problems,
+        "registry": registry,
+        "emit": emit,
+        "Event": Event,
+        "integrate": integrate,
+        "section": section,
+        "load": load,
+        "Hamiltonian": Hamiltonian,
+        "VectorField": VectorField,
+        "Poisson": Poisson,
+        "Foreign": Foreign,
+        "Problem": Problem,
+        "Bodies": Bodies,
+        "deep": deep,
+        "horner": horner,
+        "osc": osc,
         "H1": pendulum,
         "V2": VectorField(lambda y: [y[1], -y[0]], dim=2),
         "P1": Problem(pendulum, q0=[0.0], p0=[1.9], t_end=1.0),
@@ -52,6 +70,6 @@ def faults(table: str) -> list[Fault]:
     known = names()
     rows = [line.rsplit(" | ", 1) for line in table.strip().splitlines() if line.strip()]
     return [
-        Fault(code.strip(), lambda code=code: eval(code.strip(), known), re.escape(says.strip()))
+        Fault(code.strip(), partial(eval, code.strip(), known), re.escape(says.strip()))
         for code, says in rows
     ]
