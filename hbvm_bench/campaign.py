@@ -1,8 +1,9 @@
 """A campaign: a TOML file of problems and methods, and the cases it stands for."""
 
+import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_args
@@ -23,6 +24,7 @@ from hbvm_bench.entries import (
 from hbvm_bench.grid import Grid
 from hbvm_bench.spec import parse_spec
 from hbvm_bench.sweep import PLACEHOLDER, Scalar, combinations, fill, names
+from problems import limits
 from problems.errors import InputError, unknown
 
 
@@ -66,7 +68,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if bool(self.problems) != bool(self.methods):
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
-        known = {parse_spec(PLACEHOLDER.sub("0", entry.use)).name for entry in self.entries()}
+        known = {_name(entry) for entry in self.entries()}
         for name in (name for method in self.methods for name in method.only):
             if name not in known:
                 raise unknown("problem of the campaign", name, known)
@@ -83,8 +85,9 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Raises
         ------
         problems.errors.InputError
-            If a placeholder has no value, or a value no placeholder.
+            If a placeholder has no value, or a value no placeholder; for too many cases.
         """
+        limits.check(f"campaign {self.name!r}", "CASES", self._count(), "give fewer values to its sweeps")
         made = [
             Case(
                 problem=fill(entry.use, chosen),
@@ -111,6 +114,25 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for method in entry.methods
             for text in _settings(method, ProblemEntry(use=entry.problem), {})
         ]
+
+    def _count(self) -> int:
+        """Return how many cases there are, without making any."""
+        runs = [
+            _combinations(entry.sweep) * _combinations(method.sweep)
+            for entry in self.entries()
+            for method in self.methods
+            if not method.only or _name(entry) in method.only
+        ]
+        many = [_combinations(method.sweep) for entry in self.ensembles for method in entry.methods]
+        return sum(runs) + sum(many)
+
+
+def _combinations(sweep: Mapping[str, Sequence[object]]) -> int:
+    return math.prod(len(values) for values in sweep.values())
+
+
+def _name(entry: ProblemEntry) -> str:
+    return parse_spec(PLACEHOLDER.sub("0", entry.use)).name
 
 
 def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
@@ -204,6 +226,8 @@ def parse(text: str, source: str = "campaign") -> Campaign:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{source}: not valid TOML: {error}.") from None
+    except RecursionError:
+        raise InputError(f"{source}: lists or tables are nested too deep, for a campaign.") from None
     _check_keys(data, Campaign, source)
     try:
         return msgspec.convert(data, Campaign)

@@ -7,11 +7,13 @@ from msgspec import Meta
 
 from hbvm_bench.grid import Grid
 from hbvm_bench.sweep import Scalar
+from problems import limits
+from problems.errors import InputError, shown
 
 Settings = Literal["default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
-Positive = Annotated[float, Meta(gt=0)]
+Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
 
 
@@ -48,8 +50,8 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         Seconds of sampling per case and round; at least one sample is taken.
     """
 
-    rounds: Annotated[int, Meta(ge=0)] = 3
-    samples: Count = 2
+    rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
+    samples: Annotated[int, Meta(ge=1, le=10_000)] = 2
     shortest: Positive = 0.02
     budget: Positive = 8.0
 
@@ -81,7 +83,7 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Every number of the start is multiplied by 1 + ``spread`` x, |x| <= 1.
     """
 
-    count: Annotated[int, Meta(ge=1, le=10_000_000)]
+    count: Count
     spread: Positive = 1e-2
 
 
@@ -152,6 +154,11 @@ class EnsembleEntry(
     count: int
     methods: Annotated[list[MethodEntry], Meta(min_length=1)]
     spread: Positive = 1e-2
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise InputError(f"count={shown(self.count)} of an ensemble must be at least 1.")
+        limits.check(f"an ensemble with count={shown(self.count)}", "TRAJECTORIES", self.count)
 
     @property
     def ensemble(self) -> Ensemble:

@@ -15,14 +15,14 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from hbvm_bench import reference
-from problems.errors import InputError
+from problems import limits
+from problems.errors import InputError, shown
 from problems.problem import Problem
 
 GOLDEN = (5**0.5 - 1) / 2
 FIRST = 1e-2  # of the span: where samples in log time begin
-MOST = 10_000_000  # samples
 
-Positive = Annotated[float, Meta(gt=0)]
+Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
 Spacing = Literal["equal", "irregular", "log"]
 
@@ -65,21 +65,19 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Raises
         ------
         problems.errors.InputError
-            For more than ten million samples, or ``first`` beyond the span.
+            For more samples than `problems.limits` allow, or ``first`` beyond the span.
         """
         span = problem.t_end - problem.t0
         count = self.count or 1000
+        limits.check(f"a grid with count={shown(count)}", "SAMPLES", count)
         if self.spacing != "equal":
-            if count > MOST:
-                raise InputError(f"a grid of {count} samples is too fine; at most {MOST}.")
             return self._uneven(problem, span, count)
         if self.step is None and self.count is None and problem.times is not None:
             return np.asarray(problem.times, dtype=np.float64)
         if self.step is None:
             return problem.t0 + span * np.arange(count + 1) / count
+        limits.check(f"a grid with step={self.step!r}", "SAMPLES", abs(span) / self.step, "make it larger")
         whole = round(abs(span) / self.step)
-        if whole > MOST:
-            raise InputError(f"a grid step of {self.step!r} gives {whole} samples; make it larger.")
         times = problem.t0 + np.copysign(self.step, span) * np.arange(whole + 1)
         inside = times[np.abs(times - problem.t0) < abs(span) * (1 - 1e-12)]
         return np.append(inside, problem.t_end)

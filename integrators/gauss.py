@@ -1,5 +1,6 @@
 """Gauss-Legendre collocation, which is HBVM(s, s)."""
 
+import re
 from dataclasses import dataclass
 
 from integrators.hbvm import HBVM
@@ -68,7 +69,7 @@ class Gauss(MethodBase):
         try:
             twin = self.as_hbvm()
         except InputError as error:
-            raise InputError(str(error).replace("HBVM", "Gauss")) from None
+            raise InputError(re.sub(r"\bHBVM\b", "Gauss", str(error))) from None
         object.__setattr__(self, "s", twin.s)
         object.__setattr__(self, "h", twin.h)
         object.__setattr__(self, "tol", twin.tol)

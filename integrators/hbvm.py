@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from integrators.options import length, tolerance, whole
 from integrators.protocol import MethodBase, Program
-from problems.errors import InputError, unknown
+from problems.errors import InputError, shown, unknown
 from problems.problem import Problem, System
 
 CITATION = """\
@@ -128,7 +128,7 @@ class HBVM(MethodBase):
             raise InputError(f"HBVM needs k and s, or neither of them; give {missing} too.")
         if self.k is None and self.tol is None:
             raise InputError(
-                f"HBVM needs k and s with a fixed step, h={self.h!r}; or give tol, and they are chosen."
+                f"HBVM needs k and s with a fixed step, h={shown(self.h)}; or give tol, and they are chosen."
             )
         for name in ("s", "k"):
             if getattr(self, name) is not None:
@@ -143,8 +143,8 @@ class HBVM(MethodBase):
             raise InputError(
                 "HBVM needs k > 1 with a tolerance: one stage tells nothing about its error; give h instead."
             )
-        if self.solver not in SOLVERS:
-            raise unknown("solver", str(self.solver), SOLVERS)
+        if not isinstance(self.solver, str) or self.solver not in SOLVERS:
+            raise unknown("solver", self.solver, SOLVERS)
 
     @property
     def order(self) -> int | None:

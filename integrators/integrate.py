@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.protocol import Array, MethodBase, Samples, Stats, Status, Stepper, check_times
-from problems.errors import InputError
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, Stepper, as_numbers, check_times
+from problems import limits
+from problems.errors import InputError, shown
 from problems.foreign import Foreign
 from problems.problem import Problem
 
@@ -195,10 +196,11 @@ def check(problem: Problem, method: MethodBase) -> None:
     """Raise `problems.errors.InputError` unless ``method`` can integrate ``problem``."""
     if not isinstance(problem, Problem):
         raise InputError(
-            f"problem must be a Problem, not {problem!r}; make one with problems.load or problems.Problem."
+            f"problem must be a Problem, not {shown(problem)}; "
+            "make one with problems.load or problems.Problem."
         )
     if not isinstance(method, MethodBase):
-        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {method!r}.")
+        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {shown(method)}.")
     reason = method.accepts(problem)
     if reason is not None:
         raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
@@ -221,4 +223,7 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
         times = problem.times
     if times is None:
         times = np.linspace(problem.t0, problem.t_end, DEFAULT_SAMPLES)
-    return np.asarray(times, dtype=np.float64)
+    grid = as_numbers("times", times)
+    gib = 8 * grid.size * problem.system.dim / 2**30
+    limits.check(f"a solution of {grid.size} times and {problem.system.dim} components", "GIB", gib)
+    return grid

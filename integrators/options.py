@@ -4,7 +4,8 @@ import math
 import operator
 from typing import Any
 
-from problems.errors import InputError
+from problems import limits
+from problems.errors import InputError, shown
 
 SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
@@ -17,7 +18,9 @@ def whole(method: str, name: str, value: Any) -> int:
     except TypeError:
         number = 0
     if number < 1:
-        raise InputError(f"{method} needs a whole number {name} >= 1, not {name}={value!r}.")
+        raise InputError(f"{method} needs a whole number {name} >= 1, not {name}={shown(value)}.")
+    if name in ("k", "s"):
+        limits.check(f"{method} with {name}={shown(value)}", "STAGES", number)
     return number
 
 
@@ -26,7 +29,7 @@ def length(method: str, h: Any) -> float:
     value = _number(h)
     if not (value > 0.0 and math.isfinite(value)):
         raise InputError(
-            f"{method} needs a finite step h > 0, not h={h!r}; the sign of time is that of the times."
+            f"{method} needs a finite step h > 0, not h={shown(h)}; the sign of time is that of the times."
         )
     return value
 
@@ -36,7 +39,7 @@ def tolerance(method: str, tol: Any) -> float:
     value = _number(tol)
     if not SMALLEST <= value < 1.0:
         raise InputError(
-            f"{method} needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={tol!r}: "
+            f"{method} needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={shown(tol)}: "
             "an error smaller than this cannot be told from rounding."
         )
     return value
@@ -45,5 +48,5 @@ def tolerance(method: str, tol: Any) -> float:
 def _number(value: Any) -> float:
     try:
         return math.nan if isinstance(value, (bool, str)) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return math.nan

@@ -35,7 +35,8 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.errors import InputError
+from problems.calls import Called
+from problems.errors import InputError, shown
 from problems.problem import Problem, System
 
 Array = NDArray[np.float64]
@@ -197,7 +198,7 @@ class Program(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MethodBase:
+class MethodBase(Called):
     """Base of all methods: a frozen description that prints as the call that makes it.
 
     Attributes
@@ -207,6 +208,13 @@ class MethodBase:
     to_end : str or None
         The sampling by which the library's own documentation goes to one end time, which is what
         a clock runs for; ``None`` where that is the method's best, see `Stepper.advance`.
+
+    Raises
+    ------
+    problems.errors.UnknownNameError
+        For an option that does not exist, with the nearest names.
+    problems.errors.InputError
+        For an option that is missing, or not given by name.
     """
 
     library: ClassVar[str] = "hbvm-bench"
@@ -260,7 +268,7 @@ def check_times(times: ArrayLike, t: float) -> Array:
     problems.errors.InputError
         If the times are empty, not finite, not strictly monotone or behind ``t``.
     """
-    grid = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    grid = np.atleast_1d(as_numbers("times", times))
     if grid.ndim != 1 or grid.size == 0:
         raise InputError(f"times must be a non-empty one-dimensional array, not of shape {grid.shape}.")
     if not np.isfinite(grid).all():
@@ -276,6 +284,22 @@ def check_times(times: ArrayLike, t: float) -> Array:
     return grid
 
 
+def as_numbers(what: str, value: ArrayLike) -> Array:
+    """Return an array of float64, or refuse what is not made of numbers."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} must be numbers, not {shown(value)}.") from None
+
+
+def check_start(t0: Any) -> float:
+    """Return the time of a start, a finite number, or refuse it."""
+    time = as_numbers("t0", t0)
+    if time.ndim or not np.isfinite(time):
+        raise InputError(f"t0={shown(t0)} must be one finite number.")
+    return float(time)
+
+
 def check_state(y0: ArrayLike, dim: int) -> Array:
     """Return ``y0`` as a fresh float64 array of shape (dim,), or refuse it.
 
@@ -284,7 +308,7 @@ def check_state(y0: ArrayLike, dim: int) -> Array:
     problems.errors.InputError
         If the shape is wrong or an entry is not finite.
     """
-    y = np.array(y0, dtype=np.float64)
+    y = as_numbers("the initial state", y0).copy()
     if y.shape != (dim,):
         raise InputError(f"the initial state must have shape ({dim},), not {y.shape}.")
     if not np.isfinite(y).all():

@@ -4,7 +4,6 @@ A method registers its class under the entry point group
 ``hbvm_bench.integrators``; nothing is imported until its name is asked for.
 """
 
-import dataclasses
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -29,7 +28,7 @@ def get(name: str) -> type[MethodBase]:
         If there is none; the message gives the nearest names.
     """
     entries = _entries()
-    if name not in entries:
+    if not isinstance(name, str) or name not in entries:
         raise unknown("method", name, entries)
     return entries[name].load()
 
@@ -44,21 +43,7 @@ def create(name: str, **options: Any) -> MethodBase:
     problems.errors.InputError
         For a missing option or a value that the method refuses.
     """
-    cls = get(name)
-    fields = [f for f in dataclasses.fields(cls) if f.init]
-    for option in options:
-        if option not in {f.name for f in fields}:
-            raise unknown(f"option of {name}", option, [f.name for f in fields])
-    missing = [
-        f.name
-        for f in fields
-        if f.name not in options
-        and f.default is dataclasses.MISSING
-        and f.default_factory is dataclasses.MISSING
-    ]
-    if missing:
-        raise InputError(f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...).")
-    return cls(**options)
+    return get(name)(**options)
 
 
 @cache

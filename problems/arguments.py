@@ -5,9 +5,9 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NoReturn
 
-from problems import sums
+from problems import limits, sums
 from problems.blame import line_of_function, line_of_traceback, refuse
-from problems.errors import InputError, unknown
+from problems.errors import InputError, shown, unknown
 from problems.tracing import FUNCTIONS, PAR, Graph, Node, P, Q, T
 
 # Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
@@ -196,7 +196,7 @@ def call(
         For an unknown argument, or anything that cannot be traced, with the line.
     """
     if not callable(function):
-        raise InputError(f"{what} must be a function, not {function!r}.")
+        raise InputError(f"{what} must be a function, not {shown(function)}.")
     place = line_of_function(function)
     offered: dict[str, Callable[[], Any]] = {
         "t": lambda: graph.symbol("t", 0, flags=T),
@@ -208,9 +208,16 @@ def call(
         dof = graph.dof
         offered["q"] = lambda: Vector(graph, "q", "y", 0, dof)
         offered["p"] = lambda: Vector(graph, "p", "y", dof, dof)
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{what} must be a function whose arguments have names, not {shown(function)}; "
+            "put it into one, as in lambda q: abs(q[0])."
+        ) from None
     arguments: list[Any] = []
     named: dict[str, Any] = {}
-    for parameter in inspect.signature(function).parameters.values():
+    for parameter in parameters:
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
         if parameter.default is not parameter.empty:
@@ -228,6 +235,7 @@ def call(
             arguments.append(value)
         else:
             named[parameter.name] = value
+    graph.limit = int(min(limits.limit("OPERATIONS"), 2**62))
     try:
         return function(*arguments, **named)
     except InputError:
@@ -248,6 +256,8 @@ def call(
     except Exception as error:
         line = line_of_traceback(error.__traceback__) or place
         raise InputError(f"{line}: {what} failed with {type(error).__name__}: {error}") from error
+    finally:
+        graph.limit = None
 
 
 def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str) -> Node:

@@ -7,12 +7,12 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, NoReturn
 
-from problems.errors import InputError
+from problems.errors import InputError, shown
 
 # Modules that run between the user's line and the error; their frames are never the user's.
 _MACHINERY = {
     f"problems.{name}"
-    for name in ["blame", "node", "tracing", "sums", "arguments", "system", "hamiltonian", "problem"]
+    for name in ["blame", "calls", "node", "tracing", "sums", "arguments", "system", "hamiltonian", "problem"]
 }
 
 
@@ -48,9 +48,9 @@ def line_of_traceback(traceback: TracebackType | None) -> str:
 
 
 def line_of_function(function: Callable[..., Any]) -> str:
-    """Return the line where a function is defined (empty for one without Python code)."""
+    """Return the line where a function is defined, or the function itself where it has no Python code."""
     code = getattr(function, "__code__", None)
-    return _describe(code.co_filename, code.co_firstlineno) if code is not None else ""
+    return _describe(code.co_filename, code.co_firstlineno) if code is not None else shown(function)
 
 
 def refuse(what: str, remedy: str) -> NoReturn:

@@ -41,6 +41,7 @@ def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float 
         For values out of range.
     """
     given.whole("cluster", 2, n=n)
+    given.size("cluster", 6 * n, n * (n - 1) // 2, n=n)
     given.whole("cluster", 0, seed=seed)
     given.positive("cluster", softening=softening)
     given.finite("cluster", t_end=t_end)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from problems import given
-from problems.errors import InputError
+from problems.errors import InputError, shown
 from problems.hamiltonian import Hamiltonian
 from problems.problem import Problem
 from problems.registry import changed
@@ -79,8 +79,8 @@ def cr3bp(*, loops: int = 4, mu: float | None = None, t_end: float | None = None
     problems.errors.InputError
         For values out of range.
     """
-    if isinstance(loops, bool) or loops not in ORBITS:
-        raise InputError(f"loops={loops!r} of cr3bp must be one of {', '.join(map(str, ORBITS))}.")
+    if isinstance(loops, bool) or not isinstance(loops, int) or loops not in ORBITS:
+        raise InputError(f"loops={shown(loops)} of cr3bp must be one of {', '.join(map(str, ORBITS))}.")
     orbit = ORBITS[loops]
     share = orbit.mu if mu is None else mu
     span = orbit.period if t_end is None else t_end

@@ -1,5 +1,7 @@
 """The errors a user can cause: one sentence that names the value and the fix."""
 
+import math
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -16,15 +18,31 @@ class MissingLibraryError(InputError, ImportError):
     """A library that a method needs is not installed."""
 
 
-def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+def shown(value: object, longest: int = 80) -> str:
+    """Return a value as a message shows it: on one line, and not longer than ``longest`` characters."""
+    if isinstance(value, int) and abs(value) >= 10**20:
+        return f"{'-' if value < 0 else ''}{large(abs(value))}"
+    try:
+        text = re.sub(r" at 0x[0-9a-fA-F]+", "", " ".join(repr(value).split()))
+    except Exception:  # a value's own repr may fail
+        text = f"something of type {type(value).__name__}"
+    return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def large(number: int) -> str:
+    """Return the size of a number that no double may hold."""
+    return f"about 1e{math.log10(number):.0f}"
+
+
+def unknown(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """Build the error for an unknown name, with the nearest known names.
 
     Parameters
     ----------
     kind : str
         What the name should have named: ``"problem"``, ``"method"``, ...
-    name : str
-        The name that was given.
+    name : object
+        The name that was given; anything, where that is no text.
     known : iterable of str
         The names that exist.
 
@@ -35,11 +53,11 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
     """
     names = sorted(known)
     folded = {candidate.casefold(): candidate for candidate in names}
-    near = [folded[match] for match in get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
+    near = [folded[match] for match in get_close_matches(str(name).casefold()[:80], folded, n=3, cutoff=0.5)]
     if near:
         hint = "did you mean " + " or ".join(repr(candidate) for candidate in near) + "?"
     elif names:
         hint = "known: " + ", ".join(names) + "."
     else:
         hint = "there are none."
-    return UnknownNameError(f"unknown {kind} {name!r}; {hint}")
+    return UnknownNameError(f"unknown {kind} {shown(name)}; {hint}")

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.errors import InputError
+from problems.calls import checked
+from problems.errors import InputError, shown
 from problems.functions import Function
 from problems.system import System, Value, check_count, name_of
 
@@ -63,6 +64,7 @@ class Foreign(System):
     kind = "vector_field"
     traced = False
 
+    @checked
     def __init__(
         self,
         f: Callable[..., Any],
@@ -73,9 +75,9 @@ class Foreign(System):
         guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        check_count("dim", dim)
+        dim = check_count("dim", dim)
         if not callable(f):
-            raise InputError(f"f must be a function, not {f!r}.")
+            raise InputError(f"f must be a function, not {shown(f)}.")
         super().__init__(
             dim=dim,
             dof=None,
@@ -132,8 +134,8 @@ class Foreign(System):
             return
         try:
             array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{self.name} returns {value!r}, not {self.dim} numbers.") from error
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"{self.name} returns {shown(value)}, not {self.dim} numbers.") from error
         if array.shape != (self.dim,):
             raise InputError(
                 f"{self.name} returns an array of shape {array.shape}, not ({self.dim},): "

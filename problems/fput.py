@@ -65,6 +65,7 @@ def fput(
         For values out of range.
     """
     given.whole("fput", 2, n=n)
+    given.size("fput", 2 * n, n=n)
     given.whole("fput", 0, seed=seed)
     given.choice("fput", "start", start, ("mode", "thermal"))
     given.finite("fput", alpha=alpha, beta=beta, amplitude=amplitude)

@@ -6,7 +6,8 @@ from decimal import Decimal, localcontext
 from random import Random
 from typing import Any
 
-from problems.errors import InputError, unknown
+from problems import limits
+from problems.errors import InputError, shown, unknown
 
 
 def finite(problem: str, **values: Any) -> None:
@@ -19,7 +20,7 @@ def finite(problem: str, **values: Any) -> None:
     """
     for name, value in values.items():
         if not _is_number(value):
-            raise InputError(f"{name}={value!r} of {problem} must be a finite number.")
+            raise InputError(f"{name}={shown(value)} of {problem} must be a finite number.")
 
 
 def positive(problem: str, **values: Any) -> None:
@@ -27,27 +28,36 @@ def positive(problem: str, **values: Any) -> None:
     finite(problem, **values)
     for name, value in values.items():
         if value <= 0:
-            raise InputError(f"{name}={value!r} of {problem} must be positive.")
+            raise InputError(f"{name}={shown(value)} of {problem} must be positive.")
 
 
 def whole(problem: str, least: int, **values: Any) -> None:
     """Refuse values that are not whole numbers of at least ``least``; see `finite`."""
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise InputError(f"{name}={value!r} of {problem} must be a whole number of at least {least}.")
+            raise InputError(
+                f"{name}={shown(value)} of {problem} must be a whole number of at least {least}."
+            )
+
+
+def size(problem: str, components: int, terms: int = 0, **values: Any) -> None:
+    """Refuse values that make a state or a sum larger than `problems.limits` allow."""
+    call = f"{problem}({', '.join(f'{name}={shown(value)}' for name, value in values.items())})"
+    limits.check(call, "COMPONENTS", components)
+    limits.check(call, "TERMS", terms)
 
 
 def numbers(problem: str, name: str, value: Any, size: int) -> tuple[float, ...]:
     """Return a list of ``size`` finite numbers as a tuple; see `finite`."""
     if not isinstance(value, list | tuple) or len(value) != size or not all(map(_is_number, value)):
-        raise InputError(f"{name}={value!r} of {problem} must be a list of {size} finite numbers.")
+        raise InputError(f"{name}={shown(value)} of {problem} must be a list of {size} finite numbers.")
     return tuple(float(number) for number in value)
 
 
 def choice(problem: str, name: str, value: Any, known: Sequence[str]) -> None:
     """Refuse a word that is not one of ``known``, with the nearest ones; see `finite`."""
-    if value not in known:
-        raise unknown(f"{name} of {problem}", str(value), known)
+    if not isinstance(value, str) or value not in known:
+        raise unknown(f"{name} of {problem}", value, known)
 
 
 def nearest(expression: Callable[[], Any]) -> float:

@@ -7,10 +7,11 @@ from typing import Any
 
 from problems import arguments, functions
 from problems.blame import line_of_function
+from problems.calls import checked
 from problems.differentiate import Gradient, gradient
-from problems.errors import InputError
+from problems.errors import InputError, shown, unknown
 from problems.functions import Function
-from problems.system import Bodies, System, Value, check_count, name_of
+from problems.system import Bodies, System, Value, check_count, check_names, name_of
 from problems.tracing import T
 
 
@@ -47,6 +48,7 @@ class Hamiltonian(System):
 
     kind = "hamiltonian"
 
+    @checked
     def __init__(
         self,
         H: Callable[..., Any],
@@ -59,8 +61,8 @@ class Hamiltonian(System):
         domain: Callable[..., Any] | None = None,
         name: str | None = None,
     ) -> None:
-        check_count("dof", dof)
-        if "energy" in invariants:
+        dof = check_count("dof", dof)
+        if "energy" in check_names("invariants", invariants):
             raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=2 * dof,
@@ -70,6 +72,8 @@ class Hamiltonian(System):
             guards=guards,
             name=name or name_of(H),
         )
+        if bodies is not None:
+            bodies = _checked_bodies(bodies, self.parameters)
         self.bodies = bodies
         self._energy = self._scalar(H, "H")
         self._functions["hamiltonian"] = functions.plain(self._graph, [self._energy])
@@ -104,6 +108,15 @@ class Hamiltonian(System):
         return None
 
 
+def _checked_bodies(bodies: Any, parameters: Mapping[str, Value]) -> Bodies:
+    if not isinstance(bodies, Bodies):
+        raise InputError(f'bodies={shown(bodies)} must be a problems.Bodies, as in Bodies(masses="m").')
+    for name in [bodies.masses, *([bodies.G] if isinstance(bodies.G, str) else [])]:
+        if name not in parameters:
+            raise unknown("parameter in bodies", name, parameters)
+    return bodies
+
+
 class VectorField(System):
     """Any first-order system y' = f(t, y).
 
@@ -119,6 +132,7 @@ class VectorField(System):
 
     kind = "vector_field"
 
+    @checked
     def __init__(
         self,
         f: Callable[..., Any],
@@ -129,7 +143,7 @@ class VectorField(System):
         guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        check_count("dim", dim)
+        dim = check_count("dim", dim)
         super().__init__(
             dim=dim,
             dof=None,

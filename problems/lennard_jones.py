@@ -67,6 +67,8 @@ def lennard_jones(
         For values out of range.
     """
     given.whole("lennard_jones", 1, rings=rings)
+    atoms = 3 * rings * (rings + 1) + 1
+    given.size("lennard_jones", 4 * atoms, atoms * (atoms - 1) // 2, rings=rings)
     given.whole("lennard_jones", 0, seed=seed)
     given.positive("lennard_jones", temperature=temperature)
     span = 0.2 if t_end is None else t_end

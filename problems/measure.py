@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from problems import dd
 from problems.dd import DD
 from problems.differentiate import reachable
-from problems.errors import InputError
+from problems.errors import InputError, shown
 from problems.functions import Function
 from problems.hamiltonian import System
 from problems.sums import Loop
@@ -146,8 +146,8 @@ class _Interpreter:
 def _states(problem: "Problem", y: ArrayLike) -> Array:
     try:
         states = np.asarray(y, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("states must be an array of numbers.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"states must be an array of numbers, not {shown(y)}.") from error
     if states.ndim not in (1, 2) or states.shape[-1] != problem.system.dim:
         raise InputError(f"states must have the shape (n, {problem.system.dim}), not {states.shape}.")
     return np.atleast_2d(states)
@@ -159,7 +159,10 @@ def _evaluate(problem: "Problem", what: str, states: Array, t: ArrayLike | None)
         if any(term.node.flags & T for terms in function.outputs for term in terms):
             raise InputError(f"{what.split(':')[-1]} depends on time; give the times of the states as t=.")
         t = problem.t0
-    times = np.asarray(t, dtype=np.float64)
+    try:
+        times = np.asarray(t, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"t must be {len(states)} times, not {shown(t)}.") from error
     if times.ndim > 1 or (times.ndim == 1 and times.size != len(states)):
         raise InputError(f"t must be {len(states)} times, one per state, not of shape {times.shape}.")
     return evaluate(function, times, np.ascontiguousarray(states.T), problem.par)

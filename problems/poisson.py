@@ -6,10 +6,11 @@ from typing import Any
 
 from problems import arguments, functions
 from problems.blame import line_of_function
+from problems.calls import checked
 from problems.differentiate import gradient
 from problems.errors import InputError
 from problems.functions import Function
-from problems.system import System, Value, check_count, name_of
+from problems.system import System, Value, check_count, check_names, name_of
 from problems.tracing import Node, T
 
 
@@ -51,6 +52,7 @@ class Poisson(System):
 
     kind = "poisson"
 
+    @checked
     def __init__(
         self,
         H: Callable[..., Any],
@@ -62,8 +64,8 @@ class Poisson(System):
         guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        check_count("dim", dim)
-        if "energy" in invariants:
+        dim = check_count("dim", dim)
+        if "energy" in check_names("invariants", invariants):
             raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=dim,

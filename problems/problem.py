@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems import measure
-from problems.errors import InputError
+from problems.calls import checked
+from problems.errors import InputError, shown
 from problems.hamiltonian import System, Value
+from problems.system import check_names
 
 Array = NDArray[np.float64]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -71,6 +73,7 @@ class Problem:
     notes: str
     _made_with: str
 
+    @checked
     def __init__(
         self,
         system: System,
@@ -90,18 +93,25 @@ class Problem:
         notes: str = "",
     ) -> None:
         if not isinstance(system, System):
-            raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {system!r}.")
+            raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
+        for key, text in {"name": name, "title": title, "notes": notes}.items():
+            if text is not None and not isinstance(text, str):
+                raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
+        if not isinstance(references, list | tuple):
+            raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
+        check_names("arguments", arguments)
         state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
         span = _numbers("t0 and t_end", [t0, t_end], 2)
         if span[0] == span[1]:
-            raise InputError(f"t_end={t_end!r} must differ from t0={t0!r}.")
+            raise InputError(f"t_end={shown(t_end)} must differ from t0={shown(t0)}.")
         grid = None if times is None else _numbers("times", times, None)
         given = {"q0": q0, "p0": p0, "v0": v0, "y0": y0}
-        shown = [f"{key}={_shown(value)}" for key, value in given.items() if value is not None]
+        printed = [f"{key}={_shown(value)}" for key, value in given.items() if value is not None]
         if parameters:
-            shown.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
-        shown += [f"t0={t0!r}"] if t0 != 0.0 else []
+            printed.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
+        t0, t_end = (x.item() if isinstance(x, np.generic) else x for x in (t0, t_end))
+        printed += [f"t0={t0!r}"] if t0 != 0.0 else []
         values = {
             "system": system,
             "y0": _frozen(state),
@@ -114,7 +124,7 @@ class Problem:
             "times": None if grid is None else _frozen(grid),
             "references": tuple(references),
             "notes": notes,
-            "_made_with": ", ".join([repr(system), *shown, f"t_end={t_end!r}"]),
+            "_made_with": ", ".join([repr(system), *printed, f"t_end={t_end!r}"]),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -210,13 +220,13 @@ def _listed(names: Sequence[str]) -> str:
 def _numbers(what: str, value: ArrayLike | None, size: int | None) -> Array:
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{what} must be numbers, not {value!r}.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{what} must be numbers, not {shown(value)}.") from error
     if array.ndim != 1 or (size is not None and array.size != size):
         wanted = "a flat list" if size is None else f"a flat list of length {size}"
         raise InputError(f"{what} must be {wanted}, not an array of shape {array.shape}.")
     if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite, not {array.tolist()!r}.")
+        raise InputError(f"{what} must be finite, not {shown(array.tolist())}.")
     return array
 
 

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+import numpy as np
+
+from problems import calls
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 
@@ -38,7 +41,7 @@ def factory(name: str) -> Callable[..., Problem]:
     problems.errors.InputError
         For a name under which two distributions offer different problems.
     """
-    offered = _entries().get(name)
+    offered = _entries().get(name) if isinstance(name, str) else None
     if offered is None:
         raise unknown("problem", name, _entries())
     if len(offered) > 1:
@@ -63,14 +66,13 @@ def load(name: str, **arguments: Any) -> Problem:
         For an unknown name or argument, with the nearest ones, or a value out of range.
     """
     make = factory(name)
-    known = inspect.signature(make).parameters
-    for key in arguments:
-        if key not in known:
-            raise unknown(f"argument of {name}", key, known)
-    missing = [key for key, p in known.items() if p.default is p.empty and key not in arguments]
-    if missing:
-        raise InputError(f"{name} needs the argument {missing[0]!r}: {name}({missing[0]}=...).")
-    return make(**arguments)
+    calls.check(name, inspect.signature(make), (), arguments, "argument")
+    # NumPy's numbers and arrays become Python's, which print as the call that is typed
+    plain = {
+        key: value.tolist() if isinstance(value, np.generic | np.ndarray) else value
+        for key, value in arguments.items()
+    }
+    return make(**plain)
 
 
 def changed(make: Callable[..., Problem], **values: Any) -> dict[str, Any]:

@@ -5,10 +5,10 @@ methods and Hamiltonian BVMs defined over Gauss points", section "Sitnikov's
 problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5, t in [0, 1500].
 """
 
-import math
 from decimal import Decimal, localcontext
 from typing import Any
 
+from problems import given
 from problems.errors import InputError
 from problems.hamiltonian import Bodies, Hamiltonian
 from problems.problem import Problem
@@ -89,9 +89,7 @@ def sitnikov(
     problems.errors.InputError
         For values out of range.
     """
-    for key, value in {"e": e, "d": d, "m3": m3, "v3": v3, "z3": z3, "t_end": t_end}.items():
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{key}={value!r} of sitnikov must be a finite number.")
+    given.finite("sitnikov", e=e, d=d, m3=m3, v3=v3, z3=z3, t_end=t_end)
     if not 0 <= e < 1:
         raise InputError(f"e={e!r} of sitnikov must be an eccentricity, 0 <= e < 1.")
     if d <= 0 or m3 <= 0:

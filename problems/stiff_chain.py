@@ -46,6 +46,7 @@ def stiff_chain(*, springs: int = 3, omega: float = 50.0, t_end: float = 200.0) 
         For values out of range.
     """
     given.whole("stiff_chain", 2, springs=springs)
+    given.size("stiff_chain", 4 * springs, springs=springs)
     given.positive("stiff_chain", omega=omega)
     given.finite("stiff_chain", t_end=t_end)
     k = springs

@@ -7,14 +7,18 @@ terms are added one after the other, in the order of ``index``.
 """
 
 import numbers
-from collections.abc import Callable, Iterable
+import sys
+from collections.abc import Callable, Iterable, Sized
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.blame import refuse
+from problems import limits
+from problems.blame import refuse, users_line
+from problems.errors import shown
 from problems.tracing import Graph, Node
 
 
@@ -153,7 +157,16 @@ def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
     if isinstance(index, Node | Index):
         refuse("the index list of m.sum depends on a symbol", "give a range or a list of integers")
     try:
-        listed = list(index)
+        size = len(index) if isinstance(index, Sized) else 0
+    except OverflowError:  # of a range that is longer than any list
+        size = sys.maxsize
+    limits.check(f"{users_line()}: this", "TERMS", size)
+    try:
+        listed = list(islice(index, int(min(limits.limit("TERMS"), sys.maxsize - 1)) + 1))
+    except TypeError:
+        refuse(f"the index of m.sum is {shown(index)}", "give a range or a list of integers")
+    limits.check(f"{users_line()}: this", "TERMS", len(listed))
+    try:
         rows = np.array([row if isinstance(row, tuple | list) else (row,) for row in listed])
     except (TypeError, ValueError):
         rows = np.array(None)

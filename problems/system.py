@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from problems import arguments, functions
-from problems.errors import InputError, unknown
+from problems import arguments, functions, limits
+from problems.errors import InputError, shown, unknown
 from problems.functions import Function
 from problems.gradients import energy_gradient, gradients, stacked
 from problems.tracing import Graph, Node
@@ -75,6 +75,10 @@ class System:
         guards: Mapping[str, Callable[..., Any]],
         name: str,
     ) -> None:
+        if not isinstance(name, str):
+            raise InputError(f"name={shown(name)} of a system must be a text.")
+        for what, given in (("parameters", parameters), ("invariants", invariants), ("guards", guards)):
+            check_names(what, given)
         self.dim = dim
         self.dof = dof
         self.name = name
@@ -164,6 +168,8 @@ class System:
         problems.errors.InputError
             If the system has no such function.
         """
+        if not isinstance(what, str):
+            raise unknown(f"function of {self.name}", what, self.offered())
         found = self._derived.get(what)
         if found is None:
             found = self._derive(what)
@@ -238,7 +244,7 @@ class System:
             For an unknown name, a wrong length or a value that is not finite.
         """
         par = np.empty(self.n_par)
-        for key in values:
+        for key in check_names("parameters", values):
             if key not in self._layout:
                 raise unknown(f"parameter of {self.name}", key, self._layout)
         for key, (offset, size) in self._layout.items():
@@ -246,7 +252,9 @@ class System:
             if size is None and isinstance(value, tuple):
                 raise InputError(f"parameter {key!r} of {self.name} is one number, not {len(value)}.")
             if size is not None and (not isinstance(value, tuple) or len(value) != size):
-                raise InputError(f"parameter {key!r} of {self.name} needs {size} numbers, not {value!r}.")
+                raise InputError(
+                    f"parameter {key!r} of {self.name} needs {size} numbers, not {shown(value)}."
+                )
             par[offset : offset + (size or 1)] = value
         return par
 
@@ -273,10 +281,20 @@ def name_of(function: Callable[..., Any]) -> str:
     return name if name.isidentifier() else "system"
 
 
-def check_count(what: str, count: Any) -> None:
-    """Raise unless ``count`` is a whole number of at least 1."""
+def check_names(what: str, given: Any) -> Mapping[str, Any]:
+    """Return a mapping from names, or refuse anything else."""
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) and key for key in given):
+        raise InputError(f"{what}={shown(given)} must be a dictionary by name, as in {{'name': ...}}.")
+    return given
+
+
+def check_count(what: str, count: Any) -> int:
+    """Return ``count``, a whole number of at least 1 that is not beyond `problems.limits`, or refuse it."""
     if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 1:
-        raise InputError(f"{what}={count!r} must be a whole number of at least 1.")
+        raise InputError(f"{what}={shown(count)} must be a whole number of at least 1.")
+    components = 2 * int(count) if what == "dof" else int(count)
+    limits.check(f"a system with {what}={shown(count)}", "COMPONENTS", components)
+    return int(count)
 
 
 def _checked(name: str, value: Any) -> Value:
@@ -284,8 +302,12 @@ def _checked(name: str, value: Any) -> Value:
         raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
     try:
         array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"parameter {name!r} is {value!r}, not a number or a list of numbers.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"parameter {name!r} is {shown(value)}, not a number or a list of numbers."
+        ) from error
     if array.ndim > 1 or not np.isfinite(array).all():
-        raise InputError(f"parameter {name!r} is {value!r}; give one finite number or a flat list of them.")
+        raise InputError(
+            f"parameter {name!r} is {shown(value)}; give one finite number or a flat list of them."
+        )
     return float(array) if array.ndim == 0 else tuple(array.tolist())

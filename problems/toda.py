@@ -82,6 +82,7 @@ def toda(*, n: int = 8, spread: float = 1.0, seed: int = 1, t_end: float = 100.0
         For values out of range.
     """
     given.whole("toda", 3, n=n)
+    given.size("toda", 2 * n, n=n)
     given.whole("toda", 0, seed=seed)
     given.positive("toda", spread=spread)
     given.finite("toda", t_end=t_end)

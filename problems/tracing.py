@@ -21,7 +21,8 @@ from collections.abc import Callable, Hashable
 from fractions import Fraction
 from typing import Any
 
-from problems.blame import refuse
+from problems import limits
+from problems.blame import refuse, users_line
 from problems.node import FUNCTIONS, PAR, STATE, Node, P, Q, T
 
 _EVALUATE: dict[str, Callable[[float], float]] = {
@@ -61,6 +62,7 @@ class Graph:
         self.nodes: list[Node] = []
         self.loops: dict[Hashable, Any] = {}
         self.in_term = False  # whether the term of a declared sum is being traced
+        self.limit: int | None = None  # number of nodes, while a user's function makes them
         self._table: dict[Hashable, Node] = {}
 
     def _intern(
@@ -88,6 +90,8 @@ class Graph:
                     )
                 loop = arg.loop
         node = Node(self, op, args, data, flags, loop)
+        if self.limit is not None and node.id >= self.limit:
+            limits.check(f"{users_line()}: this", "OPERATIONS", node.id + 1, limits.WRITTEN_OUT)
         self.nodes.append(node)
         self._table[key] = node
         return node

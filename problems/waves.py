@@ -70,6 +70,7 @@ def sine_gordon(*, n: int = 200, gamma: float = 1.5, length: float = 40.0, t_end
         For values out of range.
     """
     given.whole("sine_gordon", 3, n=n)
+    given.size("sine_gordon", 2 * n, n=n)
     given.positive("sine_gordon", gamma=gamma, length=length)
     given.finite("sine_gordon", t_end=t_end)
     return Problem(
@@ -124,6 +125,7 @@ def nonlinear_wave(
         For values out of range.
     """
     given.whole("nonlinear_wave", 3, n=n)
+    given.size("nonlinear_wave", 2 * n, n=n)
     given.finite("nonlinear_wave", mass=mass, kappa=kappa, amplitude=amplitude, t_end=t_end)
 
     def potential(u: Any, par: Any, m: Any) -> Any:

@@ -1,5 +1,6 @@
 """The command ``hbvm-bench plugins``."""
 
+import math
 from typing import Annotated
 
 import typer
@@ -17,8 +18,10 @@ def plugins(
 
     ``leak`` shows the energy of DOP853 and of HBVM in the same call of ``solve_ivp``.
     """
-    if rounds < 1 or not span > 0.0:
-        raise InputError(f"plugins needs rounds >= 1 and span > 0, not rounds={rounds}, span={span:g}.")
+    if rounds < 1 or not 0.0 < span < math.inf:
+        raise InputError(
+            f"plugins needs rounds >= 1 and a finite span > 0, not rounds={rounds}, span={span:g}."
+        )
     if host == "leak":
         print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
         for t, errors in plugin_costs.leak(span):

@@ -12,6 +12,7 @@ from hbvm_bench import executors, runner, serial, supervise, terminal
 from hbvm_bench.campaign import Campaign, Grid, MethodEntry, load
 from hbvm_bench.estimate import Estimate
 from hbvm_bench.execute import InterruptedRunError
+from hbvm_bench.executors import Pool
 from hbvm_bench.identity import Resolved, make_method
 from hbvm_bench.live import Live
 from hbvm_bench.store import Index, Store, ensure_writable
@@ -50,29 +51,36 @@ def run(
     campaign = _campaign(name, problem, method, step)
     cases = runner.plan(campaign)
     store = Store(out or Path("runs") / campaign.name)
-    store.prepare()
-    if report_to is not None:
-        ensure_writable(report_to, keep=False)
-    with store.locked():
-        index = Index(
-            campaign=campaign,
-            ids=[case.id for case in cases],
-            version=version("hbvm-bench"),
-            command=_command(name, problem, method, step),
-        )
-        store.write_index(index)
-        try:
-            _run(campaign, cases, store, executor, jobs, timing)
-        except (KeyboardInterrupt, InterruptedRunError):
-            raise _given_up("interrupted", cases, store, INTERRUPTED) from None
-        except runner.UnfinishedRunError as error:
-            raise _given_up(str(error), cases, store, UNFINISHED) from None
+    with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
+        if report_to is not None:
+            ensure_writable(report_to, keep=False)
+        store.prepare()
+        _measure(campaign, cases, store, pool, timing, _command(name, problem, method, step))
     terminal.print_results(store.records())
     if report_to is not None:
         from hbvm_bench.report.write import write_report
 
         for path in write_report(store, report_to):
             print(path)
+
+
+def _measure(
+    campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool, command: str
+) -> None:
+    with store.locked():
+        index = Index(
+            campaign=campaign,
+            ids=[case.id for case in cases],
+            version=version("hbvm-bench"),
+            command=command,
+        )
+        store.write_index(index)
+        try:
+            _run(campaign, cases, store, pool, timing)
+        except (KeyboardInterrupt, InterruptedRunError):
+            raise _given_up("interrupted", cases, store, INTERRUPTED) from None
+        except runner.UnfinishedRunError as error:
+            raise _given_up(str(error), cases, store, UNFINISHED) from None
 
 
 def _given_up(why: str, cases: list[Resolved], store: Store, code: int) -> typer.Exit:
@@ -115,12 +123,10 @@ def _command(
     return shlex.join(words)
 
 
-def _run(
-    campaign: Campaign, cases: list[Resolved], store: Store, executor: str, jobs: int | None, timing: bool
-) -> None:
+def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool) -> None:
     supervise.allow()
     missing = [case for case in cases if not runner.is_kept(case, store, campaign.limits)]
-    with Live() as live, executors.opened(executor, jobs) as pool:
+    with Live() as live:
         try:
             estimate = Estimate(_known_seconds(store, missing), campaign.limits.wall_seconds)
             ids = [case.id for case in missing]

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.protocol import Array
-from problems.errors import InputError
+from problems.calls import Called
+from problems.errors import InputError, shown
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Called):
     """Where ``g`` vanishes along the trajectory.
 
     Parameters
@@ -50,20 +51,30 @@ class Event:
 
     def __post_init__(self) -> None:
         if not callable(self.g):
-            raise InputError(f"an event needs a function g, not {self.g!r}.")
-        if self.direction not in (-1, 0, 1):
-            raise InputError(f"direction={self.direction!r} of an event must be 1, -1 or 0 (both).")
-        try:
-            last = operator.index(self.terminal)
-        except TypeError:
-            last = -1
-        if last < 0:
-            raise InputError(f"terminal={self.terminal!r} of an event must be True, False, or a count >= 1.")
+            raise InputError(f"an event needs a function g, not {shown(self.g)}.")
+        if _whole(self.direction) not in (-1, 0, 1):
+            raise InputError(f"direction={shown(self.direction)} of an event must be 1, -1 or 0 (both).")
+        object.__setattr__(self, "direction", _whole(self.direction))
+        last = _whole(self.terminal)
+        if last is None or not 0 <= last < 2**63:
+            raise InputError(
+                f"terminal={shown(self.terminal)} of an event must be True, False, or a count >= 1."
+            )
+        if self.name is not None and not (isinstance(self.name, str) and self.name):
+            raise InputError(f"name={shown(self.name)} of an event must be a text.")
 
     @property
     def last(self) -> int:
         """The occurrence that ends the integration; 0: none."""
         return int(self.terminal)
+
+
+def _whole(value: Any) -> int | None:
+    """Return a whole number as an int, also one of NumPy's; ``None`` for anything else."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        return int(value) if isinstance(value, float | np.bool_) and value in (-1.0, 0.0, 1.0) else None
 
 
 @dataclass(frozen=True, eq=False)

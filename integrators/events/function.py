@@ -38,12 +38,17 @@ class EventFunction:
         try:
             function = problem.system.trace(g, what)
         except InputError as refused:
+            value: Any = np.nan
             try:
                 self._one = _caller(g, problem)
                 with np.errstate(all="ignore"):
-                    float(self._one(problem.t0, problem.y0.copy()))
+                    value = self._one(problem.t0, problem.y0.copy())
             except UNDEFINED:
                 pass
+            except Exception:
+                raise refused from None
+            try:
+                float(value)
             except Exception:
                 raise refused from None
             self.traced = False

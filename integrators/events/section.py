@@ -8,9 +8,10 @@ import numpy as np
 from integrators.events.event import Event, named
 from integrators.events.search import search
 from integrators.integrate import Solution, check
-from integrators.protocol import MethodBase
+from integrators.options import whole
+from integrators.protocol import MethodBase, as_numbers
 from problems import Problem
-from problems.errors import InputError
+from problems.errors import InputError, shown
 
 
 def section(
@@ -58,14 +59,16 @@ def section(
     (3, 4)
     """
     check(problem, method)
-    end = problem.t_end if t_end is None else float(t_end)
-    if not np.isfinite(end) or end == problem.t0:
-        raise InputError(f"t_end={t_end!r} of a section must be a finite time other than t0={problem.t0!r}.")
-    if count is not None and (not isinstance(count, int | np.integer) or count < 1):
-        raise InputError(f"count={count!r} of a section must be a whole number of at least 1.")
+    end = as_numbers("t_end of a section", problem.t_end if t_end is None else t_end)
+    if end.ndim or not np.isfinite(end) or end == problem.t0:
+        raise InputError(
+            f"t_end={shown(t_end)} of a section must be a finite time other than t0={problem.t0!r}."
+        )
+    if count is not None:
+        count = whole("a section", "count", count)
     program = method.compile(problem.system)
     events = named(Event(g, direction=direction, terminal=int(count or 0), name="section"))
-    found = search(problem, method, program, events, end)
+    found = search(problem, method, program, events, float(end))
     passages = found.events["section"]
     return Solution(
         t=passages.t,

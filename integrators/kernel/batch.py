@@ -19,8 +19,10 @@ from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
-from integrators.protocol import Array, Status, check_state, check_times
+from integrators.options import whole
+from integrators.protocol import Array, Status, as_numbers, check_state, check_times
 from integrators.trajectories import Trajectories
+from problems import limits
 from problems.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -65,10 +67,13 @@ def run_batch(
     threads: int,
 ) -> Batch:
     """Integrate every start to all times; see `HBVMProgram.batch`."""
-    if sample is not None and sample not in SAMPLINGS:
-        raise unknown("sampling of a batch", str(sample), SAMPLINGS)
-    starts, parameters = _starts(program, Y0, par)
+    if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
+        raise unknown("sampling of a batch", sample, SAMPLINGS)
+    threads = whole("a batch", "threads", threads)
     grid = check_times(times, t0)
+    rows = np.atleast_2d(as_numbers("Y0", Y0))
+    limits.check(f"a batch of {len(rows)} trajectories", "GIB", 8 * grid.size * rows.size / 2**30)
+    starts, parameters = _starts(program, rows, par)
     h = -program.h if grid[-1] < t0 else program.h
     bases = np.full(grid.size, t0)
     if sample == "land":
@@ -85,6 +90,7 @@ def run_batch(
         return result
     size = min(n, members_for(program.shape.rows, program.constants.route))
     groups = [range(first, min(first + size, n)) for first in range(0, n, size)]
+    threads = min(threads, len(groups))
     work.share(work.run, [groups[i::threads] for i in range(threads)], threads)
     return result
 
@@ -190,15 +196,14 @@ class _Work:
             result.status[i], result.reason[i] = failure(int(words[layout.OUTCOME]), t, reals)
 
 
-def _starts(program: "HBVMProgram", Y0: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
+def _starts(program: "HBVMProgram", rows: Array, par: ArrayLike | None) -> tuple[Array, Array]:
     """Check starts and parameters; return them as arrays (n, dim) and (n, parameters)."""
-    rows = np.atleast_2d(np.asarray(Y0, dtype=np.float64))
     if rows.ndim != 2 or rows.shape[0] == 0:
         raise InputError(f"Y0 must have shape (n, {program.system.dim}) with n >= 1, not {rows.shape}.")
     starts = np.array([check_state(row, program.system.dim) for row in rows])
-    if par is None or np.ndim(par) == 1:
-        return starts, np.tile(program.parameters(par), (starts.shape[0], 1))
-    given = np.asarray(par, dtype=np.float64)
+    given = None if par is None else as_numbers("par", par)
+    if given is None or given.ndim == 1:
+        return starts, np.tile(program.parameters(given), (starts.shape[0], 1))
     if given.shape != (starts.shape[0], program.system.n_par):
         raise InputError(
             f"par must have shape ({program.system.n_par},) or ({starts.shape[0]}, {program.system.n_par}), "

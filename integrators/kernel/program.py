@@ -12,7 +12,7 @@ from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Worksp
 from integrators.kernel.implicit.workspace import solver as implicit_solver
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.workspace import Context, Shape
-from integrators.protocol import Array, check_state
+from integrators.protocol import Array, as_numbers, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
@@ -106,7 +106,7 @@ class HBVMProgram:
         problems.errors.InputError
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
-        return HBVMStepper(self, check_state(y0, self.system.dim), self.parameters(par), float(t0))
+        return HBVMStepper(self, check_state(y0, self.system.dim), self.parameters(par), check_start(t0))
 
     def batch(
         self,
@@ -142,7 +142,7 @@ class HBVMProgram:
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        return run_batch(self, Y0, par, times, float(t0), sample, threads)
+        return run_batch(self, Y0, par, times, check_start(t0), sample, threads)
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
@@ -162,9 +162,10 @@ class HBVMProgram:
         """
         values = self.system.pack()
         if par is not None:
-            if np.shape(par) != values.shape:
-                raise InputError(f"par must have shape {values.shape}, not {np.shape(par)}; see system.pack.")
-            values[:] = par
+            given = as_numbers("par", par)
+            if given.shape != values.shape:
+                raise InputError(f"par must have shape {values.shape}, not {given.shape}; see system.pack.")
+            values[:] = given
         return values
 
     def scaled(self, h: float) -> dict[str, Array]:

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.options import load
-from integrators.protocol import Array, Status, check_state, check_times
+from integrators.protocol import Array, Status, as_numbers, check_state, check_times
 from integrators.trajectories import Counts, Trajectories
-from problems import emit
+from problems import emit, limits
 from problems.errors import InputError
 from problems.system import System
 
@@ -44,6 +44,8 @@ class Lanes:
         given, parameters = self._given(starts, par)
         grid = check_times(times, t0)
         n = len(given)
+        gib = 8 * given.size * grid.size / 2**30
+        limits.check(f"a batch of {n} trajectories", "GIB", gib)
         result = Trajectories(
             t=grid,
             y=np.full((n, grid.size, self.system.dim), np.nan),
@@ -116,12 +118,12 @@ class Lanes:
         ta.set_dtime(high, low)
 
     def _given(self, starts: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
-        rows = np.atleast_2d(np.asarray(starts, dtype=np.float64))
+        rows = np.atleast_2d(as_numbers("Y0", starts))
         if rows.ndim != 2 or rows.shape[0] == 0:
             raise InputError(f"Y0 must have shape (n, {self.system.dim}) with n >= 1, not {rows.shape}.")
         checked = np.array([check_state(row, self.system.dim) for row in rows])
         default = self.system.pack({})
-        values = np.asarray(default if par is None else par, dtype=np.float64)
+        values = default if par is None else as_numbers("par", par)
         if values.shape == default.shape:
             return checked, np.tile(values, (len(checked), 1))
         if values.shape != (len(checked), default.size):

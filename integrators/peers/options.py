@@ -2,11 +2,13 @@
 
 import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from importlib import import_module
 from types import ModuleType
 
-from problems.errors import InputError, MissingLibraryError, unknown
+import numpy as np
+
+from problems.errors import InputError, MissingLibraryError, shown, unknown
 
 UNTRACED = "it needs the field as a formula, not as a function; write it as a VectorField or Hamiltonian."
 """Why libraries that take expressions refuse a `problems.Foreign`."""
@@ -49,11 +51,11 @@ def number(
     value = getattr(method, name)
     try:
         given = math.nan if isinstance(value, (bool, str)) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = math.nan
     if not least <= given < below or (strict and given == least):
         bounds = f"{least:g} {'<' if strict else '<='} {name} < {below:g}"
-        raise InputError(f"{type(method).__name__} needs a number {bounds}, not {name}={value!r}.")
+        raise InputError(f"{type(method).__name__} needs a number {bounds}, not {name}={shown(value)}.")
     object.__setattr__(method, name, given)
 
 
@@ -61,18 +63,18 @@ def flag(method: object, *names: str) -> None:
     """Make the options ``names`` of a frozen method True or False, or refuse them."""
     for name in names:
         value = getattr(method, name)
-        if not isinstance(value, bool) and value not in (0, 1):
+        if not isinstance(value, bool | np.bool_) and not (isinstance(value, int) and value in (0, 1)):
             raise InputError(
-                f"{type(method).__name__} needs {name}=True or {name}=False, not {name}={value!r}."
+                f"{type(method).__name__} needs {name}=True or {name}=False, not {name}={shown(value)}."
             )
         object.__setattr__(method, name, bool(value))
 
 
-def choice(method: object, name: str, known: Iterable[str]) -> None:
+def choice(method: object, name: str, known: Collection[str]) -> None:
     """Require the option ``name`` of a method to be one of ``known``; the nearest are named otherwise."""
     value = getattr(method, name)
-    if value not in (names := tuple(known)):
-        raise unknown(f"{name} of {type(method).__name__}", str(value), names)
+    if not isinstance(value, str) or value not in known:
+        raise unknown(f"{name} of {type(method).__name__}", value, known)
 
 
 def whole_choice(method: object, name: str, known: Iterable[int]) -> None:
@@ -84,6 +86,7 @@ def whole_choice(method: object, name: str, known: Iterable[int]) -> None:
         given = None
     if given not in (allowed := tuple(known)):
         raise InputError(
-            f"{type(method).__name__} offers {name} in {', '.join(map(str, allowed))}, not {name}={value!r}."
+            f"{type(method).__name__} offers {name} in {', '.join(map(str, allowed))}, "
+            f"not {name}={shown(value)}."
         )
     object.__setattr__(method, name, given)

@@ -10,7 +10,16 @@ from numpy.typing import ArrayLike
 from integrators.checkpoints import Identity
 from integrators.grid import plan
 from integrators.one_thread import one_thread
-from integrators.protocol import Array, MethodBase, Samples, Stats, Status, check_state, check_times
+from integrators.protocol import (
+    Array,
+    MethodBase,
+    Samples,
+    Stats,
+    Status,
+    check_start,
+    check_state,
+    check_times,
+)
 from problems.errors import InputError, unknown
 from problems.problem import System
 
@@ -45,7 +54,7 @@ class PeerProgram:
             raise InputError(f"par must have shape {default.shape}, not {values.shape}.")
         if not np.isfinite(t0):
             raise InputError(f"t0 must be a finite number, not {t0!r}.")
-        return check_state(y0, self.system.dim), values, float(t0)
+        return check_state(y0, self.system.dim), values, check_start(t0)
 
 
 @dataclass(frozen=True, eq=False)

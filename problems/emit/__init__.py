@@ -10,6 +10,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from problems import limits
+from problems.differentiate import reachable
 from problems.emit import cache
 from problems.emit.array import jax_text, numpy_text
 from problems.emit.plan import SMALL, make_plan
@@ -22,6 +24,8 @@ from problems.hamiltonian import System
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
+SLOW = 10  # operations that take as long to compile as one of:
+_SLOW = ("sin", "cos", "tan", "exp", "log")
 _NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
 
 import numba
@@ -163,6 +167,7 @@ def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
     """
     if isinstance(system, Foreign) and what == "field":
         return system.evaluate
+    compilable(system, what)
     made = source(system, what, "numba", limit=limit)
     key = ("numba", made.sha256)
     if key not in _compiled:
@@ -171,6 +176,27 @@ def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
         text = _NUMBA_HEAD + made.text[:cut] + "\n" + decorator + made.text[cut:]
         _compiled[key] = getattr(cache.module(text, made.name), made.name)
     return _compiled[key]
+
+
+def compilable(system: System, what: str) -> None:
+    """Refuse a function that would be compiled for minutes; see `problems.limits`.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For too many operations, or too many that wait for one another.
+    """
+    function = system.function(what)
+    roots = [term.node for terms in function.outputs for term in terms]
+    roots += [entry.node for _, entries in function.loops for entry in entries]
+    nodes = reachable(roots)
+    cost = sum(SLOW if node.op in _SLOW else 1 for node in nodes)
+    name = f"the {what} of {system.name}"
+    limits.check(f"{name}, with each sine or exponential as {SLOW},", "OPERATIONS", cost, limits.WRITTEN_OUT)
+    depth: dict[int, int] = {}
+    for node in nodes:  # arguments come first
+        depth[node.id] = 1 + max((depth[arg.id] for arg in node.args), default=0)
+    limits.check(name, "DEPTH", max(depth.values(), default=0), "nest fewer, or write long sums with m.sum")
 
 
 def jax(system: System, what: str, *, limit: int | None = SMALL) -> Callable[..., Any]:
@@ -234,6 +260,7 @@ __all__ = [
     "BACKENDS",
     "SMALL",
     "Source",
+    "compilable",
     "function_name",
     "heyoka",
     "jax",

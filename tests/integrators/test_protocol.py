@@ -48,7 +48,7 @@ def test_options_of_equal_value_make_equal_methods_that_print_alike():
 
 
 def test_positional_options_are_refused():
-    with pytest.raises(TypeError):
+    with pytest.raises(InputError, match="by name"):
         HBVM(4, 2, 0.1)
 
 

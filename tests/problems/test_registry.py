@@ -36,9 +36,7 @@ def test_a_name_that_two_offer_is_refused_with_both(offered):
         entry("kepler", "guest.orbits:kepler", "hbvm-guest"),
         entry("pendulum", "problems.pendulum:pendulum", "hbvm-bench"),
     ]
-    with pytest.raises(
-        InputError, match=r"offered by hbvm-bench \(.*\) and hbvm-guest \(.*\); un"
-    ):
+    with pytest.raises(InputError, match=r"offered by hbvm-bench \(.*\) and hbvm-guest \(.*\); un"):
         registry.load("kepler")
     assert registry.names() == ["kepler", "pendulum"]
     assert registry.load("pendulum").system.name == "pendulum"

@@ -15,6 +15,7 @@ from integrators.kernel.implicit.factors import Factors
 from integrators.kernel.tables import aligned, packed
 from integrators.kernel.workspace import Shape
 from problems import emit
+from problems.errors import InputError
 from problems.jacobian import Jacobian, jacobian
 from problems.system import System
 
@@ -79,6 +80,10 @@ def linearization(system: System, *, second: bool) -> Linearization:
     what = "jacobian:force" if second else "jacobian"
     found = jacobian(system, what)
     if found is None:
+        return Linearization(None, None)
+    try:
+        emit.compilable(system, what)
+    except InputError:  # differences take the field alone
         return Linearization(None, None)
     text = emit.source(system, what, "numba").text
     name = store.key("jacobian", text, native.sources(*fields.SOURCES))

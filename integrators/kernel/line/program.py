@@ -15,7 +15,7 @@ from integrators.kernel.line.dependence import independent
 from integrators.kernel.line.stepper import LineStepper
 from integrators.kernel.program import blocks
 from integrators.legendre import tables
-from integrators.protocol import Array, check_state
+from integrators.protocol import Array, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
@@ -98,7 +98,7 @@ class LineProgram:
             if np.shape(par) != values.shape:
                 raise InputError(f"par must have shape {values.shape}, not {np.shape(par)}; see system.pack.")
             values[:] = par
-        return LineStepper(self, check_state(y0, self.system.dim), values, float(t0))
+        return LineStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def memory(self, y: Array, par: Array, t0: float) -> tuple[list[int], dict[str, Any]]:
         """Return a trajectory's sizes and arrays, as in `layout`."""

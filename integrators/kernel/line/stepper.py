@@ -141,8 +141,8 @@ class LineStepper:
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
-        if sample is not None and sample not in SAMPLINGS:
-            raise unknown("sampling", str(sample), SAMPLINGS)
+        if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
+            raise unknown("sampling", sample, SAMPLINGS)
         grid = check_times(times, self.t)
         if self._status.failed:
             return Samples(grid[:0], np.empty((0, self._m["y"].size)), self._status, self._reason)

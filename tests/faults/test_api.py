@@ -1,0 +1,321 @@
+"""What is wrong with methods, events and calls of integrate, and what is said about it."""
+
+import copy
+import dataclasses
+import inspect
+import pickle
+
+import pytest
+
+from integrators import HBVM, Gauss
+from problems.errors import InputError
+
+from .fault import Fault, is_met
+from .typed import faults, names
+
+OURS = r"""
+HBVM(1, 2)                                                   | HBVM takes its options by name, not 1; write
+HBVM(kk=3)                                                   | unknown option of HBVM 'kk'; did you mean
+HBVM(k=4, s=2, step=.1)                                      | unknown option of HBVM 'step'; known: h, k,
+Gauss(h=.1)                                                  | Gauss needs s; give a value as in
+HBVM(k='4', s=2, h=.1)                                       | HBVM needs a whole number k >= 1, not k='4'
+HBVM(k=4.0, s=2, h=.1)                                       | HBVM needs a whole number k >= 1, not k=4.0
+HBVM(k=True, s=True, h=.1)                                   | HBVM needs a whole number s >= 1, not s=True
+HBVM(k=[4], s=2, h=.1)                                       | HBVM needs a whole number k >= 1, not k=[4]
+HBVM(k=np.array([4]), s=2, h=.1)                             | HBVM needs a whole number k >= 1, not
+HBVM(k=nan, s=2, h=.1)                                       | HBVM needs a whole number k >= 1, not k=nan
+HBVM(k=-4, s=2, h=.1)                                        | HBVM needs a whole number k >= 1, not k=-4
+HBVM(k=0, s=0, h=.1)                                         | HBVM needs a whole number s >= 1, not s=0
+HBVM(k=2000, s=2, h=.1)                                      | HBVM_BENCH_MAX_STAGES
+HBVM(k=huge, s=2, h=.1)                                      | HBVM_BENCH_MAX_STAGES
+HBVM(k=4, s=2, h='0.1')                                      | HBVM needs a finite step h > 0, not h='0.1';
+HBVM(k=4, s=2, h=nan)                                        | HBVM needs a finite step h > 0, not h=nan;
+HBVM(k=4, s=2, h=inf)                                        | HBVM needs a finite step h > 0, not h=inf;
+HBVM(k=4, s=2, h=-.1)                                        | HBVM needs a finite step h > 0, not h=-0.1;
+HBVM(k=4, s=2, h=0)                                          | HBVM needs a finite step h > 0, not h=0; the
+HBVM(k=4, s=2, h=True)                                       | HBVM needs a finite step h > 0, not h=True;
+HBVM(k=4, s=2, h=huge)                                       | HBVM needs a finite step h > 0, not h=about
+HBVM(k=4, s=2, h=[.1])                                       | HBVM needs a finite step h > 0, not h=[0.1];
+HBVM(k=4, s=2, h=np.array([.1, .2]))                         | HBVM needs a finite step h > 0, not
+HBVM(k=4, s=2, h=np.array([.1]))                             | HBVM needs a finite step h > 0, not
+HBVM(k=4, s=2, h=1j)                                         | HBVM needs a finite step h > 0, not h=1j; the
+HBVM(k=4, h=.1)                                              | HBVM needs k and s, or neither of them; give
+HBVM(h=.1)                                                   | HBVM needs k and s with a fixed step, h=0.1;
+HBVM(tol=0)                                                  | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=1)                                                  | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=-1e-9)                                              | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=1e-17)                                              | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol='1e-9')                                             | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=nan)                                                | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=huge)                                               | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(tol=[1e-9])                                             | HBVM needs a tolerance 2.2e-16 <= tol < 1,
+HBVM(k=1, s=1, tol=1e-9)                                     | HBVM needs k > 1 with a tolerance: one stage
+HBVM(solver='newtn')                                         | unknown solver 'newtn'; did you mean
+HBVM(solver=None)                                            | unknown solver None; known: auto, blended,
+HBVM(solver=3)                                               | unknown solver 3; known: auto, blended,
+HBVM(solver=['newton'])                                      | unknown solver ['newton']; did you mean
+HBVM(solver=np.array([1,2]))                                 | unknown solver array([1, 2]); known: auto,
+HBVM(solver={})                                              | unknown solver {}; known: auto, blended,
+HBVM(k=2, s=3, h=.1)                                         | HBVM needs k >= s; k=2 is less than s=3:
+Gauss(s=2)                                                   | Gauss needs a step h, or a tolerance tol for
+Gauss(s=0, h=.1)                                             | Gauss needs a whole number s >= 1, not s=0
+Gauss(s=2.5, h=.1)                                           | Gauss needs a whole number s >= 1, not s=2.5
+Gauss(s=300, h=.1)                                           | HBVM_BENCH_MAX_STAGES
+Gauss(s=1, tol=1e-6)                                         | Gauss needs k > 1 with a tolerance: one stage
+Gauss(s=2, h=.1, k=3)                                        | unknown option of Gauss 'k'; known: h, s,
+Gauss(s=2, h=.1, solver='x')                                 | unknown solver 'x'; known: auto, blended,
+Gauss(2, .1)                                                 | Gauss takes its options by name, not 2; write
+LineIntegral(k=4, s=2, h=.1)                                 | LineIntegral needs invariants; give a value
+LineIntegral(k=2, s=2, h=.1, invariants=['energy'])          | LineIntegral needs k > s, not k=2, s=2: 2
+LineIntegral(k=4, s=2, h=.1, invariants='energy')            | LineIntegral needs invariants as a list of
+LineIntegral(k=4, s=2, h=.1, invariants=[])                  | LineIntegral needs invariants as a list of
+LineIntegral(k=4, s=2, h=.1, invariants=[1])                 | LineIntegral needs invariants as a list of
+LineIntegral(k=4, s=2, h=.1, invariants=['energy', 'energy']) | LineIntegral needs different invariants, not
+LineIntegral(k=4, s=2, h=.1, invariants=None)                | LineIntegral needs invariants as a list of
+LineIntegral(k=4, s=2, invariants=['energy'])                | LineIntegral needs a step h, or a tolerance
+LineIntegral(k=400, s=2, h=.1, invariants=['energy'])        | HBVM_BENCH_MAX_STAGES
+"""
+
+PEERS = r"""
+Taylor(tol=0)                                                | Taylor needs a number 0 < tol < 1, not tol=0
+Taylor(tol=-1)                                               | Taylor needs a number 0 < tol < 1, not tol=-1
+Taylor(tol='a')                                              | Taylor needs a number 0 < tol < 1, not
+Taylor(tol=None)                                             | Taylor needs a number 0 < tol < 1, not
+Taylor(tol=nan)                                              | Taylor needs a number 0 < tol < 1, not
+Taylor(tol=huge)                                             | Taylor needs a number 0 < tol < 1, not
+Taylor(tol=1e-15, compact_mode='yes')                        | Taylor needs compact_mode=True or
+Taylor(tol=1e-15, compact_mode=None)                         | Taylor needs compact_mode=True or
+Taylor(high_accuracy=2)                                      | Taylor needs high_accuracy=True or
+Taylor(fast_math=np.array([1,0]))                            | Taylor needs fast_math=True or
+Taylor(fast_math=[])                                         | Taylor needs fast_math=True or
+Taylor(toll=1)                                               | unknown option of Taylor 'toll'; did you mean
+Taylor(1e-15)                                                | Taylor takes its options by name, not 1e-15;
+IAS15(epsilon=-1)                                            | IAS15 needs a number 0 <= epsilon < inf, not
+IAS15(epsilon='x')                                           | IAS15 needs a number 0 <= epsilon < inf, not
+IAS15(epsilon=nan)                                           | IAS15 needs a number 0 <= epsilon < inf, not
+IAS15(mode='globl')                                          | unknown mode of IAS15 'globl'; did you mean
+IAS15(mode=1)                                                | unknown mode of IAS15 1; known: aarseth85,
+IAS15(mode=np.array(['global','prs23']))                     | unknown mode of IAS15 array(['global',
+IAS15(min_dt=-1)                                             | IAS15 needs a number 0 <= min_dt < inf, not
+IAS15(min_dt=inf)                                            | IAS15 needs a number 0 <= min_dt < inf, not
+IAS15(h=-1)                                                  | IAS15 needs a number 0 < h < inf, not h=-1
+IAS15(h='a')                                                 | IAS15 needs a number 0 < h < inf, not h='a'
+IAS15(h=huge)                                                | IAS15 needs a number 0 < h < inf, not h=about
+IAS15(epsilom=1)                                             | unknown option of IAS15 'epsilom'; did you
+WHFast()                                                     | WHFast needs h; give a value as in
+WHFast(h=0)                                                  | WHFast needs a number 0 < h < inf, not h=0
+WHFast(h=nan)                                                | WHFast needs a number 0 < h < inf, not h=nan
+WHFast(h=.1, coordinates='jakobi')                           | unknown coordinates of WHFast 'jakobi'; did
+WHFast(h=.1, coordinates=None)                               | unknown coordinates of WHFast None; known:
+WHFast(h=.1, corrector=4)                                    | WHFast offers corrector in 0, 3, 5, 7, 11,
+WHFast(h=.1, corrector='3')                                  | WHFast offers corrector in 0, 3, 5, 7, 11,
+WHFast(h=.1, corrector=3.0)                                  | WHFast offers corrector in 0, 3, 5, 7, 11,
+WHFast(h=.1, corrector=True)                                 | WHFast offers corrector in 0, 3, 5, 7, 11,
+WHFast(h=.1, corrector2='yes')                               | WHFast needs corrector2=True or
+WHFast(h=.1, kernel='lzy')                                   | unknown kernel of WHFast 'lzy'; did you mean
+WHFast(h=.1, kernel='lazy', coordinates='whds')              | WHFast has kernel='lazy' in
+WHFast(h=.1, corrector2=True, coordinates='whds')            | WHFast has corrector2=True in
+WHFast(h=.1, body_order=3)                                   | body_order must name each body from 0 once,
+WHFast(h=.1, body_order=[0, 0])                              | body_order must name each body from 0 once,
+WHFast(h=.1, body_order='abc')                               | body_order must name each body from 0 once,
+WHFast(h=.1, body_order=[0.5, 1])                            | body_order must name each body from 0 once,
+WHFast(h=.1, body_order=[])                                  | body_order must name each body from 0 once,
+WHFast(h=.1, body_order=[1, 2])                              | body_order must name each body from 0 once,
+WHFast512(h='a')                                             | WHFast512 needs a number 0 < h < inf, not
+WHFast512(h=.1, corrector=1)                                 | WHFast512 offers corrector in 0, 17, not
+WHFast512(h=.1, corrector=-3)                                | WHFast512 offers corrector in 0, 17, not
+Leapfrog(h=.1, order=3)                                      | Leapfrog offers order in 2, 4, 6, 8, not
+Leapfrog(h=.1, order='2')                                    | Leapfrog offers order in 2, 4, 6, 8, not
+Leapfrog(h=.1, order=None)                                   | Leapfrog offers order in 2, 4, 6, 8, not
+Leapfrog(h=None)                                             | Leapfrog needs a number 0 < h < inf, not
+Leapfrog()                                                   | Leapfrog needs h; give a value as in
+LeapfrogMidpoint(h=nan)                                      | LeapfrogMidpoint needs a number 0 < h < inf,
+ReversibleHeun(h=-.1)                                        | ReversibleHeun needs a number 0 < h < inf,
+SemiImplicitEuler(h='1')                                     | SemiImplicitEuler needs a number 0 < h < inf,
+DOP853()                                                     | DOP853 needs rtol, atol; give a value as in
+DOP853(rtol=1e-9)                                            | DOP853 needs atol; give a value as in
+DOP853(rtol=0, atol=0)                                       | DOP853 needs a number 0 < rtol < 1, not
+DOP853(rtol=-1, atol=1)                                      | DOP853 needs a number 0 < rtol < 1, not
+DOP853(rtol='a', atol=1e-9)                                  | DOP853 needs a number 0 < rtol < 1, not
+DOP853(rtol=1e-9, atol=nan)                                  | DOP853 needs a number 0 <= atol < inf, not
+DOP853(rtol=1e-9, atol=[1e-9,1e-9])                          | DOP853 needs a number 0 <= atol < inf, not
+DOP853(rtol=1e-20, atol=1e-9)                                | rtol=1e-20 is below what SciPy attains (100
+DOP853(rtol=inf, atol=1e-9)                                  | DOP853 needs a number 0 < rtol < 1, not
+Radau(rtol=1e-9, atol=None)                                  | Radau needs a number 0 <= atol < inf, not
+Radau(rtol=1e-9, atol=1e-9, max_step=1)                      | unknown option of Radau 'max_step'; known:
+Dopri8()                                                     | Dopri8 needs either h, as in Dopri8(h=0.1),
+Dopri8(h=.1, rtol=1e-9)                                      | Dopri8 needs either h, as in Dopri8(h=0.1),
+Dopri8(rtol=1e-9)                                            | Dopri8 needs either h, as in Dopri8(h=0.1),
+Dopri8(h='a')                                                | Dopri8 needs a number 0 < h < inf, not h='a'
+Dopri8(rtol=2, atol=huge)                                    | Dopri8 needs a number 0 < rtol < 1, not
+"""
+
+CALLS = r"""
+registry.create('HBVN')                                      | unknown method 'HBVN'; did you mean 'HBVM'?
+registry.create('HBVM', kk=3)                                | unknown option of HBVM 'kk'; did you mean
+registry.create('Gauss')                                     | Gauss needs s; give a value as in
+registry.create(3)                                           | unknown method 3; known: DOP853, Dopri8,
+registry.create(None)                                        | unknown method None; known: DOP853, Dopri8,
+registry.get([1])                                            | unknown method [1]; known: DOP853, Dopri8,
+Event(3)                                                     | an event needs a function g, not 3
+Event(None)                                                  | an event needs a function g, not None
+Event()                                                      | Event needs g; give a value as in
+Event(osc, 1)                                                | Event takes only g by place and the rest by
+Event(osc, direction=2)                                      | direction=2 of an event must be 1, -1 or 0
+Event(osc, direction='up')                                   | direction='up' of an event must be 1, -1 or 0
+Event(osc, direction=np.array([1, 0]))                       | direction=array([1, 0]) of an event must be
+Event(osc, direction=None)                                   | direction=None of an event must be 1, -1 or 0
+Event(osc, direction=nan)                                    | direction=nan of an event must be 1, -1 or 0
+Event(osc, direction=huge)                                   | direction=about 1e400 of an event must be 1,
+Event(osc, terminal=-1)                                      | terminal=-1 of an event must be True, False,
+Event(osc, terminal='yes')                                   | terminal='yes' of an event must be True,
+Event(osc, terminal=1.5)                                     | terminal=1.5 of an event must be True, False,
+Event(osc, terminal=None)                                    | terminal=None of an event must be True,
+Event(osc, terminal=huge)                                    | terminal=about 1e400 of an event must be
+Event(osc, name=3)                                           | name=3 of an event must be a text
+Event(osc, name='')                                          | name='' of an event must be a text
+Event(osc, dirction=1)                                       | unknown option of Event 'dirction'; did you
+integrate(P1, 'HBVM')                                        | method must be a method such as HBVM(k=8,
+integrate('kepler', M1)                                      | problem must be a Problem, not 'kepler'; make
+integrate(M1, P1)                                            | problem must be a Problem, not HBVM(k=4, s=2,
+integrate(P1, HBVM)                                          | method must be a method such as HBVM(k=8,
+integrate(problems.load, M1)                                 | problem must be a Problem, not <function
+integrate(P1, M1, times='abc')                               | times must be numbers, not 'abc'
+integrate(P1, M1, times=[0, nan])                            | times must be finite numbers
+integrate(P1, M1, times=[0, inf])                            | times must be finite numbers
+integrate(P1, M1, times=[0, 1, 1])                           | times must be strictly monotone and ahead of
+integrate(P1, M1, times=[1, 0])                              | times must be strictly monotone and ahead of
+integrate(P1, M1, times=[0, 1, .5])                          | times must be strictly monotone and ahead of
+integrate(P1, M1, times=[[0, 1]])                            | times must be a non-empty one-dimensional
+integrate(P1, M1, times=[[0], [1, 2]])                       | times must be numbers, not [[0], [1, 2]]
+integrate(P1, M1, times=[0, 1j])                             | times must be numbers, not [0, 1j]
+integrate(P1, M1, times=['a', 'b'])                          | times must be numbers, not ['a', 'b']
+integrate(P1, M1, times=huge)                                | times must be numbers, not about 1e400
+integrate(P1, M1, times=[0, huge])                           | times must be numbers, not [0,
+integrate(P1, M1, times={0, 1})                              | times must be numbers, not {0, 1}
+integrate(P1, M1, times=(i for i in range(3)))               | times must be numbers, not <generator object
+integrate(P1, M1, times=[None, 1])                           | times must be finite numbers
+integrate(P1, M1, times=P1)                                  | times must be numbers, not
+integrate(P1, M1, sample='sides')                            | unknown sampling 'sides'; did you mean 'side'
+integrate(P1, M1, sample=3)                                  | unknown sampling 3; known: dense, land, side,
+integrate(P1, M1, sample=['side'])                           | unknown sampling ['side']; did you mean
+integrate(P1, M1, sample=np.array([1,2]))                    | unknown sampling array([1, 2]); known: dense,
+integrate(P1, M1, events=3)                                  | an event needs a function g, not 3
+integrate(P1, M1, events='q[0]')                             | an event needs a function g, not 'q'
+integrate(P1, M1, events=None)                               | an event needs a function g, not None
+integrate(P1, M1, events=[None])                             | an event needs a function g, not None
+integrate(P1, M1, events={'a': osc})                         | an event needs a function g, not {'a':
+integrate(P1, M1, events=lambda q: 'a')                      | event 'event' returns 'a', which is not a
+integrate(P1, M1, events=lambda q: None)                     | event 'event' returns nothing; end it with a
+integrate(P1, M1, events=lambda q: [q[0], q[0]])             | event 'event' returns 2 values, not one
+integrate(P1, M1, events=lambda q: q[3])                     | q[3] does not exist; q has the indices 0 to 0
+integrate(P1, M1, events=Event)                              | <class 'integrators.events.event.Event'>:
+integrate(P1, M1, events=np.sin)                             | <ufunc 'sin'>: event 'sin' asks for an
+integrate(P1, M1, events=osc, sample='land')                 | events are those of the method's own steps,
+section(P1, M1, 3)                                           | an event needs a function g, not 3
+section(P1, M1, osc, direction=3)                            | direction=3 of an event must be 1, -1 or 0
+section(P1, M1, osc, count=0)                                | a section needs a whole number count >= 1,
+section(P1, M1, osc, count='a')                              | a section needs a whole number count >= 1,
+section(P1, M1, osc, count=True)                             | a section needs a whole number count >= 1,
+section(P1, M1, osc, count=1.5)                              | a section needs a whole number count >= 1,
+section(P1, M1, osc, count=huge)                             | terminal=about 1e400 of an event must be
+section(P1, M1, osc, t_end='a')                              | t_end of a section must be numbers, not 'a'
+section(P1, M1, osc, t_end=nan)                              | t_end=nan of a section must be a finite time
+section(P1, M1, osc, t_end=0.)                               | t_end=0.0 of a section must be a finite time
+section(P1, M1, osc, t_end=[1, 2])                           | t_end=[1, 2] of a section must be a finite
+section(P1, M1, osc, t_end=huge)                             | t_end of a section must be numbers, not about
+section(P1, 'HBVM', osc)                                     | method must be a method such as HBVM(k=8,
+integrate(F(lambda t, y: [1]), M1)                           | system returns an array of shape (1,), not
+integrate(F(lambda t, y: 'ab'), M1)                          | system returns 'ab', not 2 numbers
+integrate(F(lambda t, y: None), M1)                          | system returns an array of shape (), not
+integrate(F(lambda t, y: {}), M1)                            | system returns {}, not 2 numbers
+integrate(F(lambda t, y: [huge, 1]), M1)                     | system returns
+integrators.order_of(3)                                      | 3 is no Runge-Kutta method whose coefficients
+integrators.stability(3, 1)                                  | 3 is no Runge-Kutta method whose coefficients
+integrate(P1, M1, times=np.broadcast_to(0., 10**10))         | HBVM_BENCH_MAX_GIB
+"""
+
+STATES = r"""
+P1.invariants('a')                                           | states must be an array of numbers, not 'a'
+P1.invariants([1, 2, 3])                                     | states must have the shape (n, 2), not (3,)
+P1.invariants([[1, 2, 3]])                                   | states must have the shape (n, 2), not (1, 3)
+P1.invariants(None)                                          | states must have the shape (n, 2), not ()
+P1.invariants([[1, 2]], t='a')                               | t must be 1 times, not 'a'
+P1.invariants([[1, 2]], t=[1, 2])                            | t must be 1 times, one per state, not of
+P1.errors('a')                                               | states must be an array of numbers, not 'a'
+P1.guards([1])                                               | states must have the shape (n, 2), not (1,)
+P1.velocity([1, 2, 3])                                       | states must have the shape (n, 2), not (3,)
+P1.velocity('a')                                             | states must be an array of numbers, not 'a'
+M1.compile(H1).batch('a', times=[0, 1])                      | Y0 must be numbers, not 'a'
+M1.compile(H1).batch([[0, 1]], times='a')                    | times must be numbers, not 'a'
+M1.compile(H1).batch([[0, 1]], times=[0, 1], threads=0)      | a batch needs a whole number threads >= 1,
+M1.compile(H1).batch([[0, 1]], times=[0, 1], threads=-1)     | a batch needs a whole number threads >= 1,
+M1.compile(H1).batch([[0, 1]], times=[0, 1], threads=1.5)    | a batch needs a whole number threads >= 1,
+M1.compile(H1).batch([[0, 1]], times=[0, 1], threads=None)   | a batch needs a whole number threads >= 1,
+M1.compile(H1).batch([[0, 1]], times=[0, 1], threads='2')    | a batch needs a whole number threads >= 1,
+M1.compile(H1).batch([[0, 1]], times=[0, 1], sample='x')     | unknown sampling of a batch 'x'; known:
+M1.compile(H1).batch([[0, 1]], times=[0, 1], sample=['x'])   | unknown sampling of a batch ['x']; known:
+M1.compile(H1).batch([[0, 1]], [1.], times=[0, 1])           | par must have shape (0,), not (1,); see
+M1.compile(H1).batch([[0, 1]], 'a', times=[0, 1])            | par must be numbers, not 'a'
+M1.compile(H1).batch([[0, 1]], times=[0, 1], t0='a')         | t0 must be numbers, not 'a'
+M1.compile(H1).batch([[0, 1]], times=[0, 1], t0=nan)         | t0=nan must be one finite number
+M1.compile(H1).batch([[0, 1, 2]], times=[0, 1])              | the initial state must have shape (2,), not
+M1.compile(H1).batch([[nan, 1]], times=[0, 1])               | the initial state must be finite numbers;
+M1.compile(H1).batch([], times=[0, 1])                       | the initial state must have shape (2,), not
+M1.compile(H1).batch([[[0, 1]]], times=[0, 1])               | Y0 must have shape (n, 2) with n >= 1, not
+M1.compile(H1).batch(np.broadcast_to([0., 1.], (10**7, 2)), times=np.arange(200.)) | HBVM_BENCH_MAX_GIB
+M1.compile(H1).start('a')                                    | the initial state must be numbers, not 'a'
+M1.compile(H1).start([0, 1, 2])                              | the initial state must have shape (2,), not
+M1.compile(H1).start([0, nan])                               | the initial state must be finite numbers;
+M1.compile(H1).start([0, 1], 'a')                            | par must be numbers, not 'a'
+M1.compile(H1).start([0, 1], [1.])                           | par must have shape (0,), not (1,); see
+M1.compile(H1).start([0, 1], None, 'a')                      | t0 must be numbers, not 'a'
+M1.compile(H1).start([0, 1], None, nan)                      | t0=nan must be one finite number
+M1.compile(H1).start([0, 1]).advance('a')                    | times must be numbers, not 'a'
+M1.compile(H1).start([0, 1]).advance([])                     | times must be a non-empty one-dimensional
+M1.compile(H1).start([0, 1]).advance([-1, 1])                | times must be strictly monotone and ahead of
+M1.compile(H1).start([0, 1]).advance([0, 1], sample=3)       | unknown sampling 3; known: dense, land, side,
+"""
+
+
+@pytest.mark.parametrize("fault", faults(OURS + PEERS + CALLS + STATES), ids=str)
+def test_one_sentence(fault: Fault):
+    is_met(fault)
+
+
+@pytest.mark.parametrize(
+    ("code", "printed"),
+    [
+        ("HBVM(k=np.int64(4), s=np.int32(2), h=np.float32(.5))", "HBVM(k=4, s=2, h=0.5)"),
+        ("Taylor(fast_math=np.bool_(True))", "Taylor(fast_math=True)"),
+        ("Event(osc, direction=np.int64(1)).direction", "1"),
+        ("Event(osc, terminal=np.bool_(True)).last", "1"),
+        ("load('kepler', e=np.float64(.5))", "kepler(e=0.5)"),
+        ("load('fput', n=np.int32(8))", "fput(n=8, alpha=0.25, beta=0.0)"),
+        ("load('expression', q0=np.array([.5])).y0.tolist()", "[0.5, 1.9]"),
+        ("Hamiltonian(osc, dof=np.int32(1)).function('field') and 1", "1"),
+        ("Hamiltonian(osc, dof=np.int32(1)).dim", "2"),
+        ("VectorField(lambda y: [y[1], -y[0]], dim=np.int64(2))", "VectorField(system, dim=2)"),
+        ("Problem(V2, y0=np.ones(2), t_end=np.int32(3)).t_end", "3.0"),
+        ("M1.compile(H1).batch([[0, 1]], times=[0, 1], threads=10**9).status[0].value", "'finished'"),
+    ],
+)
+def test_numbers_of_numpy_are_numbers(code, printed):
+    assert repr(eval(code, names())) == printed  # noqa: S307
+
+
+@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), Gauss(s=2, tol=1e-6)], ids=repr)
+def test_methods_are_copied_and_pickled(method):
+    assert copy.copy(method) == copy.deepcopy(method) == pickle.loads(pickle.dumps(method)) == method
+    assert dataclasses.replace(method, s=3).s == 3
+
+
+def test_a_signature_is_the_options():
+    assert str(inspect.signature(Gauss)).startswith("(*, s: int, h: float | None = None")
+
+
+def test_a_limit_can_be_raised(monkeypatch):
+    monkeypatch.setenv("HBVM_BENCH_MAX_STAGES", "3e2")
+    assert HBVM(k=300, s=2, h=0.1).k == 300
+    with pytest.raises(InputError, match="301 stages, and the limit is 300;"):
+        HBVM(k=301, s=2, h=0.1)
