@@ -49,7 +49,7 @@ class AdaptiveStepper(HBVMStepper):
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
         reals = self._context.reals
-        reals[layout.T0] = t0
+        reals[layout.T0] = reals[layout.DOUBT_END] = t0
         reals[layout.NEXT_LENGTH] = self._program.first or 0.0
         engine.call(engine.RESET, self._context.address, out=y.ctypes.data)
 
