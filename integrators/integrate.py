@@ -65,6 +65,19 @@ class Solution:
         """Velocities (n, dof) of a Hamiltonian problem with constant masses, else ``None``."""
         return self.problem.velocity(self.y)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what a user should know about a solution although it did not fail."""
+        kinks = self.stats.extra.get("kinks")
+        if not kinks:
+            return ()
+        t, h = kinks[0]
+        return (
+            f"the field jumps or has a kink at {len(kinks)} places or more, the first between t = {t!r} and "
+            f"{t + h!r}: steps were cut there, the order is lost, and what lies between two nodes may have been "
+            "missed; give breakpoints, if they are times that are known.",
+        )
+
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name."""
         return self.problem.invariants(self.y, self.t)

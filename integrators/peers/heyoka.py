@@ -93,6 +93,15 @@ class Taylor(MethodBase):
         """Accept every system that is traced."""
         return None if problem.system.traced else UNTRACED
 
+    def caveat(self, problem: Problem) -> str | None:
+        """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over its kink."""
+        if not problem.system.traced or not has_kinks(problem.system):
+            return None
+        return (
+            "its field has m.abs, and a Taylor series from one side of the kink knows nothing of the other: "
+            "steps go over it with any error, and the run ends as finished."
+        )
+
     def compile(self, system: System) -> "TaylorProgram":
         """Have heyoka compile the integrator for ``system``."""
         return TaylorProgram(system, self)

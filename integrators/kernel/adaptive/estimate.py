@@ -12,6 +12,7 @@ from integrators.kernel.step import prepare, set_step, start_plain
 UNSEEN = (
     1e-13  # part of a block that rounding may account for in a step that the fixed-point iteration solves
 )
+SQUARABLE = 1e150  # the square of a larger number, or of one below its inverse, has no double
 SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
 
@@ -48,6 +49,14 @@ def block_size(ctx, room, b):
     """Return the size that a block's errors are relative to, its own unless that is next to nothing."""
     largest = get_float(get_int(ctx, at.LARGEST), get_int(get_int(ctx, at.GROUP), b))
     return max(get_float(room, at.BLOCK_ROOM * b), NOTHING * largest)
+
+
+@compiled
+def squared(h, missing, slope, size):
+    """Return h missing^2 / (slope size)."""
+    if missing < SQUARABLE and missing * SQUARABLE > 1.0:
+        return h / slope / size * missing**2
+    return h * (missing / size) * (missing / slope)
 
 
 @compiled
@@ -120,7 +129,6 @@ def estimate(ctx):
         slope = max(get_float(room, i + 1), least * get_float(steepest, get_int(group, b)))
         if slope > 0.0:
             size = block_size(ctx, room, b)
-            part = h / slope / size
             missing, unseen, high = get_float(room, i + 2), get_float(room, i + 3), get_float(room, i + 4)
             most, most_unseen = INFINITY, INFINITY
             if high > 0.0:
@@ -128,8 +136,8 @@ def estimate(ctx):
                     most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * size and not narrow:
                     put_int(ctx, at.KINKED, 1)
-            error = max(error, min(most, part * missing**2))
-            defect = max(defect, min(most_unseen, part * unseen**2))
+            error = max(error, min(most, squared(h, missing, slope, size)))
+            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size)))
     return error, defect
 
 
