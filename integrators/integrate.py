@@ -68,14 +68,17 @@ class Solution:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what a user should know about a solution although it did not fail."""
+        caveat = self.method.caveat(self.problem)
+        said = () if caveat is None else (caveat,)
         kinks = self.stats.extra.get("kinks")
         if not kinks:
-            return ()
+            return said
         t, h = kinks[0]
         return (
-            f"the field jumps or has a kink at {len(kinks)} places or more, the first between t = {t!r} and "
-            f"{t + h!r}: steps were cut there, the order is lost, and what lies between two nodes may have been "
-            "missed; give breakpoints, if they are times that are known.",
+            *said,
+            f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} and {t + h!r}): "
+            "steps were cut there, and what lies between two nodes may have been missed; give breakpoints "
+            "where the times are known.",
         )
 
     def invariants(self) -> dict[str, Array]:

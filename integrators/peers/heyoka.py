@@ -18,6 +18,7 @@ from integrators.peers.options import UNTRACED, flag, load, number
 from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
 from integrators.trajectories import Trajectories
+from problems.inspection import has_kinks
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)

@@ -242,7 +242,7 @@ class AdaptiveStepper(HBVMStepper):
             if passes and outcome == layout.DONE:
                 outcome = layout.BUDGET if stop != end else layout.DONE
                 self._restart(stop)
-            elif abs(self.t - stop) <= CLOSE * abs(stop):
+            elif math.isfinite(stop) and abs(self.t - stop) <= CLOSE * abs(stop):
                 self._restart(stop)
             elif outcome == layout.BUDGET and (limit is None or n == 0):
                 why = self._ended(watch, made)
