@@ -76,9 +76,9 @@ class Solution:
         t, h = kinks[0]
         return (
             *said,
-            f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} and {t + h!r}): "
-            "steps were cut there, and what lies between two nodes may have been missed; give breakpoints "
-            "where the times are known.",
+            f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} "
+            f"and {t + h!r}): steps were cut there, and what lies between two nodes may have been missed; "
+            "give breakpoints where the times are known.",
         )
 
     def invariants(self) -> dict[str, Array]:

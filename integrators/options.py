@@ -26,7 +26,8 @@ def length(method: str, h: Any, name: str = "h") -> float:
     value = _number(h)
     if not (value > 0.0 and math.isfinite(value)):
         raise InputError(
-            f"{method} needs a finite step {name} > 0, not {name}={h!r}; the sign of time is that of the times."
+            f"{method} needs a finite step {name} > 0, not {name}={h!r}; "
+            "the sign of time is that of the times."
         )
     return value
 

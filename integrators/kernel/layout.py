@@ -157,8 +157,8 @@ KINK_PLACES = 123  # room for KINKS_KEPT pairs: time and length of the last step
 
 CONTEXT = 128
 
-# Numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's, and the largest
-# that does not fall off as a smooth field's do.
+# Numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's, and the
+# largest that does not fall off as a smooth field's do.
 BLOCK_ROOM = 5
 KINKS_KEPT = 64
 

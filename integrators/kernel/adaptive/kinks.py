@@ -34,7 +34,7 @@ def kink(ctx, ends):
 
 @compiled
 def differs_at_an_end(ctx):
-    """Whether the field at an end of the solved step is not what its nodes say, by more than is negligible."""
+    """Whether the field at an end of the solved step is far from what its nodes say there."""
     h, t = abs(get_float(ctx, at.H)), get_float(ctx, at.T0)
     if h <= NARROWEST * abs(t):
         return False

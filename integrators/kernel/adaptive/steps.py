@@ -50,7 +50,8 @@ HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
 GAIN, GAIN_PER_ROW, MOST_ROWS = 8.0, 1.5, 64
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
-# A step that is too long may fail, or look like one with a kink; so many in a row are one, and are cut to find it.
+# A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
+# find it.
 SURE = 3
 STAY = 16  # steps for which it then stays
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
