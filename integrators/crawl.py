@@ -1,5 +1,7 @@
 """When steps of varying length have collapsed: the same rule for every method, ours and the peers'."""
 
+import math
+
 CRAWL_STEPS = 200_000
 """Steps after which a method must have got somewhere."""
 
@@ -7,8 +9,22 @@ CRAWL_SHARE = 1e-7
 """A method that covers less than this share of the way in `CRAWL_STEPS` steps has stalled."""
 
 
+LONGEST_WITHOUT_A_LOOK = 1 << 12
+"""Steps between two looks at Ctrl-C."""
+
+FIRST_LOOK, LOOKS = 1024, 4
+"""Steps after which a blow-up is looked for first, and doublings of that at which it must show."""
+
+NEARER, LARGER = 0.9, 1.05
+"""Of the way covered, and of the state's size, from one doubling to the next where a solution blows up."""
+
+
 class Crawl:
     """Sees that an adaptive method no longer gets anywhere, from its own times.
+
+    Twice as many steps cover twice the way where steps keep their length, and as much
+    again where the solution oscillates exponentially faster. Where they cover less and less,
+    and the state grows, there is a time that they do not pass: the solution blows up there.
 
     Parameters
     ----------
@@ -18,13 +34,44 @@ class Crawl:
 
     def __init__(self, t: float, end: float):
         self._mark, self._end, self._count = t, end, 0
+        self._total, self._looked, self._way, self._size, self._seen = 0, t, 0.0, 0.0, 0
+        self._look = FIRST_LOOK
 
-    def sees(self, t: float, steps: int = 1) -> str:
-        """Take note of ``steps`` steps that came to ``t``; return the reason if they crawl, else ""."""
+    @property
+    def patience(self) -> int:
+        """Steps to take before the next look."""
+        return min(max(self._look - self._total, 1), LONGEST_WITHOUT_A_LOOK)
+
+    def sees(self, t: float, steps: int = 1, size: float = math.nan) -> str:
+        """Take note of ``steps`` steps that came to ``t``, where the state is of size ``size``.
+
+        Returns
+        -------
+        str
+            The reason if they crawl, else "".
+        """
+        self._total += steps
         self._count += steps
+        if self._total >= self._look and (reason := self._blows_up(t, size)):
+            return reason
         if self._count < CRAWL_STEPS:
             return ""
         mark, self._mark, self._count = self._mark, t, 0
         if abs(t - mark) >= CRAWL_SHARE * abs(self._end - mark):
             return ""
         return f"{CRAWL_STEPS} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
+
+    def _blows_up(self, t: float, size: float) -> str:
+        way, share = t - self._looked, abs(t - self._looked) / abs(self._way) if self._way else math.inf
+        grows = share <= NEARER and size >= LARGER * self._size
+        self._seen = self._seen + 1 if grows else 0
+        self._look, self._looked, self._way, self._size = 2 * self._total, t, way, size
+        if self._seen < LOOKS:
+            return ""
+        goal = t + way * share / (1.0 - share)
+        if abs(goal - t) >= abs(self._end - t):
+            return ""
+        return (
+            f"the solution seems to blow up at t = {goal:.9g}: {self._total} steps came to t = {t!r}, each "
+            f"doubling of their number by less, while the state grew to {size:.1e}."
+        )

@@ -1,6 +1,7 @@
 """Gauss-Legendre collocation, which is HBVM(s, s)."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from integrators.hbvm import HBVM
@@ -33,7 +34,9 @@ class Gauss(MethodBase):
     that keeps all quadratic invariants is.
 
     Limits: a Hamiltonian of degree 3 or more is conserved only up to O(h^{2s}),
-    and at large steps, or with changing steps, not at all.
+    and at large steps, or with changing steps, not at all. With a tolerance, what is
+    shorter than a step may be stepped over; see `HBVM`, whose estimate sees more, because it
+    has nodes to spare.
 
     Parameters
     ----------
@@ -47,6 +50,8 @@ class Gauss(MethodBase):
         keeps no energy over long times (`test_adaptive`): it is there to be compared with.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved; see `HBVM`.
+    max_step, breakpoints, max_steps
+        With ``tol``; see `HBVM`.
 
     Raises
     ------
@@ -58,6 +63,9 @@ class Gauss(MethodBase):
     h: float | None = None
     tol: float | None = None
     solver: str = "auto"
+    max_step: float | None = None
+    breakpoints: Sequence[float] = ()
+    max_steps: int | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -73,6 +81,8 @@ class Gauss(MethodBase):
         object.__setattr__(self, "s", twin.s)
         object.__setattr__(self, "h", twin.h)
         object.__setattr__(self, "tol", twin.tol)
+        for name in ("max_step", "breakpoints", "max_steps"):
+            object.__setattr__(self, name, getattr(twin, name))
 
     @property
     def order(self) -> int:
@@ -81,7 +91,10 @@ class Gauss(MethodBase):
 
     def as_hbvm(self) -> HBVM:
         """Return the HBVM that this method is."""
-        return HBVM(k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver)
+        return HBVM(
+            k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver,
+            max_step=self.max_step, breakpoints=self.breakpoints, max_steps=self.max_steps,
+        )  # fmt: skip
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system of ordinary differential equations."""
@@ -92,7 +105,10 @@ class Gauss(MethodBase):
         if self.tol is not None:
             from integrators.kernel.adaptive.program import AdaptiveProgram
 
-            return AdaptiveProgram(system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver)
+            return AdaptiveProgram(
+                system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,
+                **self.as_hbvm().control(),
+            )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None

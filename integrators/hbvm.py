@@ -1,8 +1,10 @@
 """Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from integrators.options import length, tolerance, whole
+from integrators.options import landings, length, tolerance, whole
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem, System
@@ -58,6 +60,16 @@ class HBVM(MethodBase):
     energy is still conserved and the trajectory is wrong; other invariants, such
     as the angular momentum, are kept only as far as the order does (`LineIntegral`
     keeps several).
+
+    A step sees the field at its k nodes and nowhere else. With a tolerance, what lies
+    between them - a pulse in time, or a narrow bump of the force, that is shorter than the
+    step - is stepped over, and the run ends as finished: no estimate can tell. Where the
+    field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
+    the field that nodes do see, such as those of ``m.abs``, are found, and steps cut until
+    they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
+    ``warnings`` say so. That takes more than ``s`` nodes: with k = s (`Gauss`) and with a
+    loose tolerance a weak kink can cost more than the tolerance, and k < 4 nodes see none
+    (`test_own_steps`).
 
     These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -115,6 +127,9 @@ class HBVM(MethodBase):
     h: float | None = None
     tol: float | None = None
     solver: str = "auto"
+    max_step: float | None = None
+    breakpoints: Sequence[float] = ()
+    max_steps: int | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -137,6 +152,17 @@ class HBVM(MethodBase):
             object.__setattr__(self, "h", length(type(self).__name__, self.h))
         if self.tol is not None:
             object.__setattr__(self, "tol", tolerance(type(self).__name__, self.tol))
+        if self.max_step is not None:
+            longest = length(type(self).__name__, self.max_step, "max_step")
+            object.__setattr__(self, "max_step", longest)
+        if self.max_steps is not None:
+            object.__setattr__(self, "max_steps", whole(type(self).__name__, "max_steps", self.max_steps))
+        object.__setattr__(self, "breakpoints", landings(type(self).__name__, self.breakpoints))
+        if self.tol is None and (given := self.control()):
+            raise InputError(
+                f"HBVM takes {', '.join(given)} with a tolerance only; give tol, or choose h "
+                "such that its multiples meet these times."
+            )
         if self.k is not None and self.s is not None and self.k < self.s:
             raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")
         if self.k == 1 and self.tol is not None:
@@ -155,7 +181,17 @@ class HBVM(MethodBase):
         """Accept every system; Poisson systems with fixed-point iteration only."""
         return self._refusal(problem.system)
 
+    def control(self) -> dict[str, Any]:
+        """Return those of the options ``max_step``, ``breakpoints`` and ``max_steps`` that are given."""
+        names = ("max_step", "breakpoints", "max_steps")
+        return {name: value for name, value in self.options().items() if name in names}
+
     def _refusal(self, system: System) -> str | None:
+        if system.kind == "poisson" and (given := self.control()):
+            return (
+                f"the steps that keep a Poisson system's energy do not take {', '.join(given)}; "
+                "leave that out, or use Gauss."
+            )
         if system.kind != "poisson" or self.solver in ("auto", "fixed_point"):
             return None
         return (
@@ -181,7 +217,7 @@ class HBVM(MethodBase):
             from integrators.kernel.adaptive.program import AdaptiveProgram
 
             return AdaptiveProgram(
-                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver
+                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, **self.control()
             )
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 

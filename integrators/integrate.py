@@ -69,6 +69,22 @@ class Solution:
         """Velocities (n, dof) of a Hamiltonian problem with constant masses, else ``None``."""
         return self.problem.velocity(self.y)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what a user should know about a solution although it did not fail."""
+        caveat = self.method.caveat(self.problem)
+        said = () if caveat is None else (caveat,)
+        kinks = self.stats.extra.get("kinks")
+        if not kinks:
+            return said
+        t, h = kinks[0]
+        return (
+            *said,
+            f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} "
+            f"and {t + h!r}): steps were cut there, and what lies between two nodes may have been missed; "
+            "give breakpoints where the times are known.",
+        )
+
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name."""
         return self.problem.invariants(self.y, self.t)

@@ -24,12 +24,13 @@ def whole(method: str, name: str, value: Any) -> int:
     return number
 
 
-def length(method: str, h: Any) -> float:
+def length(method: str, h: Any, name: str = "h") -> float:
     """Return a step as a float > 0, or refuse it."""
     value = _number(h)
     if not (value > 0.0 and math.isfinite(value)):
         raise InputError(
-            f"{method} needs a finite step h > 0, not h={shown(h)}; the sign of time is that of the times."
+            f"{method} needs a finite step {name} > 0, not {name}={shown(h)}; "
+            "the sign of time is that of the times."
         )
     return value
 
@@ -43,6 +44,17 @@ def tolerance(method: str, tol: Any) -> float:
             "an error smaller than this cannot be told from rounding."
         )
     return value
+
+
+def landings(method: str, breakpoints: Any) -> tuple[float, ...]:
+    """Return breakpoints as ascending floats, or refuse them."""
+    values = [_number(t) for t in breakpoints] if isinstance(breakpoints, list | tuple) else [math.nan]
+    if not all(math.isfinite(t) for t in values):
+        raise InputError(
+            f"{method} needs breakpoints as a list of finite times, not breakpoints={breakpoints!r}; "
+            "such as breakpoints=[1.0, 2.5]."
+        )
+    return tuple(sorted(set(values)))
 
 
 def _number(value: Any) -> float:

@@ -101,6 +101,12 @@ def depends_on_time(system: System) -> bool:
     return any(node.flags & T for node in _roots(system.function(what)))
 
 
+def has_kinks(system: System) -> bool:
+    """Whether the vector field has an absolute value, or its derivative, of the state or of time."""
+    nodes = reachable(_roots(system.function("field")))
+    return any(node.op in ("abs", "sign") and node.flags & (STATE | T) for node in nodes)
+
+
 def absent(system: System) -> list[int]:
     """Return the places of the state that do not occur in the energy, in order.
 

@@ -1,6 +1,6 @@
 """Where things are: the slots of a context, the block of memory a trajectory is integrated in.
 
-A context is 120 words of eight bytes, integers and doubles side by side: the
+A context is 128 words of eight bytes, integers and doubles side by side: the
 addresses of all tables and arrays, and the state of the nonlinear solver.
 Compiled functions take its address and nothing else, so their signature does
 not change with what they do, and a batch is a row of contexts.
@@ -117,7 +117,9 @@ TIME_LOW = 90  # double: what T0 lacks
 ALLOWED_ERROR = 91  # double: the estimated local error of a step, relative, at most
 ALLOWED_DEFECT = 92  # double: the same of the quadrature; infinite: any
 ERROR_DEGREE = 93  # degree of the Legendre coefficient that the error is estimated by
-ESTIMATORS = 94  # b_l P_j(c_l) for eight j: 0 .. 3, the two up to ERROR_DEGREE, the last two
+# b_l P_j(c_l) for ten j: 0 .. 3, the two up to ERROR_DEGREE, the last two, two from the middle; then what
+# extrapolates to the start and to the end of the step.
+ESTIMATORS = 94
 ESTIMATES = 95  # room for these coefficients of the field, row by row, and for the blocks' numbers
 NEXT_LENGTH = 96  # double: of the next step to be tried
 LENGTH_AFTER = 97  # double: of the one after the step that is solved
@@ -142,9 +144,23 @@ FUSED = 112  # address of whole sweeps, void(context, count, tested); 0: none, s
 LEAST_SLOPE = 114  # double: of a block's field beside the largest in its group, where errors are estimated
 CHANGE = 113  # double: the largest change of the last fused sweep
 
-CONTEXT = 120
+LONGEST = 115  # double: no step of varying length is longer
+STOP = 116  # double: no step passes this time; infinite: none
+DOUBT = 117  # double: last coefficients that are a smaller part of the low ones fall off well enough
+SLOWEST_DECAY = 118  # double: of a smooth field, from the middle coefficients to the last ones
+NEGLIGIBLE = 119  # double: part of a block's size that the error at a kink may be
+KINKED = 120  # 1: in the step that was estimated the field does not look smooth
+KINKS = 121  # places where steps were rejected for that
+KINK_END = 122  # double: where the first such step at the last place would have ended
+DOUBT_END = 124  # double: where the last step would have ended that failed or looked like one with a kink
+KINK_PLACES = 123  # room for KINKS_KEPT pairs: time and length of the last step rejected at each place
 
-BLOCK_ROOM = 4  # numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's
+CONTEXT = 128
+
+# Numbers in ESTIMATES per block: its size, its largest coefficient, the error's, the defect's, and the
+# largest that does not fall off as a smooth field's do.
+BLOCK_ROOM = 5
+KINKS_KEPT = 64
 
 # Routes of a product that are not a number of columns.
 WIDE, THROUGH = 0, 1

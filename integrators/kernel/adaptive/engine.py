@@ -13,7 +13,7 @@ SOURCES = (
     *KERNEL,
     "control",
     "line/views",
-    *(f"adaptive/{name}" for name in ("estimate", "steps", "loops")),
+    *(f"adaptive/{name}" for name in ("estimate", "kinks", "steps", "loops")),
 )
 
 # What the entry can do; `loops` has the same numbers.

@@ -5,13 +5,16 @@ from math import log
 from integrators.kernel import layout as at
 from integrators.kernel.control import INFINITY, NOTHING, TINY
 from integrators.kernel.lanes import fma
-from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8, sums
+from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8, sums, total
 from integrators.kernel.products import compiled, evaluate, offset
 from integrators.kernel.step import prepare, set_step, start_plain
 
 UNSEEN = (
     1e-13  # part of a block that rounding may account for in a step that the fixed-point iteration solves
 )
+SQUARABLE = 1e150  # the square of a larger number, or of one below its inverse, has no double
+SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is negligible
+NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
 
 
 @compiled
@@ -25,6 +28,13 @@ def coefficient(ctx, row, which):
     for chunk in range(chunks):
         result = fma(get(table, 8 * chunk), get(f, i + offset(ctx, chunk)), result)
     return result
+
+
+@compiled
+def stays(ctx, d, last):
+    """Whether the last coefficient of a row is as large, beside those from the middle, as at a kink."""
+    middle = max(abs(total(coefficient(ctx, d, 8))), abs(total(coefficient(ctx, d, 9))))
+    return last > get_float(ctx, at.SLOWEST_DECAY) * middle
 
 
 @compiled
@@ -42,6 +52,14 @@ def block_size(ctx, room, b):
 
 
 @compiled
+def squared(h, missing, slope, size):
+    """Return h missing^2 / (slope size)."""
+    if missing < SQUARABLE and missing * SQUARABLE > 1.0:
+        return h / slope / size * missing**2
+    return h * (missing / size) * (missing / slope)
+
+
+@compiled
 def estimate(ctx):
     """Return the estimated local error of the solved step, and that of its quadrature.
 
@@ -52,6 +70,12 @@ def estimate(ctx):
     block of the state; the largest of all. A block whose field is nothing beside that of
     others in its group may be moved by their rounding alone, which no step is short
     enough for: its gamma counts as a part of theirs.
+
+    All this is true of coefficients that fall off geometrically. At a jump or a kink of
+    the field they do not: |gamma_j| falls off like 1/j or 1/j^2, and the error of the
+    quadrature is of the size of h |gamma_{k-1}| itself. KINKED says whether there is more
+    of that than rounding and tolerance account for. If there is less, nothing is gained
+    by cutting the step further, whatever the squares are.
     """
     rows = get_int(ctx, at.ROWS)
     h = abs(get_float(ctx, at.H))
@@ -68,6 +92,7 @@ def estimate(ctx):
     for i in range(at.BLOCK_ROOM * blocks):
         put_float(room, i, 0.0)
     steepest = room + 8 * at.BLOCK_ROOM * blocks
+    doubt = get_float(ctx, at.DOUBT)
     for g in range(get_int(ctx, at.GROUP_COUNT)):
         put_float(largest, g, 0.0)
         put_float(steepest, g, 0.0)
@@ -80,6 +105,10 @@ def estimate(ctx):
         )
         missing = max(get_float(found, i + 5), error_decay * get_float(found, i + 4))
         unseen = max(get_float(found, i + 7), defect_decay * get_float(found, i + 6))
+        low = max(max(get_float(found, i + 1), get_float(found, i + 2)), get_float(found, i + 3))
+        high = max(get_float(found, i + 6), get_float(found, i + 7))
+        if high > doubt * low and stays(ctx, d, get_float(found, i + 7)):
+            put_float(room, b + 4, max(get_float(room, b + 4), high))
         put_float(room, b, max(get_float(room, b), abs(momentum(ctx, d)) + h * slope))
         put_float(room, b + 1, max(get_float(room, b + 1), slope))
         put_float(room, b + 2, max(get_float(room, b + 2), missing))
@@ -90,13 +119,25 @@ def estimate(ctx):
         put_float(steepest, g, max(get_float(steepest, g), get_float(room, at.BLOCK_ROOM * b + 1)))
     least = get_float(ctx, at.LEAST_SLOPE)
     error, defect = 0.0, 0.0
+    negligible = get_float(ctx, at.NEGLIGIBLE)
+    allowed, allowed_defect = get_float(ctx, at.ALLOWED_ERROR), get_float(ctx, at.ALLOWED_DEFECT)
+    kinks = get_int(ctx, at.KINKS) > 0
+    narrow = h <= NARROWEST * abs(get_float(ctx, at.T0))
+    put_int(ctx, at.KINKED, 0)
     for b in range(blocks):
         i = at.BLOCK_ROOM * b
         slope = max(get_float(room, i + 1), least * get_float(steepest, get_int(group, b)))
         if slope > 0.0:
-            part = h / slope / block_size(ctx, room, b)
-            error = max(error, part * get_float(room, i + 2) ** 2)
-            defect = max(defect, part * get_float(room, i + 3) ** 2)
+            size = block_size(ctx, room, b)
+            missing, unseen, high = get_float(room, i + 2), get_float(room, i + 3), get_float(room, i + 4)
+            most, most_unseen = INFINITY, INFINITY
+            if high > 0.0:
+                if kinks and h * max(high, max(missing, unseen)) <= negligible * size:
+                    most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
+                elif h * high > negligible * size and not narrow:
+                    put_int(ctx, at.KINKED, 1)
+            error = max(error, min(most, squared(h, missing, slope, size)))
+            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size)))
     return error, defect
 
 

@@ -1,7 +1,9 @@
 """HBVM(k, s) with steps of varying length, compiled for one system."""
 
 import math
+from collections.abc import Sequence
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.kernel import layout, native, tables
@@ -32,6 +34,10 @@ of a lattice are moved by the others' rounding.
 """
 
 
+UNSEEN = 1e-12
+"""Part of a block's size that the error at a kink of the field may always be."""
+
+
 class AdaptiveProgram(HBVMProgram):
     """HBVM(k, s) with steps as long as a tolerance allows, compiled for one system.
 
@@ -49,6 +55,12 @@ class AdaptiveProgram(HBVMProgram):
         Length of the first step.
     solver : {"auto", "fixed_point", "newton", "blended"}, optional
         How the stage equations are solved; see `integrators.hbvm.HBVM`.
+    max_step : float, optional
+        Length that no step exceeds.
+    breakpoints : sequence of float, optional
+        Times that steps end at, ascending.
+    max_steps : int, optional
+        Steps of a trajectory, at most.
     """
 
     varying = True
@@ -63,10 +75,14 @@ class AdaptiveProgram(HBVMProgram):
         defect: float | None = None,
         h: float | None = None,
         solver: str = "auto",
+        max_step: float | None = None,
+        breakpoints: Sequence[float] = (),
+        max_steps: int | None = None,
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
         started = native.clock()
         self.tol, self.defect, self.first = tol, defect, h
+        self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps
         made = engine.code()
         self.from_cache = self.from_cache and made.from_cache
         c = self.constants
@@ -80,9 +96,15 @@ class AdaptiveProgram(HBVMProgram):
         self.degree = s if k > s else s - 1
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
         m = self.degree
+        middle = max(1, (k - 4) // 2)
         degrees = [0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1]
-        self._estimators = aligned(len(degrees) * 8 * -(-k // 8))
-        self._estimators.reshape(len(degrees), -1)[:, :k] = basis.T[degrees]
+        degrees += [min(middle, k - 1), min(middle + 1, k - 1)]
+        rows = [*basis.T[degrees], *(basis @ legendre(np.array([0.0, 1.0]), k).T).T]
+        self._estimators = aligned(len(rows) * 8 * -(-k // 8))
+        self._estimators.reshape(len(rows), -1)[:, :k] = rows
+        # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
+        self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
+        self._doubt, self._slowest = _decays(k, m, tol, middle)
         self.compile_seconds += native.clock() - started
 
     @property
@@ -91,7 +113,8 @@ class AdaptiveProgram(HBVMProgram):
         c = self.constants
         return (
             f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
-            f"solver={self._named!r})"
+            f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self.breakpoints.tolist()!r}, "
+            f"max_steps={self.max_steps!r})"
         )
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
@@ -116,6 +139,27 @@ class AdaptiveProgram(HBVMProgram):
             last = self.constants.k - 1
             reals[layout.DEFECT_AIM] = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
             reals[layout.DEFECT_DECAY] = self.defect ** (0.5 / last)
+        reals[layout.DOUBT], reals[layout.SLOWEST_DECAY] = self._doubt, self._slowest
+        reals[layout.NEGLIGIBLE] = self._negligible
+        context.point({"KINK_PLACES": aligned(2 * layout.KINKS_KEPT)})
+        reals[layout.LONGEST] = math.inf if self.max_step is None else self.max_step
+        reals[layout.STOP] = math.inf
         reals[layout.LENGTH_LIMIT] = math.inf
         reals[layout.LOG_RATE] = math.log(FIRST_RATE)
         return context
+
+
+def _decays(k: int, m: int, tol: float, middle: int) -> tuple[float, float]:
+    """Return DOUBT and SLOWEST_DECAY, which tell a smooth field from one with a kink.
+
+    Where the error is the tolerance, coefficients of a smooth field fall off by
+    ``tol^(1/2m)`` from one degree to the next. Those of a kink fall off like 1/j^2, from the
+    middle ones, of degrees ``middle`` and the next, to the last one. Infinite where k is too small
+    to tell.
+    """
+    if k < 4:
+        return math.inf, math.inf
+    smooth, last = tol ** (0.5 / m), k - 1
+    at_a_kink = ((middle + 0.5) / last) ** 2
+    doubt = min(10.0 * smooth ** (last - min(3, m - 1)), 0.1 / last**2)
+    return doubt, max(at_a_kink / 4.0, 6.0 * smooth ** (last - middle - 1))

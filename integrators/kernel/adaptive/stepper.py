@@ -19,13 +19,15 @@ from problems.errors import unknown
 if TYPE_CHECKING:
     from integrators.kernel.adaptive.program import AdaptiveProgram
 
-CHUNK = 1 << 12  # steps between two looks at Ctrl-C
+CLOSE = 2.0**-50  # as in `integrators.kernel.control`, which imports numba
+
+Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 
 # What a checkpoint holds besides that of steps of one length.
 MORE_WORDS = (
     layout.TIME_LOW, layout.NEXT_LENGTH, layout.LENGTH_AFTER, layout.LENGTH_BEHIND,
     layout.ERROR_BEHIND, layout.ERROR_AHEAD, layout.DEFECT_BEHIND, layout.DEFECT_AHEAD,
-    layout.LENGTH_LIMIT, layout.LOG_RATE,
+    layout.LENGTH_LIMIT, layout.LOG_RATE, layout.KINKS, layout.KINK_END, layout.DOUBT_END,
 )  # fmt: skip
 
 
@@ -51,7 +53,7 @@ class AdaptiveStepper(HBVMStepper):
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
         reals = self._context.reals
-        reals[layout.T0] = t0
+        reals[layout.T0] = reals[layout.DOUBT_END] = t0
         reals[layout.NEXT_LENGTH] = self._program.first or 0.0
         engine.call(engine.RESET, self._context.address, out=y.ctypes.data)
 
@@ -62,13 +64,17 @@ class AdaptiveStepper(HBVMStepper):
 
     @property
     def stats(self) -> Stats:
-        """Counters of the work done, as `HBVMStepper.stats`; ``extra`` has the method's k and s too."""
-        stats, c = super().stats, self._program.constants
-        return replace(
-            stats,
-            rejections=int(self._context.words[layout.REJECTIONS]),
-            extra={**stats.extra, "k": c.k, "s": c.s},
-        )
+        """Counters of the work done, as `HBVMStepper.stats`; ``extra`` has the method's k and s too.
+
+        And, where the field jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a
+        step had to be cut for and the length at which it was found, of the last 64 places.
+        """
+        stats, c, context = super().stats, self._program.constants, self._context
+        extra = {**stats.extra, "k": c.k, "s": c.s}
+        if found := int(context.words[layout.KINKS]):
+            kept = context["KINK_PLACES"].reshape(-1, 2)[: min(found, layout.KINKS_KEPT)]
+            extra["kinks"] = sorted((float(t), float(h)) for t, h in kept)
+        return replace(stats, rejections=int(context.words[layout.REJECTIONS]), extra=extra)
 
     @one_thread
     def step(self) -> Status:
@@ -96,6 +102,22 @@ class AdaptiveStepper(HBVMStepper):
         self._face(float(grid[-1]))
         between = {"land": layout.LAND, "dense": layout.DENSE}.get(sample or "side", layout.SIDE)
         return self._to(grid, between)
+
+    def _stop(self) -> float:
+        """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
+        reals, points = self._context.reals, self._program.breakpoints
+        ahead = reals[layout.NEXT_LENGTH] > 0.0
+        found = points[points > self.t] if ahead else points[points < self.t][::-1]
+        stop = float(found[0]) if found.size else math.inf if ahead else -math.inf
+        reals[layout.STOP] = stop
+        return stop
+
+    def _restart(self, t: float) -> None:
+        """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
+        words, reals = self._context.words, self._context.reals
+        reals[layout.T0], reals[layout.TIME_LOW] = t, 0.0
+        reals[layout.LENGTH] = reals[layout.LENGTH_BEHIND] = 0.0
+        words[layout.SOLVED] = words[layout.AGE] = 0
 
     @one_thread
     def checkpoint(self) -> AdaptiveCheckpoint:
@@ -137,20 +159,54 @@ class AdaptiveStepper(HBVMStepper):
             words[layout.SOLVED], reals[layout.LENGTH] = 0, 0.0
 
     def _to(self, times: Array, between: int) -> Samples:
-        """Make the samples, in chunks so that Ctrl-C is heard between them."""
-        grid, out = np.ascontiguousarray(times), np.empty((times.size, self._dim))
-        outcome, made, crawl = layout.BUDGET, 0, ""
-        watch, words = Crawl(self.t, float(grid[-1])), self._context.words
-        while outcome == layout.BUDGET and not crawl:
+        """Make the samples, piece by piece from one breakpoint to the next."""
+        watch, out = Crawl(self.t, float(times[-1])), np.empty((times.size, self._dim))
+        made, outcome, why = 0, layout.DONE, None
+        while made < times.size and outcome == layout.DONE and why is None:
+            stop = self._stop()
+            beyond = np.flatnonzero((times - stop) * self._context.reals[layout.NEXT_LENGTH] > 0.0)
+            last = int(beyond[0]) if beyond.size and beyond[0] >= made else times.size
+            piece = times[made:last]
+            meets = last < times.size or times[-1] == stop
+            grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece
+            states, outcome, why = self._piece(np.ascontiguousarray(grid), between, watch)
+            n = min(len(states), piece.size)
+            out[made : made + n] = states[:n]
+            made += n
+            if meets and outcome == layout.DONE and why is None:
+                self._restart(stop)
+        return self._samples(times[:made], out[:made], outcome, why)
+
+    def _piece(self, grid: Array, between: int, watch: Crawl) -> tuple[Array, int, "Ended | None"]:
+        """Make samples before the next breakpoint, in chunks so that Ctrl-C is heard between them."""
+        out, made, why = np.empty((grid.size, self._dim)), 0, None
+        outcome, words = layout.BUDGET, self._context.words
+        while outcome == layout.BUDGET and why is None:
             before = int(words[layout.STEPS])
             outcome = self._call(
                 engine.VARY, between=between, count=grid.size, times=grid.ctypes.data, first=made,
-                out=out.ctypes.data, budget=CHUNK,
+                out=out.ctypes.data, budget=self._budget(watch.patience),
             )  # fmt: skip
             made = int(words[layout.MADE])
             if outcome == layout.BUDGET:
-                crawl = watch.sees(self.t, int(words[layout.STEPS]) - before)
-        return self._samples(grid[:made], out[:made], outcome, crawl)
+                why = self._ended(watch, int(words[layout.STEPS]) - before)
+        return out[:made], outcome, why
+
+    def _budget(self, most: int) -> int:
+        """Return how many steps the kernel may take at a time: ``most``, or what is left of them all."""
+        if self._program.max_steps is None:
+            return most
+        return max(0, min(most, self._program.max_steps - int(self._context.words[layout.STEPS])))
+
+    def _ended(self, watch: Crawl, steps: int) -> "Ended | None":
+        """Return why the run is over after ``steps`` steps that the kernel took, if it is."""
+        words, most = self._context.words, self._program.max_steps
+        if most is not None and words[layout.STEPS] >= most and not words[layout.WANTED]:
+            return Status.MAX_STEPS, (
+                f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
+            )
+        crawl = watch.sees(self.t, steps, float(np.abs(self.y).max()))
+        return (Status.STALLED, crawl) if crawl else None
 
     @one_thread
     def walk(
@@ -171,22 +227,30 @@ class AdaptiveStepper(HBVMStepper):
         """
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
-        outcome, steps, crawl, reals = layout.BUDGET, 0, "", self._context.reals
+        outcome, steps, why, reals = layout.BUDGET, 0, None, self._context.reals
         watch = Crawl(self.t, end)
-        while outcome == layout.BUDGET and (limit is None or steps < limit) and not crawl:
-            n = CHUNK if limit is None else limit - steps  # fewer come where the implicit solver is made
+        while outcome == layout.BUDGET and (limit is None or steps < limit) and why is None:
+            # fewer come where the implicit solver is made
+            n = self._budget(watch.patience if limit is None else limit - steps)
             if longest < math.inf:
-                n = 1
+                n = min(n, 1)
                 reals[layout.NEXT_LENGTH] = np.clip(reals[layout.NEXT_LENGTH], -longest, longest)
-            times, out = np.full(n, end), np.empty((n, self._dim))
+            stop = self._stop()
+            passes = (end - stop) * reals[layout.NEXT_LENGTH] >= 0.0
+            times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
             outcome = self._call(engine.WALK, times=times.ctypes.data, out=out.ctypes.data, budget=n)
             made = int(self._context.words[layout.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
-            if outcome == layout.BUDGET and limit is None:
-                crawl = watch.sees(self.t, made)
+            if passes and outcome == layout.DONE:
+                outcome = layout.BUDGET if stop != end else layout.DONE
+                self._restart(stop)
+            elif math.isfinite(stop) and abs(self.t - stop) <= CLOSE * abs(stop):
+                self._restart(stop)
+            elif outcome == layout.BUDGET and (limit is None or n == 0):
+                why = self._ended(watch, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, layout.DONE if outcome == layout.BUDGET else outcome, crawl)
+        return self._samples(t, y, layout.DONE if outcome == layout.BUDGET else outcome, why)
 
     def _call(self, what: int, **arguments: int) -> int:
         """Call the kernel once; put the implicit solver to work where it is wanted."""
@@ -198,10 +262,10 @@ class AdaptiveStepper(HBVMStepper):
             workspace.raise_what_is_no_failure()
         return outcome
 
-    def _samples(self, t: Array, y: Array, outcome: int, crawl: str) -> Samples:
+    def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None") -> Samples:
         status = Status.FINISHED
-        if crawl:
-            status, self._reason = Status.STALLED, crawl
+        if why is not None:
+            status, self._reason = why
             self._status = status
         elif outcome != layout.DONE:
             status, self._reason = self._failure(outcome)

@@ -7,6 +7,7 @@ from math import log
 
 from integrators.kernel import layout as at
 from integrators.kernel.adaptive.estimate import estimate, estimate_implicit, log_decay
+from integrators.kernel.adaptive.kinks import kink
 from integrators.kernel.control import (
     APPROACH,
     CLOSE,
@@ -49,6 +50,9 @@ HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
 GAIN, GAIN_PER_ROW, MOST_ROWS = 8.0, 1.5, 64
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
+# A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
+# find it.
+SURE = 3
 STAY = 16  # steps for which it then stays
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
@@ -168,6 +172,26 @@ def learn(ctx):
 
 
 @compiled
+def remaining(ctx, t):
+    """Return how far the time t is ahead; 0 where it is the present but for rounding."""
+    rest = (t - get_float(ctx, at.T0)) - get_float(ctx, at.TIME_LOW)
+    return 0.0 if abs(rest) <= CLOSE * abs(t) else rest
+
+
+@compiled
+def within(ctx, h):
+    """Return the length of a step, no longer than LONGEST and not beyond STOP."""
+    longest, stop = get_float(ctx, at.LONGEST), get_float(ctx, at.STOP)
+    if abs(h) > longest:
+        h = longest if h > 0.0 else -longest
+    if abs(stop) < INFINITY:
+        rest = remaining(ctx, stop)
+        if abs(h) > abs(rest):
+            h = rest
+    return h
+
+
+@compiled
 def ready(ctx):
     """Solve the step ahead with a length that the tolerance allows; H is its length."""
     if get_int(ctx, at.SOLVED):
@@ -181,9 +205,9 @@ def ready(ctx):
     allowed, allowed_defect = get_float(ctx, at.ALLOWED_ERROR), get_float(ctx, at.ALLOWED_DEFECT)
     busy = BUSY if get_int(ctx, at.SECOND) else BUSY_FIRST
     put_int(ctx, at.REJECTED, 0)
-    grow, failure = GROW, at.UNDERFLOW
+    grow, failure, doubts = GROW, at.UNDERFLOW, 0
     while True:
-        h = get_float(ctx, at.NEXT_LENGTH)
+        h = within(ctx, get_float(ctx, at.NEXT_LENGTH))
         if not abs(h) > SHORTEST * abs(t):
             return failure
         before = get_int(ctx, at.ITERATIONS)
@@ -195,8 +219,17 @@ def ready(ctx):
         error, defect = INFINITY, INFINITY
         if outcome == at.DONE:
             error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
+            if implicit == 0:
+                fits = error <= allowed and defect <= allowed_defect
+                if get_int(ctx, at.KINKED):
+                    doubts += 1
+                    put_float(ctx, at.DOUBT_END, t + h)
+                if (fits or doubts >= SURE) and kink(ctx, fits):
+                    error = INFINITY
         factor = longer(ctx, error, defect, grow)
         if error <= allowed and defect <= allowed_defect:
+            if doubts >= SURE and get_int(ctx, at.KINKS):
+                put_float(ctx, at.LENGTH_LIMIT, INFINITY)  # what the iteration allowed was for the kink
             limit = get_float(ctx, at.LENGTH_LIMIT) * APPROACH
             put_float(ctx, at.LENGTH_LIMIT, limit)
             if implicit:
@@ -239,13 +272,6 @@ def take(ctx):
     put_float(ctx, at.LENGTH_BEHIND, get_float(ctx, at.H))
     put_float(ctx, at.ERROR_BEHIND, get_float(ctx, at.ERROR_AHEAD))
     put_float(ctx, at.DEFECT_BEHIND, get_float(ctx, at.DEFECT_AHEAD))
-
-
-@compiled
-def remaining(ctx, t):
-    """Return how far the time t is ahead; 0 where it is the present but for rounding."""
-    rest = (t - get_float(ctx, at.T0)) - get_float(ctx, at.TIME_LOW)
-    return 0.0 if abs(rest) <= CLOSE * abs(t) else rest
 
 
 @compiled

@@ -1,0 +1,231 @@
+"""Steps of varying length where the field is not smooth, where the solution ends, and what they refuse."""
+
+import math
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+import integrators
+import problems
+from hbvm_bench.spec import parse_spec
+from integrators import HBVM, Gauss
+from integrators.protocol import Status
+from problems import Hamiltonian, Problem, VectorField
+from problems.errors import InputError
+
+from .fault import Fault, is_met, sentence
+
+WELL = problems.load("rigid_body")
+
+FAULTS = [
+    Fault("HBVM(max_step=0)", lambda: HBVM(max_step=0.0), r"finite step max_step > 0, not max_step=0\.0"),
+    Fault("HBVM(max_step=nan)", lambda: HBVM(max_step=math.nan), "max_step=nan"),
+    Fault("HBVM(max_steps=0)", lambda: HBVM(max_steps=0), "whole number max_steps >= 1, not max_steps=0"),
+    Fault("HBVM(breakpoints=3)", lambda: HBVM(breakpoints=3.0), r"finite times, not breakpoints=3\.0"),  # pyright: ignore
+    Fault("HBVM(breakpoints=[nan])", lambda: HBVM(breakpoints=[1.0, math.nan]), "finite times, not"),
+    Fault(
+        "HBVM(k=4, s=2, h=0.1, breakpoints=[1])",
+        lambda: HBVM(k=4, s=2, h=0.1, breakpoints=[1.0]),
+        "takes breakpoints with a tolerance only; give tol",
+    ),
+    Fault("Gauss(s=2, h=0.1, max_steps=9)", lambda: Gauss(s=2, h=0.1, max_steps=9), "Gauss takes max_steps"),
+    Fault(
+        "HBVM(breakpoints=[1]) on a Poisson system",
+        lambda: integrators.integrate(WELL, HBVM(breakpoints=[1.0])),
+        "do not take breakpoints; leave that out, or use Gauss",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=str)
+def test_is_refused(fault):
+    is_met(fault)
+
+
+START, END = 3.0, 3.005
+
+
+def pulse():
+    """An oscillator that is pushed by 100 for 0.005, and its exact state at 20."""
+
+    def field(t, y, m):
+        push = (t - START) / m.abs(t - START) - (t - END) / m.abs(t - END)
+        return [y[1], -y[0] + 50.0 * push]
+
+    def pushed(since):
+        return np.array([100.0 * (1.0 - math.cos(20.0 - since)), 100.0 * math.sin(20.0 - since)])
+
+    exact = np.array([math.cos(20.0), -math.sin(20.0)]) + pushed(START) - pushed(END)
+    return Problem(VectorField(field, dim=2, name="pulse"), y0=[1.0, 0.0], t_end=20.0), exact
+
+
+@pytest.mark.parametrize("sample", [None, "land", "steps"])
+@pytest.mark.parametrize("method", [HBVM(), HBVM(tol=1e-8), Gauss(s=4, tol=1e-10)], ids=repr)
+def test_a_pulse_between_breakpoints_is_not_stepped_over(method, sample):
+    problem, exact = pulse()
+    options = {**method.options(), "breakpoints": [END, START]}
+    solution = integrators.integrate(problem, type(method)(**options), [1.0, START, 20.0], sample=sample)
+    assert solution.status is Status.FINISHED
+    assert solution.warnings == ()
+    if sample == "steps":
+        assert {START, END} <= set(solution.t)
+    else:
+        assert np.abs(solution.y[-1] - exact).max() < 1e-9  # measured 9e-14 to 1e-10; without, 0.5
+
+
+def test_breakpoints_hold_on_the_way_back_and_are_read_from_a_command_line():
+    problem, _ = pulse()
+    spec = parse_spec("HBVM(breakpoints=[3.0, 3.005], max_step=2, max_steps=500)")
+    method = HBVM(**spec.arguments)
+    assert repr(method) == "HBVM(tol=3e-16, max_step=2.0, breakpoints=(3.0, 3.005), max_steps=500)"
+    stepper = method.compile(problem.system).start(problem.y0, problem.par, 0.0)
+    stepper.advance([20.0], sample="land")
+    back = stepper.advance([0.0], sample="land").y[-1]
+    assert np.abs(back - problem.y0).max() < 1e-12  # measured 6e-16
+
+
+def test_a_pulse_is_seen_with_a_largest_step():
+    width = 0.005
+
+    def field(t, y, m):
+        return [m.exp(-(((t - 3.0) / width) ** 2))]
+
+    problem = Problem(VectorField(field, dim=1, name="bump"), y0=[1.0], t_end=20.0)
+    exact = 1.0 + width * math.sqrt(math.pi)
+    missed, seen = (
+        integrators.integrate(problem, method, [20.0]).y[-1, 0] for method in (HBVM(), HBVM(max_step=0.03))
+    )
+    assert abs(missed - exact) > 1e-3  # nobody can know: the reason for the option
+    assert abs(seen - exact) < 1e-13  # measured 2e-16 to 1e-14
+    steps = integrators.integrate(problem, HBVM(max_step=0.5), sample="steps")
+    assert np.diff(steps.t).max() <= 0.5 * (1.0 + 1e-12)
+
+
+def bounce(t):
+    """Return q and p at t of H = p^2/2 + |q| from q = 1 at rest."""
+    quarter = math.sqrt(2.0)
+    part = t % (4.0 * quarter)
+    if part <= quarter:
+        return 1.0 - part * part / 2.0, -part
+    if part <= 3.0 * quarter:
+        v = part - 2.0 * quarter
+        return -(1.0 - v * v / 2.0), v
+    v = part - 4.0 * quarter
+    return 1.0 - v * v / 2.0, -v
+
+
+@pytest.mark.parametrize(
+    ("method", "most"),
+    [
+        (HBVM(), 1e-9),  # measured 1e-11; a step underflow before
+        (HBVM(k=8, s=4, tol=1e-10), 1e-6),  # 9e-9; 8.5e-6
+        (Gauss(s=4, tol=1e-10), 1e-7),  # 5e-10; 0.48
+    ],
+    ids=repr,
+)
+def test_a_jump_of_the_force_is_found_and_named(method, most):
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    solution = integrators.integrate(Problem(valley, q0=[1.0], p0=[0.0], t_end=20.3), method, [20.3])
+    assert solution.status is Status.FINISHED
+    assert np.abs(solution.y[-1] - bounce(20.3)).max() < most
+    kinks = solution.stats.extra["kinks"]
+    crossings = math.sqrt(2.0) * np.arange(1, 15, 2)
+    assert min(np.abs(crossings - t).min() for t, _ in kinks) < 1e-2
+    (warning,) = solution.warnings
+    sentence(warning, "the field jumps or has a kink .* give breakpoints")
+
+
+@pytest.mark.parametrize(
+    ("method", "most"),
+    [(HBVM(), 1e-10), (HBVM(k=8, s=4, tol=1e-10), 1e-6)],  # measured 3e-13, 3e-9; 4.6e-5, 6.1e-6 before
+    ids=repr,
+)
+def test_a_kink_of_the_force_costs_no_more_than_the_tolerance(method, most):
+    # y'' = -y + 0.9 |y|: two frequencies
+    kink = VectorField(lambda y, m: [y[1], -y[0] + 0.9 * m.abs(y[0])], dim=2, name="kink")
+    slow, fast = math.sqrt(0.1), math.sqrt(1.9)
+    period = math.pi / slow + math.pi / fast
+    solution = integrators.integrate(Problem(kink, y0=[1.0, 0.0], t_end=8 * period), method, [8 * period])
+    assert solution.status is Status.FINISHED
+    assert np.abs(solution.y[-1] - [1.0, 0.0]).max() < most
+
+
+def test_smooth_fields_have_no_kinks():
+    for name in ("kepler", "sitnikov", "double_pendulum"):
+        solution = integrators.integrate(problems.load(name, t_end=100.0), HBVM(), [100.0])
+        assert "kinks" not in solution.stats.extra
+        assert solution.warnings == ()
+
+
+def test_heyoka_says_that_it_does_not_see_a_kink():
+    pytest.importorskip("heyoka")
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    problem = Problem(valley, q0=[1.0], p0=[0.0], t_end=2.0)
+    solution = integrators.integrate(problem, integrators.Taylor(), [2.0])
+    (warning,) = solution.warnings
+    sentence(warning, r"its field has m\.abs")
+    assert integrators.Taylor().caveat(problems.load("kepler")) is None
+
+
+def spiral():
+    """z' = z |z|^2 + i z |z|^4, which ends at t = 1/2 after infinitely many turns."""
+
+    def field(y):
+        r = y[0] * y[0] + y[1] * y[1]
+        return [y[0] * r - y[1] * r * r, y[1] * r + y[0] * r * r]
+
+    return VectorField(field, dim=2, name="spiral")
+
+
+@pytest.mark.parametrize("end", [0.5000001, 1e6])
+@pytest.mark.parametrize("method", [HBVM(), Gauss(s=4, tol=1e-8)], ids=repr)
+def test_a_blow_up_is_seen_and_its_time_named(method, end):
+    problem = Problem(spiral(), y0=[1.0, 0.0], t_end=end)
+    program = method.compile(problem.system)
+    program.start(problem.y0).advance([0.1])
+    started = perf_counter()
+    stepper = program.start(problem.y0)
+    samples = stepper.advance([0.1, 0.4, end])
+    assert perf_counter() - started < 3.0  # measured 0.05 to 0.35; 600,000 steps and 5.6 s before
+    assert samples.status is Status.STALLED
+    assert samples.t.tolist() == [0.1, 0.4]
+    sentence(stepper.reason, r"seems to blow up at t = 0\.(4999|5000)")
+
+
+def test_oscillations_that_become_faster_are_no_blow_up():
+    faster = VectorField(lambda y: [y[1], -y[0] * y[2], y[2]], dim=3, name="faster")
+    problem = Problem(faster, y0=[1.0, 0.0, 1.0], t_end=21.0)
+    solution = integrators.integrate(problem, HBVM(tol=1e-8), [21.0])
+    assert solution.status is Status.FINISHED
+    assert solution.stats.steps > 16_384  # measured 26,000
+
+
+@pytest.mark.parametrize("sample", [None, "steps"])
+def test_a_budget_of_steps_ends_the_run_with_its_status(sample):
+    problem = problems.load("kepler", t_end=60.0)
+    solution = integrators.integrate(problem, HBVM(max_steps=20), np.linspace(0.0, 60.0, 61), sample=sample)
+    assert solution.status is Status.MAX_STEPS
+    assert solution.stats.steps == 20
+    assert 0.0 < solution.t_stop < 60.0
+    assert solution.t.size > 1
+    sentence(solution.reason, r"max_steps=20 steps came to t = \d")
+    enough = integrators.integrate(problem, HBVM(max_steps=5000), [60.0])
+    assert np.array_equal(enough.y, integrators.integrate(problem, HBVM(), [60.0]).y)
+
+
+@pytest.mark.parametrize("scale", [1e-160, 1e-100, 1e100, 1e160])
+def test_the_error_is_estimated_in_any_unit(scale):
+    field = VectorField(lambda y: [y[1], -y[0]], dim=2, name="oscillator")
+    steps = [
+        integrators.integrate(Problem(field, y0=[size, size], t_end=20.0), HBVM(k=8, s=4, tol=1e-8), [20.0])
+        for size in (1.0, scale)
+    ]
+    assert steps[1].status is Status.FINISHED
+    assert abs(steps[1].stats.steps - steps[0].stats.steps) <= 5  # of 48
+    assert np.abs(steps[1].y / scale - steps[0].y).max() < 1e-7  # measured 0 to 3e-9
+
+
+def test_a_wrong_option_is_an_input_error():
+    with pytest.raises(InputError, match="did you mean 'max_step'"):
+        integrators.registry.create("HBVM", max_stp=1.0)
