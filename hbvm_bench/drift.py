@@ -376,5 +376,5 @@ def _drift(
     reached: float = 0.0,
 ) -> Drift:
     ends = (math.nan,) * 3 if drift is None else (drift.value, drift.low, drift.high)
-    rate = (end / (drift.span if drift else 1.0) for end in ends)
-    return Drift(law, why, *slope, floor, growth, *rate, starts, reached, drift)
+    rate, low, high = (end / (drift.span if drift else 1.0) for end in ends)
+    return Drift(law, why, *slope, floor, growth, rate, low, high, starts, reached, drift)

@@ -44,7 +44,7 @@ def time_cases(
     hbvm_bench.execute.InterruptedRunError
         If the run was stopped; every visit that ended is in the store.
     """
-    here = machine.describe()
+    here = machine.describe(measure=True)
     with machine.leaving_a_core() as core:
         for number in range(plan.rounds):
             for resolved in cases:
@@ -104,6 +104,6 @@ def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits,
 
 def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:
     """Return what was timed on this machine; seconds of another one are no rounds of the same pass."""
-    if record.timing is None or (record.timing.machine and record.timing.machine != here):
+    if record.timing is None or (record.timing.machine and not machine.same(record.timing.machine, here)):
         return Timing(machine=here)
     return record.timing

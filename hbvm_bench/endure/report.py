@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench import drift
+from hbvm_bench import drift, machine
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.drift import LAWS
 from hbvm_bench.endure.law import goals, lines, mean_in_words
@@ -42,6 +42,7 @@ def write(result: Endurance, directory: Path) -> Path:
     look = looks(result)
     made = over_time(result, look)
     content = {"result": result, "tables": tables(result), "picture": made, "figure": FIGURE}
+    content["processor"] = machine.sentence(result.machine)
     environment = shell.environment("hbvm_bench.endure", autoescape=False)
     environment.filters |= {"code": code, "table": in_markdown}
     files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}
@@ -103,8 +104,8 @@ def tables(result: Endurance) -> list[Table]:
             rows,
             "rms over the starts. Mean at the end: over the starts, with its standard error, after the "
             "offset of each has been taken off; called a drift beyond 3 of them (with few starts, beyond "
-            "Student's 95 % interval), whatever the power of t. Power of t and drift per year with 95 % intervals over "
-            "the starts. Time: median of one trajectory.",
+            "Student's 95 % interval), whatever the power of t. Power of t and drift per year with 95 % "
+            "intervals over the starts. Time: median of one trajectory.",
             words=(2 + len(heads),),
         )
     ]

@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from hbvm_bench import machine
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.race import tables
 from hbvm_bench.race.accuracy import SAMPLES
 from hbvm_bench.race.contests import CONTESTS
 from hbvm_bench.race.figures import looks, work_precision
-from hbvm_bench.race.results import Race
+from hbvm_bench.race.results import Race, by_kind
 from hbvm_bench.race.rounds import SHORTEST
 from hbvm_bench.race.settings import FAMILIES
 from hbvm_bench.race.standings import calibrated, present
@@ -76,6 +77,9 @@ def write(races: Sequence[Race], directory: Path) -> list[Path]:
     look = looks(races)
     sections = [section(race, look) for race in races]
     top = [tables.headline(races), tables.goals(races)]
+    found = by_kind(directory, list(CONTESTS))
+    if len(found) > 1:
+        top.insert(1, tables.kinds(found))
     made: dict[str, bytes] = {
         "data/settings.csv": settings_csv(sections).encode(),
         "README.md": markdown(sections, top).encode(),
@@ -163,6 +167,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "top": top,
         "rules": RULES,
         "families": [(family.title, family.code) for family in FAMILIES.values()],
+        "processors": list(dict.fromkeys(machine.sentence(race.machine) for race in races)),
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
         "command": commands(races),

@@ -155,7 +155,7 @@ def gather(stores: Sequence[Store]) -> Content:
         columns=columns(records),
         looks=look,
         records=records,
-        rules=(*words.RULES, *fairness.sentences(records)),
+        rules=(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
         settings=words.settings_count(records),
         excluded=words.excluded(records),
         versions=provenance.versions(records),
