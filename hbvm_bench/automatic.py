@@ -22,6 +22,7 @@ import numpy as np
 from hbvm_bench import machine, processes
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.identity import make_method, make_problem
+from hbvm_bench.measure import POSITION
 from hbvm_bench.race import truth
 from hbvm_bench.race.accuracy import sample_times
 from hbvm_bench.race.contests import chosen
@@ -53,9 +54,9 @@ class Side:
     method : str
         As it prints.
     energy, position : float
-        Largest relative error of the energy along the way; geometric mean of the relative
-        errors of the positions at the ten times at which the true solution is stored. At
-        round-off a single one of them would be a matter of luck.
+        Largest relative error of the energy along the way; geometric mean of the position
+        errors (`hbvm_bench.measure.POSITION`) at the ten times at which the true solution is
+        stored. At round-off a single one of them would be a matter of luck.
     steps : int
         Of one run.
     seconds : list of float
@@ -217,6 +218,7 @@ def markdown(results: Mapping[str, Result]) -> str:
         "# HBVM() against heyoka's Taylor method",
         "HBVM() chooses k, s and its steps by itself; heyoka's `Taylor(tol=1e-15)` likewise has no step to "
         "set. The ratio is the Taylor method's median time over ours, of one core's time, alternating.",
+        POSITION + " Here: the geometric mean over ten such times.",
         in_markdown(ratios(results)),
     ]
     for kind, result in results.items():

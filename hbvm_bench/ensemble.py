@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench import reference
 from hbvm_bench.campaign import Ensemble, TimingPlan
-from hbvm_bench.measure import Measured, ahead, largest_distance, positions
+from hbvm_bench.measure import Measured, ahead, largest_distance, position_error, positions
 from hbvm_bench.records import Compile, Counters, TimingRound
 from hbvm_bench.reference import Reference
 from hbvm_bench.starts import cloud
@@ -115,12 +115,10 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
     with np.errstate(all="ignore"):
         distance = largest_distance(problem, positions(problem, members.y))
         errors = _errors(problem, starts, members.y)
-        gap = np.empty((0, problem.system.dim))
+        position = phase = np.empty(0)
         if known is not None:
             gap = (members.y[witnesses] - known.high) - known.low
-        position = largest_distance(problem, positions(problem, gap))
-        phase = np.empty(0)
-        if known is not None:
+            position = position_error(problem, gap, known.high)
             phase = np.abs(ahead(problem, known.t, known.high, gap))
     measured = Measured(
         problem=problem,

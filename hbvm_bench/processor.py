@@ -52,8 +52,7 @@ def _time(function: Any) -> float:
 
 def _function(engine: Any, name: str) -> Any:
     address = engine.get_function_address(name)
-    function = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
-    return function
+    return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
 
 def _compiled(text: str) -> Any:

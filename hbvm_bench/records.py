@@ -13,7 +13,7 @@ import msgspec
 from hbvm_bench.campaign import Case, Limits, Role
 from hbvm_bench.laws import Law
 
-SCHEMA = 1
+SCHEMA = 2  # 1 had position errors in units of length
 
 Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
 

@@ -12,7 +12,7 @@ from hbvm_bench.report.canvas import Picture
 from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
 from hbvm_bench.report.style import Look, looks, method_name
-from hbvm_bench.store import Store
+from hbvm_bench.store import Store, progress
 from hbvm_bench.summaries import fairness
 from hbvm_bench.table import columns
 
@@ -104,7 +104,8 @@ class Content:
 def gather(stores: Sequence[Store]) -> Content:
     """Read the stores of one or more runs and make everything a report says.
 
-    A case that several runs have is taken from the one in which it finished last.
+    A case that several runs have is taken from the one that got further with it
+    (`hbvm_bench.store.progress`).
 
     Raises
     ------
@@ -112,12 +113,12 @@ def gather(stores: Sequence[Store]) -> Content:
         If a directory holds no run.
     """
     indices = [store.index() for store in stores]
-    latest: dict[str, tuple[Record, Store]] = {}
+    furthest: dict[str, tuple[Record, Store]] = {}
     for store in stores:
         for record in store.records():
-            if record.id not in latest or record.finished > latest[record.id][0].finished:
-                latest[record.id] = (record, store)
-    records = [record for record, _ in latest.values()]
+            if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
+                furthest[record.id] = (record, store)
+    records = [record for record, _ in furthest.values()]
     look = looks(records)
     texts = list(dict.fromkeys(record.case.problem for record in records))
     runs = [
@@ -126,7 +127,7 @@ def gather(stores: Sequence[Store]) -> Content:
             command=index.command,
             version=index.version,
             planned=len(index.ids),
-            missing=[case for number, case in index.listed() if number not in latest],
+            missing=[case for number, case in index.listed() if number not in furthest],
         )
         for index in indices
     ]
@@ -135,7 +136,7 @@ def gather(stores: Sequence[Store]) -> Content:
     sections = [
         section(
             text,
-            [(record, store) for record, store in latest.values() if record.case.problem == text],
+            [(record, store) for record, store in furthest.values() if record.case.problem == text],
             look,
             [case for run in runs for case in run.missing if printed[case.problem] == text],
             number,

@@ -185,7 +185,7 @@ OVER_TIME = (
     OverTime(
         key="position",
         title="Position error over time",
-        caption="Largest distance of a body from the stored 128-bit reference, at the reference's times.",
+        caption="Position error at the times of the stored 128-bit reference.",
         label="position error",
         get=lambda series: _pair(series, "position_t", "position"),
         low=-17,
