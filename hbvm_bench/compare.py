@@ -119,7 +119,7 @@ def compare(first: Store, second: Store) -> Comparison:
 
 
 def _by_case(records: Sequence[Record]) -> dict[bytes, Record]:
-    plain = {"settings": "recommended", "note": ""}  # words about the case
+    plain = {"settings": "chosen", "note": ""}  # words about the case
     return {msgspec.json.encode(msgspec.structs.replace(record.case, **plain)): record for record in records}
 
 

@@ -120,12 +120,13 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
             gap = (members.y[witnesses] - known.high) - known.low
             position = position_error(problem, gap, known.high)
             phase = np.abs(ahead(problem, known.t, known.high, gap))
+    t = np.full(ensemble.count, problem.t_end)
     measured = Measured(
         problem=problem,
-        t=np.full(ensemble.count, problem.t_end),
+        t=t,
         y=members.y,
         errors=errors,
-        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y).items()},
+        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y, t).items()},
         distance=distance,
         position_t=np.full(len(position), problem.t_end),
         position=np.sort(position),  # the last is the largest

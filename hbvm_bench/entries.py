@@ -8,7 +8,7 @@ from msgspec import Meta
 from hbvm_bench.grid import Grid
 from hbvm_bench.sweep import Scalar
 
-Settings = Literal["default", "recommended", "as published", "outside its domain"]
+Settings = Literal["chosen", "default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
 Positive = Annotated[float, Meta(gt=0)]
@@ -124,7 +124,7 @@ class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """
 
     use: str
-    settings: Settings = "recommended"
+    settings: Settings = "chosen"
     note: str = ""
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     only: list[str] = []

@@ -114,7 +114,7 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
     # an overflow is a result here: it becomes a sentence in the metrics
     with np.errstate(all="ignore"):
         errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
-        guards = {name: np.asarray(values, float) for name, values in problem.guards(y).items()}
+        guards = {name: np.asarray(values, float) for name, values in problem.guards(y, t).items()}
         distance = largest_distance(problem, positions(problem, y))
         position_t, position, phase = _position_error(problem, t, y, reference)
     stats = solution.stats

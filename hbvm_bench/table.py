@@ -25,7 +25,7 @@ HEADLINE = (
 RANKED_BY = "position_end"
 
 GROUPS = {
-    "on": "On the trajectory that was asked for, by position error at the end",
+    "on": "On the trajectory that was asked for",
     "off": "On another trajectory: the symmetry was lost; position and time are void",
     "ended": "Did not reach the end",
 }
@@ -100,6 +100,12 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     order = list(GROUPS)
     # sorting is stable: what has no number keeps the campaign's order
     return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
+
+
+def title_of(group: str, found: Sequence[Row]) -> str:
+    """Return the title of a group, with what it is sorted by where any of its rows has that."""
+    ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in found)
+    return GROUPS[group] + (", by position error at the end" if ranked else "")
 
 
 def numbers(records: Sequence[Record]) -> dict[str, int]:

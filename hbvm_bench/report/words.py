@@ -19,8 +19,8 @@ Every integrator starts from the same doubles and receives the same vector field
 once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
 
 The settings were declared in the campaign file before the run. How many each method has, and
-whether they are its defaults, its authors' advice, those of a publication or a use outside its
-domain, is in the table below.
+whether they are chosen by whoever wrote the file, the method's defaults, its authors' advice, those
+of a publication or a use outside its domain, is in the table below.
 
 Energy is never ranked without position: the table is sorted by the position error at the end, and
 the picture of energy against time stands beside that of position against time.
