@@ -73,11 +73,12 @@ def test_the_least_relative_tolerance_is_the_library_s():
         solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], rtol=np.nextafter(RTOL_FLOOR, 0.0))
 
 
-@pytest.mark.parametrize("name", ["stiff_chain", "fput"])
-def test_radau_has_the_jacobian_of_the_traced_system(name):
-    problem = problems.load(name, n=60)
+@pytest.mark.parametrize(("name", "more"), [("kepler", {}), ("fput", {"n": 60})])
+def test_radau_has_the_jacobian_of_the_traced_system(name, more):
+    problem = problems.load(name, **more)
     stepper = Radau(rtol=1e-6, atol=1e-8).compile(problem.system).start(problem.y0, problem.par)
-    assert np.allclose(stepper._solver.J.toarray(), dense(problem)(0.0, problem.y0), rtol=0, atol=1e-14)
+    J = stepper._solver.J  # sparse where it is large
+    assert np.allclose(J.toarray() if more else J, dense(problem)(0.0, problem.y0), rtol=0, atol=1e-14)
     # Its step takes no evaluation of the field for differences: 120 of them each time.
     before = stepper.stats.evaluations
     stepper._solver.jac(0.0, problem.y0, None)
