@@ -1,16 +1,32 @@
-"""HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side."""
+"""HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side.
 
+``python -m hbvm_bench.automatic REQUEST.json`` measures. Results of several kinds of
+processor lie side by side, one file each::
+
+    DIR/<kind>.json     e.g. znver4.json, znver4-avx2.json
+    DIR/README.md       all of them, one column for each kind
+"""
+
+import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
 from statistics import median, quantiles
 
+import msgspec
 import numpy as np
 
+from hbvm_bench import machine, processes
+from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.identity import make_method, make_problem
+from hbvm_bench.measure import POSITION
 from hbvm_bench.race import truth
 from hbvm_bench.race.accuracy import sample_times
 from hbvm_bench.race.contests import chosen
+from hbvm_bench.store import atomic, ensure_writable
 from hbvm_bench.timing import Run
 from integrators.protocol import MethodBase, Status
 from problems.errors import InputError
@@ -25,6 +41,10 @@ GOALS = {"outer_solar_system": 6.0, "sitnikov": 5.0, "kepler": 2.0, "henon_heile
 """How many times as long the Taylor method should take, declared before it was measured."""
 
 
+SCHEMA = 1
+LIBRARIES = ("hbvm-bench", "numpy", "numba", "heyoka")
+
+
 @dataclass(frozen=True)
 class Side:
     """One method's errors and samples on one problem.
@@ -34,9 +54,9 @@ class Side:
     method : str
         As it prints.
     energy, position : float
-        Largest relative error of the energy along the way; geometric mean of the relative
-        errors of the positions at the ten times at which the true solution is stored. At
-        round-off a single one of them would be a matter of luck.
+        Largest relative error of the energy along the way; geometric mean of the position
+        errors (`hbvm_bench.measure.POSITION`) at the ten times at which the true solution is
+        stored. At round-off a single one of them would be a matter of luck.
     steps : int
         Of one run.
     seconds : list of float
@@ -77,9 +97,197 @@ class Duel:
         return self.ours.energy <= self.theirs.energy and self.ours.position <= self.theirs.position
 
     @property
+    def verdict(self) -> str:
+        """``reached``, ``missed``, or ``not as accurate``."""
+        return "reached" if self.reached else "missed" if self.as_accurate else "not as accurate"
+
+    @property
     def reached(self) -> bool:
         """Whether the goal is: fast enough, and as accurate."""
         return self.as_accurate and self.ratio >= self.goal
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """What was measured on one kind of processor.
+
+    Attributes
+    ----------
+    duels : list of Duel
+        One per problem.
+    machine, versions : dict
+        Where and with what.
+    command, started : str
+        How to run it again, and when it ran.
+    """
+
+    duels: list[Duel]
+    machine: dict[str, str | int]
+    versions: dict[str, str]
+    command: str
+    started: str
+    schema: int = SCHEMA
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """What the measuring process is asked to do, and where its `Result` goes."""
+
+    problems: list[str]
+    rounds: int
+    command: str
+    out: str
+
+
+def main(path: Path) -> int:
+    """Run a request; return the exit code, 2 after an error that a user can mend."""
+    described = machine.describe(measure=True)
+    processes.settle()
+    request = msgspec.json.decode(path.read_bytes(), type=Request)
+    started = datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        found = duels(request.problems, request.rounds, lambda key: print(f"running {key}", file=sys.stderr))
+    except InputError as error:
+        print(f"hbvm-bench: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    result = Result(
+        duels=found,
+        machine=described,
+        versions={name: version(name) for name in LIBRARIES},
+        command=request.command,
+        started=started,
+    )
+    save(result, Path(request.out))
+    return 0
+
+
+def save(result: Result, path: Path) -> None:
+    """Write a result, all of it or nothing."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+
+
+def load(path: Path) -> Result:
+    """Read a result.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the file is something else.
+    """
+    try:
+        result = msgspec.json.decode(path.read_bytes(), type=Result)
+    except (OSError, msgspec.MsgspecError) as error:
+        raise InputError(f"{str(path)!r} is not the result of automatic: {error}.") from None
+    if result.schema != SCHEMA:
+        raise InputError(f"{str(path)!r} was written by another version; run automatic again.")
+    return result
+
+
+def keep(result: Result, directory: Path) -> Path:
+    """Write a result beside those of other kinds of processor, and the page that shows all.
+
+    Problems that were not run this time are kept from the file of the same kind.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the directory cannot be written, or what lies there is no result.
+    """
+    ensure_writable(directory)
+    path = directory / f"{machine.kind(result.machine)}.json"
+    if path.is_file():
+        new = {duel.problem: duel for duel in result.duels}
+        old = {duel.problem: duel for duel in load(path).duels}
+        both = old | new
+        order = [key for key in GOALS if key in both]
+        result = msgspec.structs.replace(result, duels=[both[key] for key in order])
+    save(result, path)
+    page = directory / "README.md"
+    with atomic(page) as temporary:
+        temporary.write_text(markdown(by_kind(directory)), encoding="utf-8")
+    return page
+
+
+def by_kind(directory: Path) -> dict[str, Result]:
+    """Return the results in a directory by the kind of processor."""
+    return {path.stem: load(path) for path in sorted(directory.glob("*.json"))}
+
+
+def markdown(results: Mapping[str, Result]) -> str:
+    """Return the page: the ratios by kind of processor, then each kind's numbers."""
+    parts = [
+        "# HBVM() against heyoka's Taylor method",
+        "HBVM() chooses k, s and its steps by itself; heyoka's `Taylor(tol=1e-15)` likewise has no step to "
+        "set. The ratio is the Taylor method's median time over ours, of one core's time, alternating.",
+        POSITION + " Here: the geometric mean over ten such times.",
+        in_markdown(ratios(results)),
+    ]
+    for kind, result in results.items():
+        parts += [f"## {kind}", machine.sentence(result.machine), in_markdown(sides(result.duels))]
+        libraries = ", ".join(f"{name} {number}" for name, number in result.versions.items())
+        parts += [f"Measured on {result.started[:10]} with {libraries}: `{result.command}`"]
+    return "\n\n".join(parts) + "\n"
+
+
+def ratios(results: Mapping[str, Result]) -> Table:
+    """Return how many times as long the Taylor method takes, one column for each kind of processor."""
+    rows = []
+    for key, goal in GOALS.items():
+        found = [
+            next((duel for duel in result.duels if duel.problem == key), None) for result in results.values()
+        ]
+        if any(found):
+            cells = ("not run" if duel is None else f"{duel.ratio:.2f}× {duel.verdict}" for duel in found)
+            rows.append((key, f"≥ {goal:g}", *cells))
+    return Table(
+        "How many times as long as HBVM() the Taylor method takes",
+        ("problem", "goal", *results),
+        rows,
+        "Columns: LLVM's name of the processor; -avx2: our code compiled without AVX-512, heyoka's as ever.",
+    )
+
+
+def sides(found: Sequence[Duel]) -> Table:
+    """Return both sides' errors and times."""
+    rows = []
+    for duel in found:
+        low, high = duel.quartiles
+        for first, side in ((True, duel.ours), (False, duel.theirs)):
+            rows.append(
+                (
+                    duel.problem if first else "",
+                    f"≥ {duel.goal:g}" if first else duel.verdict,
+                    f"{duel.ratio:.2f}" if first else "",
+                    f"{low:.2f} … {high:.2f}" if first else "",
+                    side.method,
+                    f"{1e3 * median(side.seconds):.3g} ms",
+                    str(side.steps),
+                    f"{side.energy:.1e}",
+                    f"{side.position:.1e}",
+                )
+            )
+    return Table(
+        "Errors and times",
+        ("problem", "goal", "Taylor / HBVM", "quartiles", "method", "time", "steps", "energy", "position"),
+        rows,
+        words=(4,),
+    )
+
+
+def asked(keys: Sequence[str], rounds: int) -> list[str]:
+    """Return the problems to run, checked; all for none.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an unknown key, or fewer than two rounds.
+    """
+    if rounds < 2:
+        raise InputError(f"rounds must be at least 2, not {rounds}.")
+    found = [contest.key for contest in chosen(list(keys) or list(GOALS))]
+    for key in found:
+        if key not in GOALS:
+            raise InputError(f"{key!r} is not among {', '.join(GOALS)}.")
+    return found
 
 
 def duels(
@@ -103,12 +311,8 @@ def duels(
     problems.errors.MissingLibraryError
         If heyoka is missing.
     """
-    if rounds < 2:
-        raise InputError(f"rounds must be at least 2, not {rounds}.")
     found = []
-    for contest in chosen(list(keys) or list(GOALS)):
-        if contest.key not in GOALS:
-            raise InputError(f"{contest.key!r} is not among {', '.join(GOALS)}.")
+    for contest in chosen(asked(keys, rounds)):
         tell(contest.key)
         problem = make_problem(contest.problem)
         found.append(_duel(contest.key, problem, rounds))
@@ -155,3 +359,7 @@ def _errors(
         if t in true.t[1:]
     ]
     return energy, float(np.exp(np.mean(np.log(positions)))), stepper.stats.steps
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

@@ -176,7 +176,7 @@ class Case(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     problem: str
     method: str
     grid: Grid = Grid()
-    settings: Settings = "recommended"
+    settings: Settings = "chosen"
     note: str = ""
     checks: Checks = Checks()
     ensemble: Ensemble | None = None

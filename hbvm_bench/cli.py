@@ -36,6 +36,7 @@ SEPARATE = {
     "doctor": "hbvm_bench.commands.doctor",
     "engines": "hbvm_bench.commands.engines",
     "export": "hbvm_bench.commands.export",
+    "headline": "hbvm_bench.commands.headline",
     "gallery": "hbvm_bench.commands.gallery",
     "inspect": "hbvm_bench.commands.inspect",
     "report": "hbvm_bench.commands.report",

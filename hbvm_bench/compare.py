@@ -8,6 +8,7 @@ from statistics import fmean, median, variance
 
 import msgspec
 
+from hbvm_bench import machine
 from hbvm_bench.campaign import Case
 from hbvm_bench.metrics import METRICS, Metric
 from hbvm_bench.records import Record, Value
@@ -118,7 +119,7 @@ def compare(first: Store, second: Store) -> Comparison:
 
 
 def _by_case(records: Sequence[Record]) -> dict[bytes, Record]:
-    plain = {"settings": "recommended", "note": ""}  # words about the case
+    plain = {"settings": "chosen", "note": ""}  # words about the case
     return {msgspec.json.encode(msgspec.structs.replace(record.case, **plain)): record for record in records}
 
 
@@ -136,13 +137,13 @@ def _behind(both: Sequence[tuple[Record, Record]]) -> list[str]:
         if before.versions == after.versions and before.id != after.id:
             found["the sources of hbvm-bench or of a method"] = None
         for name, was in before.machine.items():
-            if (now := after.machine.get(name)) != was:
+            if (now := after.machine.get(name, was)) != was and name not in machine.MEASURED:
                 found[f"{name.replace('_', ' ')} {was} → {now}"] = None
     return list(found)
 
 
 def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
-    strict = before.id == after.id and before.machine == after.machine
+    strict = before.id == after.id and machine.same(before.machine, after.machine)
 
     def differs(what: str, was: str, now: str) -> None:
         found.changed.append(Change(before.case.problem, before.case.method, what, was, now))

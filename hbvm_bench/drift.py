@@ -1,4 +1,4 @@
-"""From an error over time to its law: bounded, square root, linear or exponential.
+"""From an error over time to its law: bounded, square root, linear, exponential or a drift.
 
 Round-off that is unbiased makes the error of a conserved quantity walk at random,
 like t^(1/2) (Brouwer's law); a biased rounding, or a method that does not conserve,
@@ -6,6 +6,8 @@ makes it grow like t; a fixed amplitude is what a symplectic method at a step th
 resolves the motion shows before its round-off does. Several laws can act at once,
 so each is fitted together with a floor, in logarithms, to the rms over windows of
 time that are equally long in log t, and over trajectories from perturbed starts.
+The power of t alone does not tell a random walk from one that drifts slowly: the
+mean over the starts is tested against its own scatter before a law is named.
 
 D. Brouwer, "On the accumulation of errors in numerical integration",
 The Astronomical Journal 46 (1937) 149-153.
@@ -30,16 +32,49 @@ FEWEST_ABOVE = 3  # windows in which a growth is above its floor: fewer may be a
 SHORTEST = 1.2  # decades
 NOISE = 0.05  # of the logarithm: no fit is taken to be better than this
 CONFIDENCE = 0.95
+STANDARD_ERRORS = 3.0  # by which the mean over the starts must be away from 0 to be called a drift
 EVIDENCE = 6.0  # by which the criterion of a growth must beat a bound: strong evidence
 STEEPEST = 12.0  # powers of t, and e-foldings times 40, that are searched
 
 LAWS: dict[str, str] = {
     "bounded": "stays within a bound",
-    "square root": "grows like t^(1/2), as unbiased round-off does",
+    "square root": "grows like t^(1/2)",
     "linear": "grows like t",
     "power": "grows like another power of t",
     "exponential": "grows like exp(t)",
+    "drift": "drifts: the mean over the starts is not 0",
 }
+CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is told by the mean
+
+
+@dataclass(frozen=True)
+class Mean:
+    """The mean of signed errors over the starts, at the end and without the offset of each.
+
+    Attributes
+    ----------
+    value, error : float
+        The mean and its standard error, which is infinite for one start.
+    low, high : float
+        The 95 % Student interval.
+    positive, starts : int
+        How many of the starts end above 0.
+    span : float
+        Time in which it grew.
+    """
+
+    value: float
+    error: float
+    low: float
+    high: float
+    positive: int
+    starts: int
+    span: float
+
+    @property
+    def drifts(self) -> bool | None:
+        """Whether the mean is more than `limit` standard errors from 0; ``None`` for one start."""
+        return None if self.starts < 2 else abs(self.value) > limit(self.starts) * self.error
 
 
 @dataclass(frozen=True)
@@ -61,13 +96,14 @@ class Drift:
     growth : float
         With the exponential law, the rate in 1/t; else 0.
     rate, rate_low, rate_high : float
-        Mean signed drift per unit of time, end value over span, with the 95 % Student
-        interval over the starts; infinite interval for one start, not-a-number for
-        errors without a sign.
+        ``mean`` per unit of time, with its interval; infinite interval for one start,
+        not-a-number for errors without a sign.
     starts : int
         Number of trajectories.
     reached : float
         What the growth alone has reached at the end of the span; 0 for a bound.
+    mean : Mean or None
+        Over the starts; ``None`` for errors without a sign.
     """
 
     law: str | None
@@ -82,6 +118,7 @@ class Drift:
     rate_high: float
     starts: int
     reached: float = 0.0
+    mean: Mean | None = None
 
     def curve(self, t: ArrayLike, end: float) -> Array:
         """Return the law as it was fitted, shape (n,), for drawing; not-a-number where there is none.
@@ -112,31 +149,45 @@ def rms(errors: ArrayLike) -> Array:
     return scale * np.sqrt(np.mean((rows / scale) ** 2, axis=0))
 
 
-def rate(t: ArrayLike, errors: ArrayLike) -> tuple[float, float, float]:
-    """Return the mean drift per unit of time and its 95 % interval over the starts.
+def limit(starts: int) -> float:
+    """Return how many standard errors a mean over ``starts`` may be from 0 and not be called a drift.
 
-    For each trajectory the end value over the span, which is the maximum-likelihood
-    estimate of the drift of a random walk.
+    `STANDARD_ERRORS`, or Student's 95 % quantile where few starts make that larger.
+    """
+    return max(STANDARD_ERRORS, float(student.ppf(0.5 + CONFIDENCE / 2, starts - 1)))
+
+
+def mean(t: ArrayLike, errors: ArrayLike) -> Mean:
+    """Return the mean over the starts of what the errors have grown by at the end.
+
+    The offset of a trajectory, its mean over the first window of time, is taken off:
+    what the evaluation of an invariant adds throughout is no drift. End less begin is
+    the maximum-likelihood estimate of the drift of a random walk.
 
     Parameters
     ----------
     t : array_like, shape (n,)
-        Times since the start, ascending.
+        Times since the start, positive and ascending.
     errors : array_like, shape (starts, n)
         Signed errors.
     """
+    times = np.asarray(t, dtype=np.float64)
     rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))
-    each = rows[:, -1] / float(np.asarray(t, dtype=np.float64)[-1])
-    mean, n = float(np.mean(each)), each.size
-    error = math.sqrt(float(np.sum((each - mean) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
-    return (mean, *_interval(mean, error, n))
+    first = _windows(times)[1] == 0
+    first[-1] = False
+    ends = rows[:, -1] - rows[:, first].mean(axis=1)
+    value, n = float(np.mean(ends)), ends.size
+    error = math.sqrt(float(np.sum((ends - value) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
+    span = float(times[-1] - times[first].mean())
+    return Mean(value, error, *_interval(value, error, n), int(np.sum(ends > 0.0)), n, span)
 
 
 def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
     """Find the law of an error.
 
     A law with a name is preferred to an arbitrary power of t, unless the interval of
-    the power excludes both 1/2 and 1.
+    the power excludes both 1/2 and 1. Signed errors that grow by a power of t, whatever
+    it is, are called a drift where the mean over the starts is one (`Mean.drifts`).
 
     Parameters
     ----------
@@ -158,7 +209,7 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
         is not finite.
     """
     times, rows = _checked(t, errors)
-    drift = rate(times, rows) if signed else (math.nan,) * 3
+    drift = mean(times, rows) if signed else None
     middle, label = _windows(times)
     values = _windowed(rows, label)
     if not np.any(values):
@@ -170,14 +221,16 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
         return _drift(
             None, why, (math.nan, -math.inf, math.inf), float(values[kept].min()), 0.0, drift, len(rows)
         )
-    fits = {law: _fitted(law, middle[kept], values[kept]) for law in LAWS}
+    fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
     slope = _slope(times, rows, fits["power"])
     named = [
-        name for name in LAWS if name != "power" or not any(slope[1] <= a <= slope[2] for a in (0.5, 1.0))
+        name for name in CURVES if name != "power" or not any(slope[1] <= a <= slope[2] for a in (0.5, 1.0))
     ]
     law = min(named, key=lambda name: fits[name].score)
     if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
         law = "bounded"
+    if drift is not None and drift.drifts and law in ("square root", "linear", "power"):
+        fits["drift"], law = fits["power"], "drift"
     return _drift(
         law,
         "",
@@ -318,8 +371,10 @@ def _drift(
     slope: tuple[float, float, float],
     floor: float,
     growth: float,
-    drift: tuple[float, ...],
+    drift: Mean | None,
     starts: int,
     reached: float = 0.0,
 ) -> Drift:
-    return Drift(law, why, *slope, floor, growth, drift[0], drift[1], drift[2], starts, reached)
+    ends = (math.nan,) * 3 if drift is None else (drift.value, drift.low, drift.high)
+    rate, low, high = (end / (drift.span if drift else 1.0) for end in ends)
+    return Drift(law, why, *slope, floor, growth, rate, low, high, starts, reached, drift)

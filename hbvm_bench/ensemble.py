@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench import reference
 from hbvm_bench.campaign import Ensemble, TimingPlan
-from hbvm_bench.measure import Measured, ahead, largest_distance, positions
+from hbvm_bench.measure import Measured, ahead, largest_distance, position_error, positions
 from hbvm_bench.records import Compile, Counters, TimingRound
 from hbvm_bench.reference import Reference
 from hbvm_bench.starts import cloud
@@ -134,19 +134,18 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
     with np.errstate(all="ignore"):
         distance = largest_distance(problem, positions(problem, members.y))
         errors = _errors(problem, starts, members.y)
-        gap = np.empty((0, problem.system.dim))
+        position = phase = np.empty(0)
         if known is not None:
             gap = (members.y[witnesses] - known.high) - known.low
-        position = largest_distance(problem, positions(problem, gap))
-        phase = np.empty(0)
-        if known is not None:
+            position = position_error(problem, gap, known.high)
             phase = np.abs(ahead(problem, known.t, known.high, gap))
+    t = np.full(ensemble.count, problem.t_end)
     measured = Measured(
         problem=problem,
-        t=np.full(ensemble.count, problem.t_end),
+        t=t,
         y=members.y,
         errors=errors,
-        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y).items()},
+        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y, t).items()},
         distance=distance,
         position_t=np.full(len(position), problem.t_end),
         position=np.sort(position),  # the last is the largest

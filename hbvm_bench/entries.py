@@ -10,7 +10,7 @@ from hbvm_bench.sweep import Scalar
 from problems import limits
 from problems.errors import InputError, shown
 
-Settings = Literal["default", "recommended", "as published", "outside its domain"]
+Settings = Literal["chosen", "default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
 Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
@@ -129,7 +129,7 @@ class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """
 
     use: str
-    settings: Settings = "recommended"
+    settings: Settings = "chosen"
     note: str = ""
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     only: list[str] = []

@@ -29,6 +29,11 @@ class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     rate, rate_low, rate_high : float or None
         Mean signed drift per unit of time, with its 95 % interval over the starts;
         for the energy only, the other invariants' errors have no sign.
+    mean, mean_error : float or None
+        Mean over the starts at the end, without the offset of each, and its standard
+        error (`hbvm_bench.drift.Mean`); for the energy of several starts only.
+    positive : int or None
+        How many of the starts end above 0.
     reached : float
         What the growth alone reached at the end.
     end : float
@@ -47,6 +52,9 @@ class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     rate: float | None = None
     rate_low: float | None = None
     rate_high: float | None = None
+    mean: float | None = None
+    mean_error: float | None = None
+    positive: int | None = None
     reached: float = 0.0
     end: float = 0.0
     starts: int = 0
@@ -82,6 +90,7 @@ def find(t: Array, errors: Array, *, signed: bool) -> Law:
     if size < 2:
         return Law(why="the error is not finite from the first samples on", starts=len(errors))
     found = drift.fit(t[:size], errors[:, :size], signed=signed)
+    several = found.mean if found.starts > 1 else None
     cut = "" if size == good.size else f"only to t = {t[size - 1]:.4g}, where the error is last finite"
     return Law(
         law=found.law,
@@ -94,6 +103,9 @@ def find(t: Array, errors: Array, *, signed: bool) -> Law:
         rate=_finite(found.rate),
         rate_low=_finite(found.rate_low),
         rate_high=_finite(found.rate_high),
+        mean=several.value if several else None,
+        mean_error=several.error if several else None,
+        positive=several.positive if several else None,
         reached=found.reached,
         end=float(t[size - 1]),
         starts=len(errors),

@@ -2,21 +2,108 @@
 
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from problems.errors import InputError
 
-def describe() -> dict[str, str | int]:
-    """Return processor, cores, memory, instruction sets, operating system and Python."""
-    return {
+VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
+
+
+MEASURED = ("vector_bits", "clock_ghz")
+"""What `describe` measures: it may differ from one look at a processor to the next."""
+
+FEATURES = "NUMBA_CPU_FEATURES"
+NAME = "NUMBA_CPU_NAME"
+
+
+def describe(*, measure: bool = False) -> dict[str, str | int]:
+    """Return processor, cores, memory, instruction sets, operating system and Python.
+
+    Parameters
+    ----------
+    measure : bool
+        Whether to measure the width of the arithmetic and the clock too (some 50 ms): for
+        whatever will be printed beside times.
+    """
+    from llvmlite import binding
+
+    described: dict[str, str | int] = {
         "processor": _processor(),
+        "family": f"{VENDORS.get(_cpuinfo('vendor_id'), _cpuinfo('vendor_id'))} family "
+        f"{_cpuinfo('cpu family') or '?'}, model {_cpuinfo('model') or '?'}",
+        "llvm_processor": binding.get_host_cpu_name(),
         "cores": len(cores()),
         "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
         "vector_instructions": _vector_instructions(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": f"{platform.python_implementation()} {platform.python_version()}",
     }
+    if os.environ.get(NAME) or FEATURES in os.environ:
+        without = "-avx512f" in os.environ.get(FEATURES, "").split(",")
+        described["ours_built_for"] = "AVX2" if without else os.environ.get(NAME) or "other instructions"
+    if measure:
+        from hbvm_bench import processor
+
+        described |= processor.measured()
+    return described
+
+
+def same(a: Mapping[str, str | int], b: Mapping[str, str | int]) -> bool:
+    """Whether two descriptions are of one machine: equal in what both say and neither measured."""
+    restricted = a.get("ours_built_for") == b.get("ours_built_for")
+    return restricted and all(a[name] == b[name] for name in a.keys() & b.keys() if name not in MEASURED)
+
+
+def kind(described: Mapping[str, str | int]) -> str:
+    """Return the kind of processor in one word, for file names and columns: ``znver4``, ``znver4-avx2``."""
+    built = described.get("ours_built_for")
+    words = [str(described.get("llvm_processor", "unknown")), *([str(built).lower()] if built else [])]
+    return "-".join(words).replace(" ", "-").replace("/", "-")
+
+
+def sentence(described: Mapping[str, str | int]) -> str:
+    """Say what kind of processor times and their ratios belong to."""
+    names = [str(described[key]) for key in ("family",) if key in described]
+    names += [f"LLVM: {described['llvm_processor']}"] if "llvm_processor" in described else []
+    bits, clock = described.get("vector_bits"), described.get("clock_ghz")
+    width = f"arithmetic {bits} bits wide" if bits else "width of the arithmetic not recorded"
+    built = described.get("ours_built_for")
+    return (
+        f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"
+        + (f" ({'; '.join(names)})" if names else "")
+        + f", {described.get('vector_instructions', 'vector instructions not recorded')}, {width}"
+        + (f", {clock} GHz" if clock else "")
+        + (
+            f"; what numba compiles, our code, was restricted to {built}, the peers' own code was not"
+            if built
+            else ""
+        )
+        + "."
+    )
+
+
+def restricted_to_avx2() -> dict[str, str]:
+    """Return the environment in which our code, and all else that numba compiles, does without AVX-512.
+
+    Libraries with compilers of their own (heyoka, JAX) or compiled code (REBOUND, SciPy) do not
+    look at it. Only a process that starts with it is restricted.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the processor has no AVX2.
+    """
+    from llvmlite import binding
+
+    features = binding.get_host_cpu_features()
+    if not features.get("avx2"):
+        raise InputError(f"this processor ({_processor()}) has no AVX2; leave --avx2 out.")
+    kept = {name: on and not name.startswith(("avx512", "avx10")) for name, on in features.items()}
+    # LLVM's name of the processor alone would bring AVX-512 back
+    kept["avx512f"] = False
+    return {FEATURES: ",".join(f"{'+' if on else '-'}{name}" for name, on in sorted(kept.items()))}
 
 
 def cores() -> list[int]:

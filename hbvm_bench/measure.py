@@ -114,7 +114,7 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
     # an overflow is a result here: it becomes a sentence in the metrics
     with np.errstate(all="ignore"):
         errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
-        guards = {name: np.asarray(values, float) for name, values in problem.guards(y).items()}
+        guards = {name: np.asarray(values, float) for name, values in problem.guards(y, t).items()}
         distance = largest_distance(problem, positions(problem, y))
         position_t, position, phase = _position_error(problem, t, y, reference)
     stats = solution.stats
@@ -203,6 +203,30 @@ def largest_distance(problem: Problem, q: Array) -> Array:
     return (safe * np.sqrt(((groups / safe[:, :, None]) ** 2).sum(axis=2))).max(axis=1)
 
 
+POSITION = (
+    "A position error is the largest distance of a body from where the 128-bit solution has it, relative to "
+    "the largest distance of a body from the origin at the stored times of that solution. Without bodies all "
+    "positions together are one vector."
+)
+"""The one definition, for every page that prints such an error."""
+
+
+def position_error(problem: Problem, difference: Array, true: Array) -> Array:
+    """Return position errors, shape (n,), as `POSITION` says.
+
+    Parameters
+    ----------
+    problem : Problem
+        Says which part of a state is a position, and of which body.
+    difference : ndarray, shape (n, dim)
+        States less the true ones.
+    true : ndarray, shape (m, dim)
+        The true states at all their stored times; they give the size.
+    """
+    size = float(largest_distance(problem, positions(problem, true)).max(initial=0.0))
+    return largest_distance(problem, positions(problem, difference)) / (size or 1.0)
+
+
 def _position_error(
     problem: Problem, t: Array, y: Array, reference: Reference | None
 ) -> tuple[Array, Array, Array]:
@@ -211,8 +235,8 @@ def _position_error(
     _, ours, theirs = np.intersect1d(t, reference.t, return_indices=True)
     # the reference is a pair of doubles, so that its own rounding does not enter the difference
     difference = (y[ours] - reference.high[theirs]) - reference.low[theirs]
-    distance = largest_distance(problem, positions(problem, difference))
-    return t[ours], distance, ahead(problem, t[ours], reference.high[theirs], difference)
+    error = position_error(problem, difference, reference.high)
+    return t[ours], error, ahead(problem, t[ours], reference.high[theirs], difference)
 
 
 def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:

@@ -8,8 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from hbvm_bench.campaign import Campaign, Case
-from hbvm_bench.records import Record
-from hbvm_bench.store import INDEX, Index, Store
+from hbvm_bench.store import INDEX, Index, Store, progress
 from problems.errors import InputError
 
 T = TypeVar("T")
@@ -19,8 +18,8 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
     """Write the cases of several runs into a new one.
 
     A case that several runs have, by its id, is taken from the one that got further with
-    it: a measured case before a failure, then the one with more rounds of timing, then
-    the later one. The same case under other versions or sources has another id and stays a row of its own.
+    it (`hbvm_bench.store.progress`). The same case under other versions or sources has
+    another id and stays a row of its own.
 
     Parameters
     ----------
@@ -52,7 +51,7 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
         for case_id in cases:
             found = [(record, run) for run in runs if (record := run.load(case_id)) is not None]
             if found:
-                record, run = max(found, key=lambda pair: _progress(pair[0]))
+                record, run = max(found, key=lambda pair: progress(pair[0]))
                 out.save(record, run.series_file(case_id) or None)
                 made += 1
         places = [shlex.quote(str(run.directory)) for run in runs]
@@ -72,11 +71,6 @@ def stores(directories: Sequence[Path]) -> list[Store]:
     if len({path.resolve() for path in directories}) < 2:
         raise InputError("merge needs two runs or more, as in: hbvm-bench merge runs/a runs/b --out runs/c.")
     return [Store(path) for path in directories]
-
-
-def _progress(record: Record) -> tuple[bool, int, str]:
-    rounds = len(record.timing.rounds) if record.timing else 0
-    return record.result.outcome == "ok", rounds, record.finished
 
 
 def _together(campaigns: Sequence[Campaign]) -> Campaign:

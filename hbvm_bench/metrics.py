@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from hbvm_bench import quantities
-from hbvm_bench.measure import Measured
+from hbvm_bench.measure import POSITION, Measured
 from hbvm_bench.metric import GUARD_TOLERANCE, Metric, guard_violation, value
 from hbvm_bench.records import Value
 from problems.errors import unknown
@@ -121,18 +121,18 @@ _TABLE = [
         key="position_end",
         label="position error at the end",
         short="position",
-        unit="length",
+        unit="relative",
         better="lower",
         scale="log",
         function=quantities.position_end,
-        description="Largest distance of a body from where the 128-bit reference has it at the end time.",
+        description="Position error at the end time. " + POSITION,
         same_trajectory=True,
     ),
     Metric(
         key="position_max",
         label="position error",
         short="position, max",
-        unit="length",
+        unit="relative",
         better="lower",
         scale="log",
         function=quantities.position_max,

@@ -5,7 +5,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from hbvm_bench import machine
 from hbvm_bench.worker import ENVIRONMENT
@@ -13,14 +14,17 @@ from hbvm_bench.worker import ENVIRONMENT
 STDERR = 2  # the file descriptor
 
 
-def wait(command: Sequence[str]) -> int:
+def wait(command: Sequence[str], environment: Mapping[str, str] = MappingProxyType({})) -> int:
     """Run a command with one thread for every library, and return its exit code.
 
-    What it prints goes to our standard error. On Ctrl-C, or whatever else ends the waiting, it
-    is killed first.
+    ``environment`` is added to the one it inherits. What it prints goes to our standard error. On
+    Ctrl-C, or whatever else ends the waiting, it is killed first.
     """
     child = subprocess.Popen(
-        list(command), stdin=subprocess.DEVNULL, stdout=STDERR, env={**os.environ, **ENVIRONMENT}
+        list(command),
+        stdin=subprocess.DEVNULL,
+        stdout=STDERR,
+        env={**os.environ, **ENVIRONMENT, **environment},
     )
     try:
         return child.wait()

@@ -16,7 +16,7 @@ from hbvm_bench.campaign import Case, Limits, Role
 from hbvm_bench.laws import Law
 
 T = TypeVar("T")
-SCHEMA = 1
+SCHEMA = 2  # 1 had position errors in units of length
 COMPILING = "compiling"
 # They command a terminal, or turn the direction in which a line is read.
 COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")

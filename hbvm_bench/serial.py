@@ -44,7 +44,7 @@ def time_cases(
     hbvm_bench.execute.InterruptedRunError
         If the run was stopped; every visit that ended is in the store.
     """
-    here = machine.describe()
+    here = machine.describe(measure=True)
     failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
         for number in range(plan.rounds):
@@ -113,6 +113,6 @@ def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:
 
     Why a round failed is forgotten: it is tried again.
     """
-    if record.timing is None or (record.timing.machine and record.timing.machine != here):
+    if record.timing is None or (record.timing.machine and not machine.same(record.timing.machine, here)):
         return Timing(machine=here)
     return msgspec.structs.replace(record.timing, why="")

@@ -1,8 +1,8 @@
 """A child process under hard limits of wall time and memory.
 
 Address-space limits are too blunt for libraries that compile at run time, so
-the resident memory is watched from outside and the child is killed when it
-passes its limit, whatever it is doing.
+the resident memory of the child, and of what it starts, is watched from outside;
+all are killed when they pass the limit together, whatever they are doing.
 """
 
 import contextlib
@@ -42,7 +42,7 @@ class Ended:
     seconds : float
         Wall time from start to end.
     peak_gib : float
-        Largest resident memory.
+        Largest memory, with that of the processes it started.
     output : str
         The end of what it printed.
     """
@@ -102,7 +102,7 @@ def run(
     peak, delay = 0.0, POLL
     try:
         while child.poll() is None:
-            peak = max(peak, _peak_gib(child.pid))
+            peak = max(peak, _peak_gib(child.pid), _together_gib(child.pid))
             if _stopping.is_set():
                 cause = "stopped"
             elif peak > limits.memory_gib:
@@ -169,6 +169,31 @@ def _peak_gib(pid: int) -> float:
         int((sizes.get(name) or "0").split()[0]) for name in ("VmHWM", "VmRSS", "VmSwap")
     )
     return max(peak, resident + swapped) / 2**20  # what was swapped out is eaten, too
+
+
+def _together_gib(session: int) -> float:
+    """Return what the processes of a session hold together; memory that they share counts once."""
+    members = [pid for pid in _processes() if _session_of(pid) == session]
+    return sum(map(_share_gib, members)) if len(members) > 1 else 0.0
+
+
+def _processes() -> list[int]:
+    return [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
+
+
+def _session_of(pid: int) -> int | None:
+    with contextlib.suppress(OSError):
+        return os.getsid(pid)
+    return None
+
+
+def _share_gib(pid: int) -> float:
+    try:
+        rolled = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii", errors="replace")
+    except OSError:  # it has just ended
+        return 0.0
+    sizes = {name: value for name, _, value in (line.partition(":") for line in rolled.splitlines())}
+    return sum(int((sizes.get(name) or "0").split()[0]) for name in ("Pss", "SwapPss")) / 2**20
 
 
 def _signal_name(number: int) -> str:

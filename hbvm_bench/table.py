@@ -26,7 +26,7 @@ HEADLINE = (
 RANKED_BY = "position_end"
 
 GROUPS = {
-    "on": "On the trajectory that was asked for, by position error at the end",
+    "on": "On the trajectory that was asked for",
     "off": "On another trajectory: the symmetry was lost; position and time are void",
     "ended": "Did not reach the end",
 }
@@ -114,6 +114,12 @@ def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[R
 def at_once(ensemble: Ensemble | None) -> str:
     """Return what follows a problem's name where it is an ensemble, else ``""``."""
     return f", {ensemble.count} trajectories at once" if ensemble else ""
+
+
+def title_of(group: str, found: Sequence[Row]) -> str:
+    """Return the title of a group, with what it is sorted by where any of its rows has that."""
+    ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in found)
+    return GROUPS[group] + (", by position error at the end" if ranked else "")
 
 
 def numbers(records: Sequence[Record]) -> dict[str, int]:

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from hbvm_bench.metrics import Metric
 from hbvm_bench.records import Record
-from hbvm_bench.table import GROUPS, Row, at_once, columns, numbers, rows, tasks
+from hbvm_bench.table import Row, at_once, columns, numbers, rows, tasks, title_of
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -86,7 +86,8 @@ def _results(
             if group:
                 made.add_section()
             group = row.group
-            made.add_row("", Text(GROUPS[group], style="bold italic"))
+            title = title_of(group, [one for one in lines if one.group == group])
+            made.add_row("", Text(title, style="bold italic"))
         number = str(number_of[row.record.id])
         made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
         if row.remark:

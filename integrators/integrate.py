@@ -95,7 +95,7 @@ class Solution:
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that a symmetry keeps at exactly zero, by name."""
-        return self.problem.guards(self.y)
+        return self.problem.guards(self.y, self.t)
 
 
 def integrate(

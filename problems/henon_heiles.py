@@ -29,14 +29,6 @@ def _energy(q: Any, p: Any) -> Any:
     return kinetic + ((q[0] ** 2 + q[1] ** 2) / 2 + (q[0] ** 2 * q[1] - q[1] ** 3 / 3))
 
 
-def _beyond_triangle(q: Any, m: Any) -> Any:
-    def beyond(side: Any) -> Any:
-        return (side + m.abs(side)) / 2  # exactly 0 on the inner side
-
-    slanted = math.sqrt(3) * m.abs(q[0]) + q[1] - 1
-    return beyond(-0.5 - q[1]) + beyond(slanted)
-
-
 def henon_heiles(
     *,
     energy: float = 1 / 6 - 1e-3,
@@ -65,8 +57,8 @@ def henon_heiles(
     Returns
     -------
     Problem
-        State ``[q1, q2, p1, p2]``; invariant: energy; below the energy 1/6 a guard
-        ``beyond_triangle``: how far the point has left the triangle of the saddles.
+        State ``[q1, q2, p1, p2]``; invariant: energy. Below the energy 1/6 the motion stays in
+        the triangle of the saddles (`beyond_triangle`): by its energy, not by a symmetry.
 
     Raises
     ------
@@ -76,14 +68,7 @@ def henon_heiles(
     """
     given.finite("henon_heiles", energy=energy, q1=q1, q2=q2, direction=direction, t_end=t_end)
     momentum = [given.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
-    # What the saddles bound, the energy must close: only below 1/6, and only from inside.
-    bounded = energy < ESCAPE and bool(inside_triangle([[q1, q2]])[0])
-    system = Hamiltonian(
-        _energy,
-        dof=2,
-        guards={"beyond_triangle": _beyond_triangle} if bounded else {},
-        name="henon_heiles",
-    )
+    system = Hamiltonian(_energy, dof=2, name="henon_heiles")
     return Problem(
         system,
         q0=[q1, q2],
@@ -112,6 +97,25 @@ def _start(energy: float, q1: float, q2: float, direction: float) -> tuple[Any, 
         )
     speed = mpmath.sqrt(2 * kinetic)
     return speed * mpmath.cos(direction), speed * mpmath.sin(direction)
+
+
+def beyond_triangle(q: ArrayLike) -> NDArray[np.float64]:
+    """Return how far positions lie beyond the sides of the triangle of the three saddles, added up.
+
+    0 inside: below the energy 1/6 an orbit from inside stays there.
+
+    Parameters
+    ----------
+    q : array_like, shape (n, 2) or (n, 4)
+        Positions, or whole states.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    points = np.atleast_2d(np.asarray(q, dtype=np.float64))
+    slanted = math.sqrt(3) * np.abs(points[:, 0]) + points[:, 1] - 1
+    return np.maximum(-0.5 - points[:, 1], 0.0) + np.maximum(slanted, 0.0)
 
 
 def inside_triangle(q: ArrayLike) -> NDArray[np.bool_]:

@@ -103,7 +103,7 @@ def depends_on_time(system: System) -> bool:
 
 def has_kinks(system: System) -> bool:
     """Whether the vector field has an absolute value, or its derivative, of the state or of time."""
-    nodes = reachable(_roots(system.function("field")))
+    nodes = reachable(list(_roots(system.function("field"))))
     return any(node.op in ("abs", "sign") and node.flags & (STATE | T) for node in nodes)
 
 

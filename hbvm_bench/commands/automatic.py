@@ -1,8 +1,13 @@
 """The command ``hbvm-bench automatic``."""
 
 import math
+import shlex
+import sys
+import tempfile
+from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
 from rich import box
 from rich.console import Console
@@ -10,7 +15,10 @@ from rich.table import Table
 
 from hbvm_bench import automatic as automatic_
 from hbvm_bench import general as general_
-from hbvm_bench import terminal
+from hbvm_bench import machine, processes, terminal
+from hbvm_bench.cells import on_terminal
+from hbvm_bench.store import ensure_writable
+from problems.errors import InputError
 
 
 def automatic(
@@ -22,6 +30,13 @@ def automatic(
     limit: Annotated[
         float, typer.Option(help="With --general: seconds after which a run is given up.")
     ] = 30.0,
+    avx2: Annotated[
+        bool, typer.Option("--avx2", help="Compile our code, not heyoka's, without AVX-512.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Keep the result there, as <kind of processor>.json, with a page of all."),
+    ] = None,
 ) -> None:
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
@@ -30,27 +45,44 @@ def automatic(
     at a step a hundred times as long as one at which the fixed-point iteration fails.
     """
     console = terminal.console()
+    if general and (avx2 or out is not None):
+        raise InputError("--avx2 and --out do not go with --general; leave them out.")
     if general:
         _general(console, problems or [], limit)
         return
-    table = Table(
-        "problem", "goal", "Taylor / HBVM", "quartiles", "method", "steps", "energy", "position",
-        box=box.SIMPLE_HEAD, pad_edge=False,
-    )  # fmt: skip
-    with console.status("compiling") as status:
-        found = automatic_.duels(problems or [], rounds, lambda key: status.update(f"running {key}"))
-    for duel in found:
-        low, high = duel.quartiles
-        verdict = "reached" if duel.reached else "missed" if duel.as_accurate else "not as accurate"
-        for first, side in ((True, duel.ours), (False, duel.theirs)):
-            table.add_row(
-                duel.problem if first else "",
-                f"≥ {duel.goal:g}" if first else verdict,
-                f"{duel.ratio:.2f}" if first else "",
-                f"{low:.2f} … {high:.2f}" if first else "",
-                side.method, str(side.steps), f"{side.energy:.1e}", f"{side.position:.1e}",
-            )  # fmt: skip
-    console.print(table)
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        result = _measured(problems or [], rounds, avx2, out, Path(scratch))
+    page = automatic_.keep(result, out) if out is not None else None
+    console.print(on_terminal(automatic_.sides(result.duels)))
+    console.print(machine.sentence(result.machine), highlight=False)
+    if page is not None:
+        terminal.console(stderr=True).print(str(page), style="dim")
+
+
+def _measured(
+    problems: list[str], rounds: int, avx2: bool, out: Path | None, scratch: Path
+) -> automatic_.Result:
+    keys = automatic_.asked(problems, rounds)
+    environment = machine.restricted_to_avx2() if avx2 else {}
+    if out is not None:
+        ensure_writable(out)
+    words = ["hbvm-bench", "automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
+    words += [] if out is None or out.is_absolute() else ["--out", str(out)]
+    request = automatic_.Request(
+        problems=keys, rounds=rounds, command=shlex.join(words), out=str(scratch / "result.json")
+    )
+    path = scratch / "request.json"
+    path.write_bytes(msgspec.json.encode(request))
+    try:
+        code = processes.wait([sys.executable, "-m", "hbvm_bench.automatic", str(path)], environment)
+    except KeyboardInterrupt:
+        raise typer.Exit(130) from None
+    if code == 2:  # it has said why
+        raise typer.Exit(2)
+    if code != 0:
+        print(f"hbvm-bench: the process that measures ended with exit code {code}.", file=sys.stderr)
+        raise typer.Exit(1)
+    return automatic_.load(scratch / "result.json")
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:

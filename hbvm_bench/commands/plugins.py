@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import plugin_costs
+from hbvm_bench import machine, plugin_costs
+from hbvm_bench.measure import POSITION
 from problems.errors import InputError
 
 
@@ -28,6 +29,8 @@ def plugins(
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
         return
     print(plugin_costs.markdown(plugin_costs.measure(host, rounds)))
+    print(f"\n{POSITION}")
+    print(f"\n{machine.sentence(machine.describe(measure=True))}")
 
 
 __all__ = ["plugins"]

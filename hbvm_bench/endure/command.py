@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
-from hbvm_bench import processes, terminal
+from hbvm_bench import machine, processes, terminal
 from hbvm_bench.cells import on_terminal
 from hbvm_bench.endure import law, runs
 from hbvm_bench.endure.runs import Endurance, Request
@@ -67,6 +67,7 @@ def endure(
     else:
         for table in report.tables(result):
             terminal.console().print(on_terminal(table))
+        terminal.console().print(machine.sentence(result.machine), highlight=False)
     terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench import drift
-from hbvm_bench.drift import Drift
+from hbvm_bench.drift import Drift, Mean
 from hbvm_bench.endure.runs import DECADES, OURS, Endurance, of_method
 
 # The goals declared for a million years.
@@ -85,7 +85,7 @@ def goals(result: Endurance) -> list[Goal]:
         return []
     by_method = {line.method: line for line in lines(result)}
     ours = by_method.get(OURS)
-    if ours is None or ours.drift is None:
+    if ours is None or ours.drift is None or (mean := ours.drift.mean) is None:
         return []
     rms, law = ours.rms[DECADES[-1]], ours.drift
     made = [
@@ -94,6 +94,15 @@ def goals(result: Endurance) -> list[Goal]:
             f"mean drift at most {RATE_GOAL:.0e} per year, within its interval",
             f"{law.rate:+.1e} ({law.rate_low:+.1e} to {law.rate_high:+.1e})",
             law.rate_low <= RATE_GOAL and law.rate_high >= -RATE_GOAL,
+        ),
+        Goal(
+            f"no drift: mean within {drift.limit(mean.starts):.3g} of its standard errors"
+            if mean.starts > 1
+            else "no drift",
+            f"{mean_in_words(mean)}, {abs(mean.value) / mean.error:.1f} standard errors"
+            if mean.error
+            else mean_in_words(mean),
+            mean.drifts is False,
         ),
     ]
     for line in by_method.values():
@@ -107,6 +116,12 @@ def goals(result: Endurance) -> list[Goal]:
                 )
             )
     return made
+
+
+def mean_in_words(mean: Mean) -> str:
+    """Return the mean over the starts with its standard error and the count of signs."""
+    signs = f"{mean.positive} of {mean.starts} positive"
+    return f"{mean.value:+.1e}" + (f" ± {mean.error:.1e}" if mean.starts > 1 else "") + f"; {signs}"
 
 
 def _seconds(result: Endurance, method: str) -> float | None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench import drift
+from hbvm_bench import drift, machine
 from hbvm_bench.cells import Table, in_markdown
 from hbvm_bench.drift import LAWS
-from hbvm_bench.endure.law import goals, lines
+from hbvm_bench.endure.law import goals, lines, mean_in_words
 from hbvm_bench.endure.runs import Endurance, of_method
 from hbvm_bench.race.tables import NONE
 from hbvm_bench.report import shell
@@ -45,6 +45,7 @@ def write(result: Endurance, directory: Path) -> Path:
     peers = fairness.peers()
     shown = [*tables(result), *([] if peers is None else [peers])]
     content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
+    content["processor"] = machine.sentence(result.machine)
     environment = shell.environment("hbvm_bench.endure", autoescape=False)
     environment.filters |= {"code": code, "table": in_markdown}
     files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}
@@ -91,19 +92,23 @@ def tables(result: Endurance) -> list[Table]:
                 NONE
                 if law is None or not law.law
                 else f"{law.slope:.2f} ({law.slope_low:.2f} to {law.slope_high:.2f})",
+                NONE if law is None or law.mean is None else mean_in_words(law.mean),
                 NONE if law is None else f"{law.rate:+.1e} ({law.rate_low:+.1e} to {law.rate_high:+.1e})",
                 NONE if line.seconds is None else seconds(line.seconds),
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
         )
     heads = tuple(f"rms at {year:g} yr" for year in years)
+    after = ("law", "power of t", "mean at the end", "drift per year", "time", "× ours")
     made = [
         Table(
             f"Relative energy error over {result.years:g} years",
-            ("method", "starts", *heads, "law", "power of t", "drift per year", "time", "× ours"),
+            ("method", "starts", *heads, *after),
             rows,
-            "rms over the starts. Power of t and drift with 95 % intervals over the starts. Time: median of "
-            "one trajectory.",
+            "rms over the starts. Mean at the end: over the starts, with its standard error, after the "
+            "offset of each has been taken off; called a drift beyond 3 of them (with few starts, beyond "
+            "Student's 95 % interval), whatever the power of t. Power of t and drift per year with 95 % "
+            "intervals over the starts. Time: median of one trajectory.",
             words=(2 + len(heads),),
         )
     ]

@@ -179,7 +179,7 @@ def signed_errors(problem: Problem, y0: Array, y: Array) -> Array:
 
 def main(path: Path) -> None:
     """Run a request."""
-    described = machine.describe()
+    described = machine.describe(measure=True)
     processes.settle()
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     problem = make_problem(PROBLEM.format(years=request.years))

@@ -11,6 +11,7 @@ from integrators import Solution, integrate
 from integrators.protocol import MethodBase
 from problems import Problem, load
 from problems.errors import InputError
+from problems.henon_heiles import beyond_triangle
 
 # Every family has the same number of settings here: one, as its authors advise for
 # accuracy; and the paper's two methods, at the paper's steps.
@@ -116,7 +117,7 @@ def on_henon_heiles(text: str) -> Row:
     finite = np.isfinite(solution.y).all(axis=1) & (np.abs(solution.y[:, :2]).max(axis=1) < henon_heiles.GONE)
     numbers = {
         "energy": float(solution.errors()["energy"][finite].max()),
-        "outside": float(solution.guards()["beyond_triangle"][finite].max()),
+        "outside": float(beyond_triangle(solution.y[finite]).max()),
         "agrees": float(solution.t[parted[0]] if parted.size else solution.t[-1]),
     }
     return Row(text, numbers, _ended(solution) if solution.status.failed else "")

@@ -129,7 +129,7 @@ def _with_errors(
     t, y = np.append(samples.t, end.t[-1]), np.vstack([samples.y, end.y[-1]])
     with np.errstate(all="ignore"):
         energy = float(np.max(next(iter(problem.errors(y, t).values()))))
-        guards = problem.guards(y)
+        guards = problem.guards(y, t)
         size = float(np.max(largest_distance(problem, positions(problem, y))))
     guard, void = None, ""
     for name, values in guards.items():

@@ -56,7 +56,7 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
 
 def main(path: Path) -> None:
     """Run the contests of a request and store their results."""
-    described = _machine()
+    described = machine.describe(measure=True)
     processes.settle()
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     for key in request.contests:
@@ -134,12 +134,6 @@ def _progress() -> Progress:
         console=console,
         disable=not console.is_terminal,
     )
-
-
-def _machine() -> dict[str, str | int]:
-    from llvmlite import binding
-
-    return machine.describe() | {"llvm_processor": binding.get_host_cpu_name()}
 
 
 def _version(name: str) -> str:

@@ -3,7 +3,7 @@
 import shlex
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,7 +11,7 @@ import msgspec
 import typer
 from rich.text import Text
 
-from hbvm_bench import processes, terminal
+from hbvm_bench import machine, processes, terminal
 from hbvm_bench.cells import on_terminal
 from hbvm_bench.race import results, standings, tables
 from hbvm_bench.race.child import Request
@@ -36,6 +36,9 @@ def race(
         bool | None,
         typer.Option("--compile/--no-compile", help="Compile times in fresh processes; not with --quick."),
     ] = None,
+    avx2: Annotated[
+        bool, typer.Option("--avx2", help="Compile our code, not the peers', without AVX-512.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Where the results and the report go; default runs/race.")
     ] = None,
@@ -49,12 +52,13 @@ def race(
 ) -> None:
     """Time our integrators against the peers, side by side, at equal energy and position error."""
     contests = chosen(problem)
-    directory = out or Path("runs") / ("race-quick" if quick else "race")
+    directory = out or Path("runs") / ("race" + "-quick" * quick + "-avx2" * avx2)
     if declare:
         _declare(contests, quick, error=False)
         return
     failed: list[str] = []
     if not redraw:
+        environment = machine.restricted_to_avx2() if avx2 else {}
         ensure_writable(directory)
         _declare(contests, quick, error=True)
         request = Request(
@@ -63,9 +67,9 @@ def race(
             quick=quick,
             rounds=rounds or (QUICK_ROUNDS if quick else ROUNDS),
             probes=not quick if compile_times is None else compile_times,
-            command=_command(problem, quick, rounds, compile_times, directory),
+            command=_command(problem, quick, rounds, compile_times, avx2, directory),
         )
-        failed = _run(request)
+        failed = _run(request, environment)
     races = results.load(directory, list(CONTESTS))
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(as_data(races)), indent=1).decode())
@@ -129,7 +133,7 @@ def _ratio(ratio: standings.Ratio) -> dict[str, Any]:
     }
 
 
-def _run(request: Request) -> list[str]:
+def _run(request: Request, environment: Mapping[str, str]) -> list[str]:
     """Run the contests, each in a process of its own (all in one with ``--quick``); return what failed."""
     keys = request.contests
     failed: list[str] = []
@@ -138,7 +142,7 @@ def _run(request: Request) -> list[str]:
             path = Path(scratch) / "request.json"
             path.write_bytes(msgspec.json.encode(msgspec.structs.replace(request, contests=group)))
             try:
-                code = processes.wait([sys.executable, "-m", "hbvm_bench.race.child", str(path)])
+                code = processes.wait([sys.executable, "-m", "hbvm_bench.race.child", str(path)], environment)
             except KeyboardInterrupt:
                 print(
                     f"hbvm-bench: interrupted; the problems that had ended are kept in {request.out}; "
@@ -166,15 +170,23 @@ def _show(races: Sequence[Race]) -> None:
     for table in [tables.headline(races), tables.goals(races), *map(tables.fastest, races)]:
         if table.rows:
             terminal.console().print(on_terminal(table))
+    for said in dict.fromkeys(machine.sentence(race.machine) for race in races):
+        terminal.console().print(said, highlight=False)
 
 
 def _command(
-    problem: list[str] | None, quick: bool, rounds: int | None, compile_times: bool | None, out: Path
+    problem: list[str] | None,
+    quick: bool,
+    rounds: int | None,
+    compile_times: bool | None,
+    avx2: bool,
+    out: Path,
 ) -> str:
     words = ["hbvm-bench", "race"]
     words += [word for key in problem or [] for word in ("--problem", key)]
     words += ["--quick"] if quick else []
     words += ["--rounds", str(rounds)] if rounds else []
     words += [] if compile_times is None else ["--compile" if compile_times else "--no-compile"]
+    words += ["--avx2"] if avx2 else []
     words += [] if out.is_absolute() else ["--out", str(out)]  # a path of this machine is nobody else's
     return shlex.join(words)

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from hbvm_bench import machine
 from hbvm_bench.cells import Table, in_markdown
+from hbvm_bench.measure import POSITION
 from hbvm_bench.race import tables
 from hbvm_bench.race.accuracy import SAMPLES
 from hbvm_bench.race.contests import CONTESTS
 from hbvm_bench.race.figures import looks, work_precision
-from hbvm_bench.race.results import Race
+from hbvm_bench.race.results import SCHEMA, Race, by_kind
 from hbvm_bench.race.rounds import SHORTEST
 from hbvm_bench.race.settings import FAMILIES
 from hbvm_bench.race.standings import calibrated, present
@@ -46,8 +48,9 @@ setting up are not in it. A sample is as many such runs one after the other as l
 
 The energy error is the largest at some {SAMPLES} times, one in each equal part of the span and at no
 common phase, at the methods' own steps where the step is fixed, else by the means that cost the method
-nothing; it is evaluated in double-double arithmetic. The position error is that of the end state of the
-very run that is timed, relative, in the 2-norm over all bodies, against a 128-bit solution.
+nothing; it is evaluated in double-double arithmetic.
+
+The position error is that of the end state of the very run that is timed. {POSITION}
 
 A setting too slow for all rounds takes part in fewer, and the table says so. What did not finish, or
 does not apply, is a row with its reason.
@@ -77,6 +80,9 @@ def write(races: Sequence[Race], directory: Path) -> list[Path]:
     look = looks(races)
     sections = [section(race, look) for race in races]
     top = [tables.headline(races), tables.goals(races)]
+    found = by_kind(directory, list(CONTESTS))
+    if len(found) > 1:
+        top.insert(1, tables.kinds(found))
     made: dict[str, bytes] = {
         "data/settings.csv": settings_csv(sections).encode(),
         "README.md": markdown(sections, top).encode(),
@@ -117,6 +123,11 @@ def remarks(race: Race) -> list[str]:
     absent = [FAMILIES[f].title for f, n in per_family.items() if not n]
     if absent:
         said.append(f"Does not apply: {', '.join(absent)}.")
+    if race.schema < SCHEMA:
+        said.append(
+            "The position errors are of an earlier definition: in the 2-norm over all bodies, relative to "
+            "that of the true positions at the end."
+        )
     if race.quick:
         said.append("This is the quick run: a tenth of the span and few settings; its ratios mean little.")
     calibration = calibrated(race)
@@ -165,6 +176,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "rules": RULES,
         "peers": fairness.peers(),
         "families": [(family.title, family.code) for family in FAMILIES.values()],
+        "processors": list(dict.fromkeys(machine.sentence(race.machine) for race in races)),
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
         "command": commands(races),

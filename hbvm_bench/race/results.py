@@ -10,10 +10,12 @@ from statistics import median, quantiles
 
 import msgspec
 
+from hbvm_bench import machine
 from hbvm_bench.store import atomic, ensure_writable
 from problems.errors import InputError
 
-SCHEMA = 1
+SCHEMA = 2
+READABLE = (1, SCHEMA)  # 1 had another definition of the position error
 
 # The accuracy at which times are compared first.
 ENERGY = 1e-13
@@ -100,7 +102,7 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
     energy : float or None
         Largest relative error of the energy over the samples and at the end.
     position : float or None
-        Relative error of the positions at the end, in the 2-norm.
+        Error of the positions at the end; see `hbvm_bench.measure.POSITION`.
     guard : float or None
         Largest value of what a symmetry keeps at 0, where the problem has such.
     samples : int
@@ -283,6 +285,35 @@ def load(directory: Path, order: list[str]) -> list[Race]:
     problems.errors.InputError
         If there are none, or a file is not a result.
     """
+    found = _in(directory, order)
+    if not found:
+        raise InputError(
+            f"there is no result of a race in {str(directory)!r}; run: hbvm-bench race --out DIR."
+        )
+    return found
+
+
+def by_kind(directory: Path, order: list[str]) -> dict[str, list[Race]]:
+    """Read the results in a directory and in the directories in it, by the kind of processor.
+
+    Several kinds lie side by side as ``DIR/*.json`` and ``DIR/<kind>/*.json``. Of two results of
+    one contest on one kind the outer directory's counts.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a file is not a result.
+    """
+    found: dict[str, list[Race]] = {}
+    for folder in [directory, *sorted(path for path in directory.glob("*") if path.is_dir())]:
+        for race in _in(folder, order):
+            of_kind = found.setdefault(machine.kind(race.machine), [])
+            if race.contest.key not in {one.contest.key for one in of_kind}:
+                of_kind.append(race)
+    return found
+
+
+def _in(directory: Path, order: list[str]) -> list[Race]:
     found: list[Race] = []
     for key in order:
         path = directory / f"{key}.json"
@@ -292,11 +323,7 @@ def load(directory: Path, order: list[str]) -> list[Race]:
             race = msgspec.json.decode(path.read_bytes(), type=Race)
         except msgspec.MsgspecError as error:
             raise InputError(f"{str(path)!r} is not the result of a race: {error}.") from None
-        if race.schema != SCHEMA:
+        if race.schema not in READABLE:
             raise InputError(f"{str(path)!r} was written by another version; run the race again.")
         found.append(race)
-    if not found:
-        raise InputError(
-            f"there is no result of a race in {str(directory)!r}; run: hbvm-bench race --out DIR."
-        )
     return found

@@ -1,6 +1,6 @@
 """The tables of a race, as text cells: the terminal and both reports print these."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 
 from hbvm_bench.cells import Table
@@ -40,6 +40,34 @@ def headline(races: Sequence[Race]) -> Table:
         rows,
         "Medians over interleaved rounds; in brackets the quartiles of the ratio within each round. A ratio "
         "below 1 means that the peer is faster.",
+    )
+
+
+def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
+    """Return the peers' best times over ours, one column for each kind of processor."""
+    keys = dict.fromkeys(race.contest.key for races in by_kind.values() for race in races)
+    rows = []
+    for key in keys:
+        of_kind = {kind: race for kind, races in by_kind.items() for race in races if race.contest.key == key}
+        shown = {peer: None for race in of_kind.values() for peer in standings.present(race) if peer != OURS}
+        for peer in shown:
+            cells = [
+                _headline_cell(race, peer, standings.at(race, peer, *asked(race)))
+                if (race := of_kind.get(kind)) is not None
+                else "not run"
+                for kind in by_kind
+            ]
+            if any(cell.endswith((")", "×")) for cell in cells):
+                first = next(iter(of_kind.values()))
+                rows.append((first.contest.title, FAMILIES[peer].short, *cells))
+    return Table(
+        "The same ratios by kind of processor",
+        ("problem", "peer", *by_kind),
+        rows,
+        "How many times as long as our fastest setting each peer's fastest takes. Columns: LLVM's name of "
+        "the processor; -avx2: our code compiled without AVX-512, the peers' as ever. Left out: peers "
+        "without a ratio anywhere.",
+        words=(1,),
     )
 
 

@@ -17,7 +17,7 @@ from hbvm_bench.report.canvas import Picture
 from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
 from hbvm_bench.report.style import Look, looks, method_name
-from hbvm_bench.store import Store, damage
+from hbvm_bench.store import Store, damage, progress
 from hbvm_bench.summaries import fairness
 from hbvm_bench.table import columns, tasks
 
@@ -112,7 +112,8 @@ class Content:
 def gather(stores: Sequence[Store]) -> Content:
     """Read the stores of one or more runs and make everything a report says.
 
-    A case that several runs have is taken from the one in which it finished last.
+    A case that several runs have is taken from the one that got further with it
+    (`hbvm_bench.store.progress`).
 
     Raises
     ------
@@ -120,12 +121,12 @@ def gather(stores: Sequence[Store]) -> Content:
         If a directory holds no run.
     """
     indices = [store.index() for store in stores]
-    latest: dict[str, tuple[Record, Store]] = {}
+    furthest: dict[str, tuple[Record, Store]] = {}
     for store in stores:
         for record in store.records():
-            if record.id not in latest or record.finished > latest[record.id][0].finished:
-                latest[record.id] = (record, store)
-    found = {number: _read(record, store) for number, (record, store) in latest.items()}
+            if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
+                furthest[record.id] = (record, store)
+    found = {number: _read(record, store) for number, (record, store) in furthest.items()}
     records = [record for record, _ in found.values()]
     look = looks(records)
     tables = tasks(records)
@@ -135,7 +136,7 @@ def gather(stores: Sequence[Store]) -> Content:
             command=index.command,
             version=index.version,
             planned=len(index.ids),
-            missing=[case for number, case in index.listed() if number not in latest],
+            missing=[case for number, case in index.listed() if number not in furthest],
         )
         for index in indices
     ]
@@ -169,7 +170,7 @@ def gather(stores: Sequence[Store]) -> Content:
         columns=columns(records),
         looks=look,
         records=records,
-        rules=(*words.RULES, *fairness.sentences(records)),
+        rules=(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
         settings=words.settings_count(records),
         peers=fairness.peers(),
         excluded=words.excluded(records),

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from datetime import datetime
 
+from hbvm_bench import machine
 from hbvm_bench.records import Record
 
 # Machine code of the libraries: what the times were made with.
@@ -31,6 +32,13 @@ def versions(records: Sequence[Record]) -> list[tuple[str, str]]:
         (name, ", ".join(sorted(numbers)) + (f" ({BUILT[name.lower()]})" if name.lower() in BUILT else ""))
         for name, numbers in sorted(found.items())
     ]
+
+
+def processors(records: Sequence[Record]) -> list[str]:
+    """Say what kinds of processor the times were taken on; nothing where none were taken."""
+    timings = [record.timing for record in records if record.timing is not None and record.timing.rounds]
+    said = [machine.sentence(timing.machine) for timing in timings if timing.machine]
+    return list(dict.fromkeys(said))
 
 
 def machines(records: Sequence[Record]) -> list[tuple[str, str]]:

@@ -20,7 +20,7 @@ from hbvm_bench.report.figures import Drawn, OverTime
 from hbvm_bench.report.motion import Motion
 from hbvm_bench.report.style import Look, method_name
 from hbvm_bench.report.work_precision import work_precision
-from hbvm_bench.table import GROUPS, Row, at_once, group_of, rows
+from hbvm_bench.table import GROUPS, Row, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -108,9 +108,9 @@ def section(
         summary=words.summary(records),
         shortcomings=words.shortcomings(records),
         groups=[
-            (title, [row for row in table if row.group == key])
-            for key, title in GROUPS.items()
-            if any(row.group == key for row in table)
+            (title_of(key, members), members)
+            for key in GROUPS
+            if (members := [row for row in table if row.group == key])
         ],
         missing=missing,
         pictures=pictures,
@@ -191,7 +191,7 @@ OVER_TIME = (
     OverTime(
         key="position",
         title="Position error over time",
-        caption="Largest distance of a body from the stored 128-bit reference, at the reference's times.",
+        caption="Position error at the times of the stored 128-bit reference.",
         label="position error",
         get=lambda series: _pair(series, "position_t", "position"),
         low=-17,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from statistics import median
 
+from hbvm_bench.measure import POSITION
 from hbvm_bench.metrics import GUARD_TOLERANCE, METRICS
 from hbvm_bench.records import Record
 from hbvm_bench.report.style import method_name
@@ -18,11 +19,13 @@ Every integrator starts from the same doubles and receives the same vector field
 once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
 
 The settings were declared in the campaign file before the run. How many each method has, and
-whether they are its defaults, its authors' advice, those of a publication or a use outside its
-domain, is in the table below.
+whether they are chosen by whoever wrote the file, the method's defaults, its authors' advice, those
+of a publication or a use outside its domain, is in the table below.
 
 Energy is never ranked without position: the table is sorted by the position error at the end, and
 the picture of energy against time stands beside that of position against time.
+
+{POSITION}
 
 Where the problem's symmetry is lost by more than {GUARD_TOLERANCE:g} of the size of the trajectory,
 the run follows another trajectory: its position error and its time are void, are printed in
@@ -114,7 +117,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
             continue
         parts = [
             f"Here {record.case.method} has the energy right to {energy:.1e} "
-            f"and a body {position:.2g} off at the end"
+            f"and a position error of {position:.2g} at the end"
         ]
         z, angular = _value(record, "z_error"), _value(record, "angular_momentum_max")
         if z is not None:

@@ -14,6 +14,7 @@ SHORT = {
     "linear": "t",
     "power": "t^a",
     "exponential": "exp t",
+    "drift": "drift",
 }
 """Every law in a few signs, by the keys of `hbvm_bench.drift.LAWS`."""
 
@@ -71,13 +72,15 @@ def counts(records: Sequence[Record], invariant: str = "energy") -> dict[str, di
 
 
 def text(law: Law) -> str:
-    """Return a law in a few signs: ``"t^1/2 (0.52, 0.41 to 0.63)"``."""
+    """Return a law in a few signs: ``"t^1/2 (0.52, 0.41 to 0.63)"``, ``"drift (-8.5e-14 ± 9e-15)"``."""
     if law.law is None:
         return law.why or "not clear"
     if law.law == "bounded":
         return "0" if law.floor == 0 else f"bounded at {law.floor:.1e}"
     if law.law == "exponential":
         return SHORT[law.law] if law.growth is None else f"exp({law.growth:.2g} t)"
+    if law.law == "drift" and law.mean is not None and law.mean_error is not None:
+        return f"drift ({law.mean:+.1e} ± {law.mean_error:.0e})"
     if law.slope is None:
         return SHORT[law.law]
     if law.slope_low is None or law.slope_high is None:

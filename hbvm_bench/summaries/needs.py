@@ -111,7 +111,7 @@ def needs_of(records: Sequence[Record]) -> list[Need]:
     timed = work == "warm_seconds"
     cheaply = "in little time" if timed else "with few evaluations (a method that counts none takes no part)"
     wanted = [
-        Need(f"a position right to 1e-4 of its size, {cheaply}", right, work),
+        Need(f"a position right to 1e-4, {cheaply}", right, work),
         Need(f"a position right to 1e-8, {cheaply}", accurate, work),
         Need(f"position to 1e-8 and energy to 1e-13, {cheaply}", exact, work),
         Need("the most accurate position at the end", there, "position_end", 10.0, ROUND_OFF),

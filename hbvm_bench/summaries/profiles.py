@@ -24,7 +24,7 @@ class Goal:
     Attributes
     ----------
     position : float
-        Error at the end, relative to the largest distance of a body from the origin.
+        Error at the end; see `hbvm_bench.measure.POSITION`.
     energy : float
         Largest relative error.
     """
@@ -35,7 +35,7 @@ class Goal:
     @property
     def words(self) -> str:
         """The goal in words."""
-        text = f"position to {self.position:g} of its size"
+        text = f"position to {self.position:g}"
         return text if math.isinf(self.energy) else f"{text}, energy to {self.energy:g}"
 
 
@@ -90,17 +90,11 @@ class Profile:
         return sum(winner == family for winner, _ in self.best.values())
 
 
-def relative_position(record: Record) -> float | None:
-    """Return the position error at the end over the largest distance of a body from the origin."""
-    error, size = number(record, "position_end"), number(record, "distance_max")
-    return None if error is None or not size else error / size
-
-
 def reaches(record: Record, goal: Goal) -> bool:
     """Whether a case reaches a goal."""
     if group_of(record) != "on" or record.case.ensemble:
         return False
-    position, energy = relative_position(record), number(record, "energy_max")
+    position, energy = number(record, "position_end"), number(record, "energy_max")
     if position is None or position > goal.position:
         return False
     return math.isinf(goal.energy) or (energy is not None and energy <= goal.energy)
@@ -127,7 +121,7 @@ def profile(records: Sequence[Record], goal: Goal, work: str) -> Profile:
     ratios: dict[str, list[float]] = {family: [] for family in families}
     for problem in problems_of(records):
         here = [record for record in singles if record.case.problem == problem]
-        if not any(relative_position(record) is not None for record in here):
+        if not any(number(record, "position_end") is not None for record in here):
             continue
         cheapest: dict[str, tuple[float, Record]] = {}
         for record in here:

@@ -188,6 +188,15 @@ def processor() -> str:
     return os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name()
 
 
+def features() -> str:
+    """Return the instructions that code may use, as LLVM writes them.
+
+    The variable alone decides, as it does in numba: the name of a processor does not restrict them.
+    """
+    given = os.environ.get("NUMBA_CPU_FEATURES")
+    return llvm.get_host_cpu_features().flatten() if given is None else given
+
+
 def load(code: bytes) -> int:
     """Put an object file into this process; return the address of its `ENTRY`."""
     with lock:
@@ -212,7 +221,7 @@ def _machine() -> Any:
     _initialize()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
         cpu=processor(),
-        features=os.environ.get("NUMBA_CPU_FEATURES") or llvm.get_host_cpu_features().flatten(),
+        features=features(),
         opt=3,
         reloc="static",
         codemodel="jitdefault",

@@ -1,13 +1,16 @@
 import json
+from pathlib import Path
 
 import msgspec
 import numpy as np
 import pytest
 
+from hbvm_bench import drift
 from hbvm_bench.cli import main
 from hbvm_bench.endure import law, report, runs
 from hbvm_bench.endure.runs import Endurance, Trajectory
 from hbvm_bench.identity import make_problem
+from hbvm_bench.report.markdown import plain
 from problems.errors import InputError
 
 PROBLEM = make_problem("outer_solar_system(t_end=1000.0)")
@@ -68,9 +71,38 @@ def test_errors_have_signs_and_the_size_that_the_problem_says():
 
 def test_goals_are_reached_by_an_unbiased_walk_and_missed_by_a_biased_one():
     fine = law.goals(made())
-    assert [goal.reached for goal in fine] == [True, True, True]
+    assert [goal.reached for goal in fine] == [True, True, True, True]
     drifting = law.goals(made(bias=1e-17))
-    assert [goal.reached for goal in drifting] == [False, False, True]
+    assert [goal.reached for goal in drifting] == [False, False, False, True]
+
+
+def test_a_drift_below_the_allowed_rate_is_a_drift_all_the_same():
+    """Eight ends of one sign, five standard errors from 0: within the rate, and no random walk."""
+    result = made(bias=-3e-20)
+    small, allowed, within, _ = law.goals(result)
+    assert (small.reached, allowed.reached, within.reached) == (True, True, False)
+    assert "mean within 3 of its standard errors" in within.words
+    ours, _ = law.lines(result)
+    assert ours.drift is not None
+    assert ours.drift.law == "drift"
+    (table, _) = report.tables(result)
+    assert "0 of 8 positive" in str(table.rows[0])
+
+
+def test_the_stored_report_says_what_its_own_numbers_say():
+    stored = Path(__file__).parents[2] / "reports" / "endure"
+    result = runs.load(stored)
+    page = (stored / "README.md").read_text(encoding="utf-8")
+    for line in law.lines(result):
+        assert line.drift is not None
+        assert line.drift.law is not None
+        row = next(text for text in page.splitlines() if text.startswith(f"| {plain(line.method)} "))
+        assert drift.LAWS[line.drift.law] in row
+    ours = law.lines(result)[0].drift
+    assert ours is not None
+    if ours.law == "drift":
+        readme = (stored.parents[1] / "README.md").read_text(encoding="utf-8")
+        assert "grows like the square root of time" not in readme
 
 
 def test_a_short_run_has_no_goals():

@@ -12,6 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hbvm_bench.merge import merge
+from hbvm_bench.records import Result
 from hbvm_bench.report import pack
 from hbvm_bench.report.content import gather
 from hbvm_bench.report.index import write_index
@@ -78,7 +80,7 @@ def test_crossings_of_a_circle_are_where_it_passes_the_axis():
     assert crossings(y)[0].size == 0
 
 
-def test_runs_are_merged_and_a_case_is_taken_from_where_it_finished_last(tmp_path):
+def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
     first = made_up_run.write(Store(tmp_path / "a"), ["pendulum(p=1.0)"], 4, missing=1)
     second = made_up_run.write(Store(tmp_path / "b"), ["pendulum(p=1.0)", "pendulum(p=1.2)"], 3)
     newer = second.records()[1]
@@ -91,6 +93,22 @@ def test_runs_are_merged_and_a_case_is_taken_from_where_it_finished_last(tmp_pat
     assert content.measured == "2026-11-21 to 2026-11-22"
     numbers_ = {record.case.method: content.looks[record.id].number for record in content.records}
     assert len(set(numbers_.values())) == 4  # a method has one number and one look on every problem
+
+
+def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
+    """A later failure does not stand for what an earlier run measured."""
+    first = made_up_run.write(Store(tmp_path / "a"), ["pendulum(p=1.0)"], 3)
+    second = made_up_run.write(Store(tmp_path / "b"), ["pendulum(p=1.0)"], 3)
+    measured = first.records()[0]
+    failed = msgspec.structs.replace(
+        measured, finished="2026-11-23T10:00:00+00:00", result=Result(outcome="timeout"), timing=None
+    )
+    second.save(failed)
+    (kept,) = (record for record in gather([first, second]).records if record.id == measured.id)
+    out = Store(tmp_path / "out")
+    merge([first, second], out)
+    assert kept.result.outcome == "ok"
+    assert kept == out.load(measured.id)
 
 
 def test_what_is_missing_is_named(tmp_path):

@@ -116,6 +116,15 @@ def test_what_eats_memory_is_killed_at_its_limit(toys, store):
     assert record.peak_memory_gib < 1.2
 
 
+def test_memory_of_processes_that_it_starts_counts_too():
+    eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
+    start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
+    ended = supervise.run([sys.executable, "-c", start], {}, Limits(wall_seconds=15, memory_gib=0.2))
+    assert ended.cause == "memory"
+    assert 0.2 < ended.peak_gib < 0.6  # measured 0.21 to 0.31
+    assert ended.seconds < 10
+
+
 def test_a_lost_symmetry_voids_position_and_time(toys, store):
     record = run(store, "Straying()")
     assert "off axis reached 0.001" in record.result.violation

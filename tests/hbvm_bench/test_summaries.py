@@ -120,6 +120,7 @@ def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
         (Law(law="bounded"), "0"),
         (Law(law="linear", slope=1.01, slope_low=0.9, slope_high=1.1), "t (1.01, 0.90 to 1.10)"),
         (Law(law="square root", slope=0.5), "t^1/2 (0.50)"),
+        (Law(law="drift", slope=0.57, mean=-8.51e-14, mean_error=9.4e-15), "drift (-8.5e-14 ± 9e-15)"),
         (Law(law="exponential", growth=0.25), "exp(0.25 t)"),
         (Law(why="too short"), "too short"),
     ],

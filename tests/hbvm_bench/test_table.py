@@ -6,7 +6,7 @@ from rich.console import Console
 from hbvm_bench.campaign import Case
 from hbvm_bench.metrics import METRICS
 from hbvm_bench.records import Record, Result, Value
-from hbvm_bench.table import columns, format_value, group_of, numbers, rows, seconds, status_of
+from hbvm_bench.table import columns, format_value, group_of, numbers, rows, seconds, status_of, title_of
 from hbvm_bench.terminal import results
 from problems.errors import InputError
 
@@ -27,6 +27,16 @@ STALLED = record("stalled()", outcome="stalled", status="stalled", t_stop=8.5343
 REFUSED = record("refused()", outcome="refused", status="", reason="no.", metrics={})
 DIVERGED = record("diverged()", status="nonlinear_divergence", t_stop=3.0, reason="no convergence")
 ALL = [FAR, STALLED, OFF, NEAR, REFUSED, DIVERGED]
+
+
+def test_a_table_without_positions_does_not_claim_to_be_sorted_by_them():
+    assert title_of("on", rows([record("a()")])) == "On the trajectory that was asked for"
+    assert title_of("on", rows([record("a()"), NEAR])).endswith(", by position error at the end")
+    assert "position error" not in title_of("ended", rows([STALLED]))
+
+
+def test_settings_that_nobody_recommended_are_not_called_so():
+    assert Case(problem="p()", method="m()").settings == "chosen"
 
 
 def test_rows_are_grouped_and_sorted_by_position_never_by_energy():

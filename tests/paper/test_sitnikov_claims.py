@@ -1,11 +1,14 @@
 """What the paper says of Sitnikov's problem, one sentence per test."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import problems
 from hbvm_bench.paper import sitnikov
-from hbvm_bench.paper.sitnikov_claims import beat, kept
+from hbvm_bench.paper.axis_motion import Growth
+from hbvm_bench.paper.sitnikov_claims import beat, claims, kept, oscillates
 from hbvm_bench.paper.sitnikov_figures import apocentres
 from integrators import integrate
 from integrators.gauss import Gauss
@@ -20,6 +23,32 @@ def runs():
 @pytest.fixture(scope="module")
 def steps():
     return sitnikov.by_step(2, (1 / 16, 1 / 8, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6))
+
+
+@pytest.mark.parametrize(
+    ("reached", "off", "verdict"), [(1.01, 0.01, "holds"), (1.01, 0.5, "partly"), (1.5, 0.01, "no")]
+)
+def test_the_verdict_on_the_planetoids_motion_follows_from_its_numbers(reached, off, verdict):
+    assert oscillates(reached * np.array([0.0, 1.0, -1.0]), np.array([0.0, 1.0, -1.0]), off) == verdict
+
+
+def verdicts(runs, steps):
+    """Return the verdicts by the first words of the claims, from made-up scans for what is not varied."""
+    growth = [Growth(e, 1.0, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
+    found = claims(runs, [100.0] * 20, 32, steps, growth, [(17, 1e-14, None)])
+    return {claim.words[:14]: claim.verdict for claim in found}
+
+
+def test_verdicts_change_with_what_was_measured(runs, steps):
+    before = verdicts(runs, steps)
+    assert before["Both methods l"] == "partly"
+    assert before["The large step"] == "holds"
+    flat = {key: dataclasses.replace(run, plane=0.0) for key, run in runs.items()}
+    assert verdicts(flat, steps)["Both methods l"] == "holds"
+    astray = {key: dataclasses.replace(run, off_axis=0.1) for key, run in runs.items()}
+    assert verdicts(astray, steps)["Both methods l"] == "no"
+    wild = [dataclasses.replace(row, unsteady=99.0) for row in steps]
+    assert verdicts(runs, wild)["The large step"] == "partly"
 
 
 def test_gauss_loses_the_planetoid():

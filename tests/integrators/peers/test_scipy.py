@@ -1,22 +1,39 @@
 import warnings
 
+import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import integrators.testing as testing
+import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka import Taylor
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
 from problems import emit
+from problems.jacobian import jacobian
+from problems.problem import Problem
 
 METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]
+
+
+def dense(problem):
+    """Return the Jacobian of a problem as `solve_ivp` takes it."""
+    found, entries = jacobian(problem.system), emit.numpy(problem.system, "jacobian")
+
+    def matrix(t, y):
+        made = np.zeros((y.size, y.size))
+        made[found.rows, found.columns] = entries(t, y, problem.par)
+        return made
+
+    return matrix
 
 
 @pytest.mark.parametrize("method", METHODS, ids=repr)
 def test_the_steps_are_those_of_solve_ivp(method):
     problem = testing.two_bodies()
     field = emit.numpy(problem.system, "field")
+    jac = {"jac": dense(problem)} if isinstance(method, Radau) else {}
     theirs = solve_ivp(
         lambda t, y: field(t, y, problem.par),
         (0.0, 15.0),
@@ -24,6 +41,7 @@ def test_the_steps_are_those_of_solve_ivp(method):
         method=type(method).__name__,
         rtol=method.rtol,
         atol=method.atol,
+        **jac,
     )
     ours = integrate(problem, method, [0.0, 15.0], sample="steps")
     # All but solve_ivp's last step, which it shortens to end at 15.
@@ -55,8 +73,27 @@ def test_the_least_relative_tolerance_is_the_library_s():
         solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], rtol=np.nextafter(RTOL_FLOOR, 0.0))
 
 
+@pytest.mark.parametrize(("name", "more"), [("kepler", {}), ("fput", {"n": 60})])
+def test_radau_has_the_jacobian_of_the_traced_system(name, more):
+    problem = problems.load(name, **more)
+    stepper = Radau(rtol=1e-6, atol=1e-8).compile(problem.system).start(problem.y0, problem.par)
+    J = stepper._solver.J  # sparse where it is large
+    assert np.allclose(J.toarray() if more else J, dense(problem)(0.0, problem.y0), rtol=0, atol=1e-14)
+    # Its step takes no evaluation of the field for differences: 120 of them each time.
+    before = stepper.stats.evaluations
+    stepper._solver.jac(0.0, problem.y0, None)
+    assert stepper.stats.evaluations == before
+
+
 def test_work_is_counted_with_the_finite_differences_of_the_jacobian():
+    """A system that is not traced has no Jacobian but SciPy's."""
     stats = integrate(testing.pendulum(), Radau(rtol=1e-6, atol=1e-8), [20.0]).stats
+    assert stats.extra["jacobians"] >= 1
+    foreign = problems.Foreign(numba.njit(lambda t, y: np.array([y[1], -np.sin(y[0])])), dim=2)
+    problem = Problem(foreign, y0=[0.0, 1.9], t_end=20.0)
+    more = integrate(problem, Radau(rtol=1e-6, atol=1e-8), [20.0]).stats
+    assert more.evaluations > stats.evaluations
+    stats = more
     assert stats.extra["jacobians"] >= 1
     assert stats.extra["factorizations"] >= 2
     assert stats.evaluations > 3 * stats.steps
