@@ -92,7 +92,7 @@ def refuses_unknown_options(method: MethodBase, problem: Problem) -> str | None:
     """Check that a wrong option name fails, by the class and by the registry."""
     name = type(method).__name__
     options = {**method.options(), "no_such_option": 1}
-    _raises(TypeError, lambda: type(method)(**options), f"{name} refuses an unknown option")
+    _raises(UnknownNameError, lambda: type(method)(**options), f"{name} refuses an unknown option")
     if name not in registry.names():
         return f"{name} is not registered"
     _raises(UnknownNameError, lambda: registry.create(name, **options), f"the registry refuses it for {name}")
