@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Members:
     steps, evaluations : int or None
         Over all.
     seconds : float
-        Of integrating; making a stepper for each start, where there is no batch, is left out.
+        Of integrating; preparing the batch, or making a stepper for each start, is left out.
     """
 
     y: Array
@@ -56,6 +57,18 @@ class Members:
     steps: int
     evaluations: int | None
     seconds: float
+
+
+def prepared(program: Program, starts: Array, problem: Problem) -> Callable[[], Any] | None:
+    """Return the call of a program's batch, compiled, checked and allocated where it can prepare one.
+
+    ``None`` where it has no batch. Preparing one compiles what the program leaves to its first batch.
+    """
+    arguments = {"times": np.array([problem.t_end]), "t0": problem.t0}
+    if prepare := getattr(program, "prepare_batch", None):
+        return prepare(starts, problem.par, **arguments)
+    batch = getattr(program, "batch", None)
+    return None if batch is None else partial(batch, starts, problem.par, **arguments)
 
 
 def integrate(
@@ -70,7 +83,8 @@ def integrate(
     Parameters
     ----------
     program : Program
-        Its ``batch`` is used where it has one; otherwise one trajectory follows the other.
+        Its ``batch`` is used where it has one, prepared before the clock runs where it can be
+        (``prepare_batch``); otherwise one trajectory follows the other.
     starts : ndarray, shape (n, dim)
         Where they start.
     problem : Problem
@@ -81,10 +95,10 @@ def integrate(
         Returns seconds.
     """
     end = np.array([problem.t_end])
-    batch = getattr(program, "batch", None)
-    if batch is not None:
+    go = prepared(program, starts, problem)
+    if go is not None:
         begin = clock()
-        made: Any = batch(starts, problem.par, times=end, t0=problem.t0)
+        made = go()
         spent = clock() - begin
         counts = getattr(made, "evaluations", None)
         return Members(

@@ -126,8 +126,7 @@ def _measure(request: Request, directory: Path) -> Result:
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem)
-        program = resolved.method.compile(resolved.problem.system)
-        (directory / COMPILED).touch()
+        program = _compiled(resolved, directory)
         if resolved.case.ensemble is not None:
             return _measure_ensemble(resolved, program, directory)
         solution = solve(resolved.problem, resolved.method, program, grid)
@@ -185,7 +184,7 @@ def _stored(measured: Measured, status: Status, reason: str, directory: Path) ->
 def _time(request: Request, directory: Path) -> TimingReply:
     resolved = _resolved(request)
     asked = resolved.case.ensemble
-    method: Any = _Telling(resolved.method, directory)
+    method: Any = _Telling(resolved, directory)
     if asked is None:
         answer = timing.time_round(resolved.problem, method, request.plan)
     else:
@@ -196,16 +195,25 @@ def _time(request: Request, directory: Path) -> TimingReply:
 class _Telling:
     """A method that tells the runner when it has compiled."""
 
-    def __init__(self, method: MethodBase, directory: Path) -> None:
-        self._method, self._directory = method, directory
+    def __init__(self, resolved: Resolved, directory: Path) -> None:
+        self._resolved, self._directory = resolved, directory
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._method, name)
+        return getattr(self._resolved.method, name)
 
     def compile(self, system: System) -> Program:
-        program = self._method.compile(system)
-        (self._directory / COMPILED).touch()
-        return program
+        del system  # the resolved problem's
+        return _compiled(self._resolved, self._directory)
+
+
+def _compiled(resolved: Resolved, directory: Path) -> Program:
+    """Compile, what only a batch needs too where an ensemble is asked for; then tell the runner."""
+    problem = resolved.problem
+    program = resolved.method.compile(problem.system)
+    if resolved.case.ensemble is not None and hasattr(program, "prepare_batch"):
+        ensemble.prepared(program, problem.y0[None], problem)
+    (directory / COMPILED).touch()
+    return program
 
 
 def _resolved(request: Request) -> Resolved:

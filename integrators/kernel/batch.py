@@ -8,6 +8,7 @@ time; each sees exactly the operations that it would see alone.
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Event
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -57,16 +58,16 @@ def members_for(rows: int, route: int) -> int:
     return 2 if route == 8 and rows <= 6 else 1
 
 
-def run_batch(
+def prepare_batch(
     program: "HBVMProgram",
     Y0: ArrayLike,
     par: ArrayLike | None,
     times: ArrayLike,
     t0: float,
-    sample: str | None,
-    threads: int,
-) -> Batch:
-    """Integrate every start to all times; see `HBVMProgram.batch`."""
+    sample: str | None = None,
+    threads: int = 1,
+) -> Callable[[], Batch]:
+    """Check and allocate; return what integrates every start to all times. See `HBVMProgram.batch`."""
     if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
         raise unknown("sampling of a batch", sample, SAMPLINGS)
     threads = whole("a batch", "threads", threads)
@@ -85,6 +86,12 @@ def run_batch(
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
     work = _Work(program, result, starts, parameters, t0, h, sample or "side", *plan(grid, bases, h))
+    return partial(_done, work, threads)
+
+
+def _done(work: "_Work", threads: int) -> Batch:
+    program, result = work.program, work.result
+    n = len(result.status)
     if program.varying or program.solver.strategy == layout.ALWAYS_IMPLICIT:
         work.share(work.alone, range(n), threads)
         return result

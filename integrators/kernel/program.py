@@ -1,12 +1,14 @@
 """HBVM(k, s) compiled for one system: a `Program` over the compiled kernel."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.grid import Counts
 from integrators.kernel import engine, layout, native, tables
 from integrators.kernel import field as fields
-from integrators.kernel.batch import Batch, run_batch
+from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.foreign import field_of
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
 from integrators.kernel.implicit.workspace import solver as implicit_solver
@@ -142,7 +144,13 @@ class HBVMProgram:
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        return run_batch(self, Y0, par, times, check_start(t0), sample, threads)
+        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads)()
+
+    def prepare_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Callable[[], Batch]:
+        """Check and allocate all that `batch` needs; return what then does it, once."""
+        return prepare_batch(self, Y0, par, times, check_start(t0))
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""

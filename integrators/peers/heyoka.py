@@ -2,7 +2,8 @@
 
 import copy
 import os
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -109,7 +110,7 @@ class Taylor(MethodBase):
 
 
 class TaylorProgram(PeerProgram):
-    """A heyoka integrator, compiled for one system; each start copies it.
+    """A heyoka integrator, compiled for one system; each start has a copy, or one that another is done with.
 
     heyoka keeps compiled code in memory and on disk (``~/.cache/heyoka``).
     ``from_cache`` is True where the code was found in memory, or the disk cache did
@@ -138,6 +139,9 @@ class TaylorProgram(PeerProgram):
         self.compile_seconds = perf_counter() - started
         self._options = method.options(defaults=True)
         self._lanes: Lanes | None = None
+        # Copying takes a millisecond, and a copy's code is not in the processor's caches yet: the first
+        # tenth of a millisecond would be slower than the library is.
+        self._spare: list[Any] = []
 
     def batch(
         self,
@@ -164,15 +168,24 @@ class TaylorProgram(PeerProgram):
         t0 : float
             Time of the starts.
         """
+        return self.prepare_batch(Y0, par, times=times, t0=t0)()
+
+    def prepare_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Callable[[], Trajectories]:
+        """Compile, check and allocate all that `batch` needs; return what then does it, once."""
         if self._lanes is None:
             self._lanes = Lanes(self.system, self._options)
             self.compile_seconds += self._lanes.compile_seconds
-        return self._lanes.run(Y0, par, times, t0)
+        return self._lanes.prepare(Y0, par, times, t0)
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "TaylorStepper":
         """Return a stepper at ``t0``; see the protocol."""
         arguments = self.arguments(y0, par, t0)
-        return self.started(TaylorStepper(copy.copy(self.template), *arguments), arguments[1])
+        integrator = self._spare.pop() if self._spare else copy.copy(self.template)
+        stepper = TaylorStepper(integrator, *arguments)
+        weakref.finalize(stepper, self._spare.append, integrator).atexit = False
+        return self.started(stepper, arguments[1])
 
 
 @contextmanager
@@ -198,7 +211,7 @@ class TaylorStepper(PeerStepper):
     def __init__(self, integrator: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._stats.extra["side_steps"] = 0
-        self._ta, self._sign = integrator, 1.0
+        self._ta, self._sign, self._stepped = integrator, 1.0, False
         self._outcome = load("heyoka").taylor_outcome
         if par.size:
             integrator.pars[:] = par
@@ -245,7 +258,7 @@ class TaylorStepper(PeerStepper):
         t = self._ta.time
         outcome, h = (self._ta.step if self._sign > 0.0 else self._ta.step_backward)(write_tc=True)
         if outcome == self._outcome.success:
-            self._stats.steps += 1
+            self._stats.steps, self._stepped = self._stats.steps + 1, True
             return abs(h)
         self._broken(t)
         return None
@@ -256,7 +269,7 @@ class TaylorStepper(PeerStepper):
         while True:
             before = self._ta.time
             outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS, write_tc=write_tc)
-            self._stats.steps += steps
+            self._stats.steps, self._stepped = self._stats.steps + steps, self._stepped or steps > 0
             if outcome == self._outcome.time_limit:
                 return True
             if outcome == self._outcome.err_nf_state:
@@ -275,7 +288,7 @@ class TaylorStepper(PeerStepper):
         """
         ta = self._ta
         while sign * (ta.time - t) < 0.0:
-            if abs(t - ta.time) > NEAR * abs(ta.last_h):
+            if not self._stepped or abs(t - ta.time) > NEAR * abs(ta.last_h):  # else last_h is another's
                 if not self._land(t, write_tc=True):
                     return False
                 self._take_back()
@@ -299,7 +312,7 @@ class TaylorStepper(PeerStepper):
         self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")
 
     def _save(self) -> Any:
-        return copy.copy(self._ta), self._sign
+        return copy.copy(self._ta), self._sign, self._stepped
 
     def _load(self, inner: Any) -> None:
-        self._ta, self._sign = copy.copy(inner[0]), inner[1]
+        self._ta, self._sign, self._stepped = copy.copy(inner[0]), *inner[1:]

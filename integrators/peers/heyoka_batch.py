@@ -1,5 +1,7 @@
 """Many trajectories by heyoka's batch integrator: one trajectory in each lane of the vector unit."""
 
+from collections.abc import Callable
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -39,8 +41,13 @@ class Lanes:
         )
         self.compile_seconds = perf_counter() - started
 
-    def run(self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float) -> Trajectories:
-        """Integrate every start to all times; see `integrators.peers.heyoka.TaylorProgram.batch`."""
+    def prepare(
+        self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float
+    ) -> Callable[[], Trajectories]:
+        """Check and allocate; return what integrates every start to all times.
+
+        See `integrators.peers.heyoka.TaylorProgram.prepare_batch`.
+        """
         given, parameters = self._given(starts, par)
         grid = check_times(times, t0)
         n = len(given)
@@ -54,39 +61,77 @@ class Lanes:
             t_stop=np.full(n, grid[-1]),
             steps=np.zeros(n, dtype=np.int64),
         )
-        for first in range(0, n, self.size):
-            # the last lanes begin as a trajectory that is there; what they do is not looked at
-            members = np.minimum(np.arange(first, first + self.size), n - 1)
-            self._group(result, members[: min(self.size, n - first)], given[members], parameters[members], t0)
+        # the last lanes begin as a trajectory that is there; what they do is not looked at
+        members = np.minimum(np.arange(-(-n // self.size) * self.size), n - 1).reshape(-1, self.size)
+        states, values = (
+            np.ascontiguousarray(rows[members].transpose(0, 2, 1)) for rows in (given, parameters)
+        )
+        return partial(self._run, result, states, values, t0)
+
+    def _run(self, result: Trajectories, states: Array, values: Array, t0: float) -> Trajectories:
+        """Integrate group by group; states and values have the shape (groups, components, lanes).
+
+        Between heyoka's calls is only what cannot wait: a group of a small system takes 0.1 ms.
+        """
+        ta, size, n, y = self._ta, self.size, len(result.status), result.y
+        now, state = ta.time, ta.state  # heyoka's own memory
+        ends = [(place, t, [t] * size) for place, t in enumerate(result.t.tolist())]
+        ended: list[tuple[int, Any]] = []
+        for first, begin in zip(range(0, n, size), states, strict=True):
+            ta.set_time(t0)
+            state[:] = begin
+            if values.size:
+                ta.pars[:] = values[first // size]
+            for place, t, all_there in ends:
+                if t != t0:
+                    ta.propagate_until(all_there, max_steps=CRAWL_STEPS)
+                    if now.tolist() != all_there:
+                        self._one_by_one(result, np.arange(first, min(first + size, n)), place, t0)
+                        break
+                    ended.append((first, ta.propagate_res))
+                y[first : first + size, place] = state.T[: n - first]
+        for first, lanes in ended:
+            result.steps[first : first + size] += [one[3] for one in lanes][: n - first]
+        broken = ~np.isfinite(y).all(axis=2)
+        for i in np.flatnonzero(broken.any(axis=1)).tolist():
+            if result.status[i] is Status.FINISHED:  # so in the very step that came to the time
+                place = int(np.argmax(broken[i]))
+                t, y[i, place:] = float(result.t[place]), np.nan
+                result.status[i], result.t_stop[i] = Status.NOT_FINITE, t
+                result.reason[i] = f"the state is not finite at t = {t:.6g}"
         return result
 
-    def _group(self, result: Trajectories, members: Counts, starts: Array, par: Array, t0: float) -> None:
-        ta, lanes = self._ta, range(len(members))
-        ta.set_time(t0)
-        ta.state[:] = starts.T
-        if par.shape[1]:
-            ta.pars[:] = par.T
-        going = set(lanes)
-        for place, time in enumerate(result.t.tolist()):
-            if time != t0:
-                self._towards(result, members, going, time)
+    def _one_by_one(self, result: Trajectories, members: Counts, place: int, t0: float) -> None:
+        """Take a group on, lane by lane, whose propagation to the time at ``place`` left some behind."""
+        going = set(range(len(members)))
+        before = np.full(self.size, result.t[place - 1] if place else t0)
+        for number, time in enumerate(result.t[place:].tolist(), place):
+            if number > place:
+                before = self._propagate(time)
+            self._towards(result, members, going, time, before)
             for lane in going:
-                result.y[members[lane], place] = ta.state[:, lane]
+                result.y[members[lane], number] = self._ta.state[:, lane]
             if not going:
                 return
 
-    def _towards(self, result: Trajectories, members: Counts, going: set[int], time: float) -> None:
-        """Bring the lanes that are going to a time; those that fail go no more, and say why.
+    def _propagate(self, time: float) -> Array:
+        """Propagate all lanes towards a time; return the times from which they went."""
+        before = self._ta.time.copy()
+        self._ta.propagate_until(np.full(self.size, time), max_steps=CRAWL_STEPS)
+        return before
 
-        heyoka leaves a propagation as soon as one lane is not finite, wherever the others are then:
-        they are taken up again.
+    def _towards(
+        self, result: Trajectories, members: Counts, going: set[int], time: float, before: Array
+    ) -> None:
+        """Bring the lanes that are going to a time, after a first propagation from ``before``.
+
+        Those that fail go no more, and say why. heyoka leaves a propagation as soon as one lane is
+        not finite, wherever the others are then: they are taken up again.
         """
-        ta, end = self._ta, np.full(self.size, time)
-        watches = {lane: Crawl(float(ta.time[lane]), time) for lane in going}
+        ta = self._ta
+        watches = {lane: Crawl(float(before[lane]), time) for lane in going}
         ahead = set(going)
-        while ahead:
-            before = ta.time.copy()
-            ta.propagate_until(end, max_steps=CRAWL_STEPS)
+        while True:
             for lane in sorted(ahead):
                 i, t, steps = members[lane], float(ta.time[lane]), ta.propagate_res[lane][3]
                 result.steps[i] += steps
@@ -104,6 +149,9 @@ class Lanes:
                 going.discard(lane)
             ahead &= going
             self._idle(going)
+            if not ahead:
+                return
+            before = self._propagate(time)
 
     def _idle(self, going: set[int]) -> None:
         """Have the lanes that are not going do what one that is does, so that they stop no other."""
