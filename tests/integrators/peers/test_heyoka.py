@@ -8,6 +8,7 @@ import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka import COLD, EPS, Taylor
 from problems import Problem, VectorField
+from problems.errors import InputError
 
 
 def test_the_default_tolerance_is_the_library_s_own_and_is_not_printed():
@@ -131,3 +132,36 @@ def test_a_cold_compilation_uses_no_cache(monkeypatch):
     assert cold.compile_seconds > 0.005  # 0.06; from memory 0.003
     monkeypatch.setenv(COLD, "0")
     assert Taylor().compile(system).from_cache is True
+
+
+def test_a_start_that_takes_over_an_integrator_is_a_start_anew():
+    problem = problems.load("kepler", e=0.6, t_end=30.0)
+    program, times = Taylor().compile(problem.system), np.array([7.0, 7.3, 30.0])
+    fresh = program.start(problem.y0, problem.par)
+    expected = fresh.advance(times)
+    other = program.start(problem.y0 * 1.1, problem.par, 2.0)
+    other.advance(np.array([-40.0]))
+    integrator = other._ta
+    del other
+    again = program.start(problem.y0, problem.par)
+    assert again._ta is integrator
+    samples = again.advance(times)
+    assert np.array_equal(samples.y, expected.y)
+    assert again.stats == fresh.stats
+
+
+def test_one_time_is_landed_on_as_several_are():
+    problem = problems.load("kepler", e=0.6, t_end=30.0)
+    program = Taylor().compile(problem.system)
+    one, same = (program.start(problem.y0, problem.par) for _ in range(2))
+    end = np.array([30.0])
+    landed, listed = one.advance(end, sample="land"), same.advance([30.0], sample="land")
+    assert np.array_equal(landed.y, listed.y)
+    assert (one.t, one.status, landed.status) == (30.0, same.status, Status.FINISHED)
+    assert np.array_equal(one.y, landed.y[0])
+    landed.y[:], end[:] = 0.0, 1.0  # what was returned and what was given are not the stepper's
+    assert np.array_equal(one.y, same.y)
+    assert landed.t.tolist() == [30.0]
+    with pytest.raises(InputError, match="finite"):
+        one.advance(np.array([np.inf]), sample="land")
+    assert one.advance(np.array([30.0]), sample="land").t.tolist() == [30.0]
