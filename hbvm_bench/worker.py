@@ -31,7 +31,7 @@ from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.solve import solve
 from hbvm_bench.store import NAME, atomic, encode_series
 from integrators.integrate import Solution
-from integrators.protocol import MethodBase, Program, Status
+from integrators.protocol import Program, Status
 from problems.errors import InputError
 from problems.system import System
 

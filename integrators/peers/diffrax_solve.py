@@ -11,6 +11,7 @@ controllers as diffrax invites its users to write.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from time import perf_counter
 from typing import Any, cast
 
@@ -33,6 +34,9 @@ ULPS = 4.0
 FIRST_STEP = 0.01
 """The first step that `diffeqsolve` takes where it is left to choose: in diffrax 0.7 always this,
 because the choice by the field asks for an `ODETerm` and is given a wrapped one."""
+
+MOST_STEPS = 1 << 24
+"""Of a plain solve, some ten seconds: then it is taken for a failure, and run again under a watch."""
 
 SHORTENED = 1e-6
 """A step shorter than wanted by this part was shortened, and not only rounded."""
@@ -141,11 +145,25 @@ class Solve:
         Fixed: ``(base, h, n0, n1, y, state, par) -> (y, state)``. Adaptive: ``(tau,
         end, dt, y, state, controller state, limit, par, rtol, atol) -> (y, tau, state,
         controller state, dt, accepted, rejected, code)``.
+    make_plain : callable
+        Compiles `plain`.
     """
 
     begin: Compiled
     run: Compiled
+    make_plain: Callable[[], Compiled]
     seconds: float = field(init=False)
+
+    @cached_property
+    def plain(self) -> Compiled:
+        """``diffeqsolve`` to one end as its documentation writes it, with diffrax's own controller.
+
+        Fixed: ``(tau, end, h, y, par) -> (y, accepted, rejected, whether it came there)``. Adaptive:
+        ``rtol`` and ``atol`` in the place of ``h``, after ``par``. Compiled when it is first asked for.
+        """
+        made = self.make_plain()
+        self.seconds += made.seconds
+        return made
 
     def __post_init__(self) -> None:
         self.seconds = self.begin.seconds + self.run.seconds
@@ -247,9 +265,30 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
         )
         return whole(jax.tree.map(lambda x: x[-1], solution.ys)), solution.solver_state
 
+    def plain(tau: Any, end: Any, h: Any, y: Any, par: Any) -> Any:
+        return _plainly(terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize(), whole)
+
     tau, y, par, n = np.float64(0.0), np.zeros(dim), np.zeros(n_par), np.int64(0)
+    one = np.float64(1.0)
     first = _compile(begin, tau, y, par)
-    return Solve(first, _compile(run, tau, np.float64(1.0), n, n, y, first.call(tau, y, par), par))
+    last = _compile(run, tau, one, n, n, y, first.call(tau, y, par), par)
+    return Solve(first, last, lambda: _compile(plain, tau, one, one, y, par))
+
+
+def _plainly(
+    terms: Any, solver: Any, tau: Any, end: Any, dt: Any, y: Any, par: Any, controller: Any, whole: Any
+) -> Any:
+    solution = dx.diffeqsolve(
+        terms, solver, tau, end, dt, y, args=par, stepsize_controller=controller,
+        max_steps=MOST_STEPS, adjoint=dx.ForwardMode(), throw=False,
+    )  # fmt: skip
+    stats = solution.stats
+    return (
+        whole(jax.tree.map(lambda x: x[-1], solution.ys)),
+        stats["num_accepted_steps"],
+        stats["num_rejected_steps"],
+        solution.result == dx.RESULTS.successful,
+    )
 
 
 def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
@@ -300,7 +339,12 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
             code,
         )
 
+    def plain(tau: Any, end: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
+        control = dx.PIDController(rtol=rtol, atol=atol)
+        return _plainly(terms, solver, tau, end, FIRST_STEP, y, par, control, lambda y: y)
+
     one, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
     first = _compile(begin, one, y, par, one, one)
     state, control, dt = first.call(one, y, par, one, one)
-    return Solve(first, _compile(run, one, one, dt, y, state, control, np.int64(1), par, one, one))
+    last = _compile(run, one, one, dt, y, state, control, np.int64(1), par, one, one)
+    return Solve(first, last, lambda: _compile(plain, one, one, y, par, one, one))

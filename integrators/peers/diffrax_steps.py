@@ -58,9 +58,18 @@ class _Direction:
             extra = stepper.stats.extra
             extra["compile_seconds"] = extra.get("compile_seconds", 0.0) + self.solve.seconds
 
+    def plain(self, t: float, end: float, *rest: Any) -> Any:
+        """Solve plainly; see `integrators.peers.diffrax_solve.Solve.plain`."""
+        return self.solve.plain.call(np.float64(self.sign * t), np.float64(self.sign * end), *rest)
+
 
 class DiffraxStepper(FixedStepper):
-    """A trajectory with fixed steps; see `integrators.peers.stepper.FixedStepper` for the sampling."""
+    """A trajectory with fixed steps; see `integrators.peers.stepper.FixedStepper` for the sampling.
+
+    ``"end"`` is a plain ``diffeqsolve`` to each time, which begins anew there.
+    """
+
+    samplings = (*FixedStepper.samplings, "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         h = float(program.method.h)  # pyright: ignore[reportAttributeAccessIssue]
@@ -71,11 +80,30 @@ class DiffraxStepper(FixedStepper):
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         self._way = _Direction(self, self._program, 1 if h > 0.0 else -1)
-        self._states = y
-        self._inner = self._way.solve.begin.call(np.float64(self._way.sign * t), y, self._par)
+        self._states, self._inner = y, None
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        if how != "end":
+            return super()._serve(grid, how)
+        self._towards(float(grid[-1]))
+        way, states = self._way, np.empty((grid.size, self._y.size))
+        t, y = self._t, self._y
+        for i, end in enumerate(grid.tolist()):
+            found, accepted, _, arrived = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
+            t, y = end, np.asarray(found) if arrived else np.full(y.size, np.nan)
+            states[i] = y
+            self._stats.steps += int(accepted)
+            work = int(accepted) * self._program.method.evaluations
+            self._stats.evaluations = (self._stats.evaluations or 0) + work
+            self._t0, self._n, self._states, self._inner = t, 0, y, None
+            if not math.isfinite(y.sum()):
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
 
     def _solve(self, base: float, h: float, n0: int, n1: int) -> tuple[Array, Any]:
         sign = self._way.sign
+        if self._inner is None:
+            self._inner = self._way.solve.begin.call(np.float64(sign * base), self._states, self._par)
         y, inner = self._way.solve.run.call(
             np.float64(sign * base),
             np.float64(sign * h),
@@ -112,9 +140,13 @@ class DiffraxStepper(FixedStepper):
 
 
 class AdaptiveStepper(PeerStepper):
-    """A trajectory with steps chosen by diffrax: ``"land"`` (default) or ``"steps"``."""
+    """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
 
-    samplings = ("land", "steps")
+    ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain
+    ``diffeqsolve`` to each time, which begins anew there.
+    """
+
+    samplings = ("land", "steps", "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
@@ -124,10 +156,7 @@ class AdaptiveStepper(PeerStepper):
         self._begin(1)
 
     def _begin(self, sign: int) -> None:
-        self._way = _Direction(self, self._program, sign)
-        self._inner = self._way.solve.begin.call(
-            np.float64(sign * self._t), self._y, self._par, *self._tolerances
-        )
+        self._way, self._inner = _Direction(self, self._program, sign), None
 
     def _towards(self, end: float) -> None:
         sign = 1 if end > self._t else -1
@@ -136,7 +165,10 @@ class AdaptiveStepper(PeerStepper):
 
     def _advance(self, t: float, y: Array, end: float, limit: int) -> tuple[float, Array, int]:
         """Solve from ``t`` to ``end`` in at most ``limit`` steps; return where it came and how it ended."""
-        sign, (state, control, dt) = self._way.sign, self._inner
+        sign = self._way.sign
+        if self._inner is None:
+            self._inner = self._way.solve.begin.call(np.float64(sign * t), y, self._par, *self._tolerances)
+        state, control, dt = self._inner
         y, reached, state, control, dt, accepted, rejected, code = self._way.solve.run.call(
             np.float64(sign * t),
             np.float64(sign * end),
@@ -149,10 +181,7 @@ class AdaptiveStepper(PeerStepper):
             *self._tolerances,
         )
         self._inner = state, control, dt
-        stats, method = self._stats, self._program.method
-        stats.steps += int(accepted)
-        stats.rejections = (stats.rejections or 0) + int(rejected)
-        stats.evaluations = (stats.evaluations or 0) + (int(accepted) + int(rejected)) * method.evaluations
+        self._count(int(accepted), int(rejected))
         reached, code, solve = sign * float(reached), int(code), self._program.solve
         if code == solve.DT_MIN:
             self._fail(
@@ -164,20 +193,51 @@ class AdaptiveStepper(PeerStepper):
             self._fail(Status.NOT_FINITE, reached, f"diffrax ended without success at t = {reached!r}.")
         return reached, np.asarray(y), code
 
-    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
-        self._towards(float(grid[-1]))
+    def _count(self, accepted: int, rejected: int) -> None:
+        stats = self._stats
+        stats.steps += accepted
+        stats.rejections = (stats.rejections or 0) + rejected
+        work = (accepted + rejected) * self._program.method.evaluations
+        stats.evaluations = (stats.evaluations or 0) + work
+
+    def _ends(self, grid: Array) -> tuple[Array, Array]:
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
-        watch, code = Crawl(t, float(grid[-1])), self._program.solve.OK
         for i, end in enumerate(grid.tolist()):
-            code = self._program.solve.LIMIT
-            while code == self._program.solve.LIMIT and t != end:
-                t, y, code = self._advance(t, y, end, CRAWL_STEPS)
-                if code == self._program.solve.LIMIT and (stalled := watch.sees(t, CRAWL_STEPS)):
-                    self._fail(Status.STALLED, t, stalled)
+            self._inner = None
+            found, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
+            if not arrived:  # why not is found out under a watch
+                _, y = self._watched(t, y, end, Crawl(t, end))
                 if self._status.failed:
                     return grid[:i], states[:i]
-            states[i], t = y, end
+                found, accepted, rejected, self._inner = y, 0, 0, None
+            self._count(int(accepted), int(rejected))
+            t, y = end, np.asarray(found)
+            states[i] = y
         return grid, states
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        self._towards(float(grid[-1]))
+        if how == "end":
+            return self._ends(grid)
+        states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
+        watch = Crawl(t, float(grid[-1]))
+        for i, end in enumerate(grid.tolist()):
+            t, y = self._watched(t, y, end, watch)
+            if self._status.failed:
+                return grid[:i], states[:i]
+            states[i] = y
+        return grid, states
+
+    def _watched(self, t: float, y: Array, end: float, watch: Crawl) -> tuple[float, Array]:
+        """Solve from ``t`` to ``end``, a limited number of steps at a time; note a failure."""
+        code = self._program.solve.LIMIT
+        while code == self._program.solve.LIMIT and t != end:
+            t, y, code = self._advance(t, y, end, CRAWL_STEPS)
+            if code == self._program.solve.LIMIT and (stalled := watch.sees(t, CRAWL_STEPS)):
+                self._fail(Status.STALLED, t, stalled)
+            if self._status.failed:
+                return t, y
+        return end, y
 
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         self._towards(end)

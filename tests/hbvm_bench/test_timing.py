@@ -73,7 +73,9 @@ class Batching(Noting):
 
     def went(self, n):
         self.now += 1.0
-        return SimpleNamespace(y=np.zeros((n, 1, 2)), status=[Status.FINISHED] * n, reason=[""], steps=np.ones(n))
+        return SimpleNamespace(
+            y=np.zeros((n, 1, 2)), status=[Status.FINISHED] * n, reason=[""], steps=np.ones(n)
+        )
 
 
 def test_preparing_a_batch_is_outside_the_clock():

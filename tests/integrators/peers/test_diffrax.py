@@ -162,3 +162,32 @@ def test_a_second_program_compiles_nothing():
     again = Dopri8(h=0.2).compile(system)
     assert again.from_cache is True
     assert again.compile_seconds == 0.0
+
+
+@pytest.mark.parametrize("method", [Dopri8(rtol=1e-9, atol=1e-9), *(solver(h=0.3) for solver in FIXED[1:])])
+def test_an_end_is_met_by_diffeqsolve_alone(method):
+    problem = testing.pendulum()
+    fixed = getattr(method, "h", None)
+    controller = dx.ConstantStepSize() if fixed else dx.PIDController(rtol=1e-9, atol=1e-9)
+    solver = getattr(dx, type(method).__name__)()
+    theirs, stats = plain(problem, solver, controller, fixed or 0.01, 20.0)
+    stepper = method.compile(problem.system).start(problem.y0, problem.par)
+    made = stepper.advance(np.array([20.0]), sample=method.to_end)
+    assert made.status is Status.FINISHED
+    assert stepper.stats.steps == int(stats["num_accepted_steps"])
+    # 0 but for Dopri8, whose stages we keep apart for XLA: 1e-15
+    assert np.abs(made.y[0] - theirs).max() < 1e-13
+    back = stepper.advance(np.array([0.0]), sample=method.to_end)  # it begins anew there, either way
+    assert (back.status, back.t.tolist(), stepper.t) == (Status.FINISHED, [0.0], 0.0)
+
+
+def test_a_plain_solve_that_does_not_arrive_is_run_again_under_a_watch(monkeypatch):
+    monkeypatch.setattr(diffrax_solve, "MOST_STEPS", 5)
+    system = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 - 1.5 * m.cos(q[0]), dof=1, name="watched")
+    problem = Problem(system, q0=[1.0], p0=[0.0], t_end=9.0)
+    program, end = Dopri8(rtol=1e-9, atol=1e-9).compile(system), np.array([9.0])
+    plainly, watched = (program.start(problem.y0) for _ in range(2))
+    made = plainly.advance(end, sample="end")
+    assert made.status is Status.FINISHED
+    assert np.array_equal(made.y, watched.advance(end, sample="land").y)
+    assert plainly.stats.steps == watched.stats.steps > 5
