@@ -26,6 +26,8 @@ from hbvm_bench.measure import POSITION
 from hbvm_bench.race import truth
 from hbvm_bench.race.accuracy import sample_times
 from hbvm_bench.race.contests import chosen
+from hbvm_bench.records import decoded
+from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.store import atomic, ensure_writable
 from hbvm_bench.timing import Run
 from integrators.protocol import MethodBase, Status
@@ -174,8 +176,8 @@ def load(path: Path) -> Result:
         If the file is something else.
     """
     try:
-        result = msgspec.json.decode(path.read_bytes(), type=Result)
-    except (OSError, msgspec.MsgspecError) as error:
+        result = decoded(path.read_bytes(), Result)
+    except (OSError, msgspec.MsgspecError, ValueError) as error:
         raise InputError(f"{str(path)!r} is not the result of automatic: {error}.") from None
     if result.schema != SCHEMA:
         raise InputError(f"{str(path)!r} was written by another version; run automatic again.")
@@ -222,9 +224,13 @@ def markdown(results: Mapping[str, Result]) -> str:
         in_markdown(ratios(results)),
     ]
     for kind, result in results.items():
-        parts += [f"## {kind}", machine.sentence(result.machine), in_markdown(sides(result.duels))]
+        parts += [
+            f"## {plain(kind)}",
+            plain(machine.sentence(result.machine)),
+            in_markdown(sides(result.duels)),
+        ]
         libraries = ", ".join(f"{name} {number}" for name, number in result.versions.items())
-        parts += [f"Measured on {result.started[:10]} with {libraries}: `{result.command}`"]
+        parts += [f"Measured on {plain(result.started[:10])} with {plain(libraries)}: {code(result.command)}"]
     return "\n\n".join(parts) + "\n"
 
 

@@ -9,6 +9,7 @@ from hbvm_bench import automatic, machine
 from hbvm_bench.cells import in_markdown
 from hbvm_bench.race import results, tables
 from hbvm_bench.race.contests import CONTESTS
+from hbvm_bench.report.markdown import plain
 from problems.errors import InputError
 
 
@@ -21,11 +22,11 @@ def headline(
     if not races and not duels:
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
     said = [one.machine for found in races.values() for one in found]
-    parts = [f"{kind}\n\n{in_markdown(tables.headline(found))}" for kind, found in races.items()]
+    parts = [f"{plain(kind)}\n\n{in_markdown(tables.headline(found))}" for kind, found in races.items()]
     parts += [in_markdown(tables.kinds(races))] if len(races) > 1 else []
     parts += [in_markdown(automatic.ratios(duels))] if duels else []
     said += [one.machine for one in duels.values()]
-    parts += dict.fromkeys(f"{machine.kind(one)}: {machine.sentence(one)}" for one in said)
+    parts += dict.fromkeys(plain(f"{machine.kind(one)}: {machine.sentence(one)}") for one in said)
     print("\n\n".join(parts))
 
 
