@@ -38,8 +38,8 @@ def headline(races: Sequence[Race]) -> Table:
         "How many times as long as our fastest setting each peer's fastest takes, at the same accuracy",
         ("problem", "energy, position", "ours", *(FAMILIES[peer].short for peer in peers)),
         rows,
-        "Medians over interleaved rounds; in brackets the quartiles of the ratio within each round. A ratio "
-        "below 1 means that the peer is faster.",
+        "The median of the ratio within each interleaved round, in brackets its quartiles. A ratio below 1 "
+        "means that the peer is faster.",
     )
 
 
