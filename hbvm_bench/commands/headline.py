@@ -25,7 +25,7 @@ def headline(
     parts = [f"{plain(kind)}\n\n{in_markdown(tables.headline(found))}" for kind, found in races.items()]
     parts += [in_markdown(tables.kinds(races))] if len(races) > 1 else []
     parts += [in_markdown(automatic.ratios(duels))] if duels else []
-    said += [one.machine for one in duels.values()]
+    said += [one.machine for runs in duels.values() for one in runs]
     parts += dict.fromkeys(plain(f"{machine.kind(one)}: {machine.sentence(one)}") for one in said)
     print("\n\n".join(parts))
 

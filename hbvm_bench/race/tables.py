@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from statistics import median
 
+from hbvm_bench import machine
 from hbvm_bench.cells import Table
 from hbvm_bench.race import standings
 from hbvm_bench.race.results import Outcome, Probe, Race
@@ -64,9 +65,9 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
         "The same ratios by kind of processor",
         ("problem", "peer", *by_kind),
         rows,
-        "How many times as long as our fastest setting each peer's fastest takes. Columns: LLVM's name of "
-        "the processor; -avx2: our code compiled without AVX-512, the peers' as ever. Left out: peers "
-        "without a ratio anywhere.",
+        "How many times as long as our fastest setting each peer's fastest takes. "
+        + machine.COLUMNS
+        + " Left out: peers without a ratio anywhere.",
         words=(1,),
     )
 

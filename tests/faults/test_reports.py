@@ -72,7 +72,7 @@ def stored_results(directory):
     ours = automatic.Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
     duels = [automatic.Duel("kepler", 2.0, ours, ours)]
     (directory / "automatic").mkdir()
-    automatic.save(automatic.Result(duels=duels, **said), directory / "automatic" / "one.json")
+    automatic.save([automatic.Result(duels=duels, **said)], directory / "automatic" / "one.json")
 
 
 @pytest.mark.parametrize(
