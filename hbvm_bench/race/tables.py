@@ -44,6 +44,23 @@ def headline(races: Sequence[Race]) -> Table:
     )
 
 
+def behind(races: Sequence[Race]) -> Table:
+    """Return the settings whose times `headline` compares."""
+    peers = [
+        f for f in FAMILIES if f != OURS and any(standings.best(race, f, *asked(race)) for race in races)
+    ]
+    rows = []
+    for race in races:
+        best = (standings.best(race, family, *asked(race)) for family in (OURS, *peers))
+        rows.append((race.contest.title, *(NONE if one is None else one.setting.method for one in best)))
+    return Table(
+        "The settings behind these ratios",
+        ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
+        rows,
+        words=tuple(range(1, len(peers) + 2)),
+    )
+
+
 def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
     """Return the peers' best times over ours, one column for each kind of processor."""
     keys = dict.fromkeys(race.contest.key for races in by_kind.values() for race in races)

@@ -36,5 +36,5 @@ def test_a_peer_on_another_trajectory_is_not_compared(monkeypatch):
     pytest.importorskip("heyoka")
     lost = {"off_axis": np.array([0.0, 1e-3])}
     monkeypatch.setattr(Problem, "guards", lambda self, y, t: lost)
-    with pytest.raises(InputError, match="loses what a symmetry .* keeps at 0: off_axis"):
+    with pytest.raises(InputError, match=r"loses what a symmetry .* keeps at 0: off_axis"):
         automatic.duels(["henon_heiles"], rounds=2)

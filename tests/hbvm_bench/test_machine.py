@@ -181,8 +181,19 @@ def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
     text = path.read_text(encoding="utf-8")
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
+    automatic.keep(of(ZEN4), tmp_path / "automatic")
+    automatic.keep(of(ZEN5, 1.5), tmp_path / "automatic")
     assert main(["headline", str(tmp_path)]) == 0
-    assert "was restricted to AVX2" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "was restricted to AVX2" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | heyoka | 1e-13, 1e-10 | ≥ 10 | 15.0×" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | Gauss(s=8, h=1.5) | Taylor() |" in said
+    assert "| problem | against | goal | znver4-256bit | znver5 |" in said
+    assert "| kepler | Taylor(tol=1e-15) | ≥ 2 | 2.00× reached | 1.50× missed |" in said
+    assert "earlier definition" not in said
+    results.save(msgspec.structs.replace(one, schema=1), tmp_path / "race")
+    assert main(["headline", str(tmp_path)]) == 0
+    assert "position errors are of an earlier definition" in capsys.readouterr().out
 
 
 def test_without_results_there_is_no_headline(tmp_path, capsys):
