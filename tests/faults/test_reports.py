@@ -44,6 +44,8 @@ def test_a_campaign_with_an_ensemble_is_run_and_reported_as_it_is_typed(tmp_path
     assert "| `Gauss(s=2, h=0.25)` |" in ours
     assert "| `Gauss(s=3, h=0.25)` |" not in ours
     assert "| `Gauss(s=3, h=0.25)` |" in together
+    assert "at these ends" in together
+    assert "at these ends" not in ours
     assert "3 trajectories at once" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
 
 
