@@ -157,6 +157,19 @@ def limit(starts: int) -> float:
     return max(STANDARD_ERRORS, float(student.ppf(0.5 + CONFIDENCE / 2, starts - 1)))
 
 
+def false_alarms(starts: int) -> float:
+    """Return in what share of errors without a drift chance puts the mean beyond `limit`."""
+    return 2.0 * float(student.sf(limit(starts), starts - 1))
+
+
+def told(starts: int) -> str:
+    """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
+    return (
+        f"Called a drift where the mean over the {starts} starts is more than {limit(starts):.3g} of its "
+        f"standard errors from 0; of errors that do not drift, chance puts {100.0 * false_alarms(starts):.0f} % there"
+    )
+
+
 def mean(t: ArrayLike, errors: ArrayLike) -> Mean:
     """Return the mean over the starts of what the errors have grown by at the end.
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from rich.console import Group, RenderableType
 from rich.live import Live as RichLive
-from rich.markup import escape
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
@@ -79,10 +78,13 @@ class Live:
     def case(self, record: Record) -> None:
         """Report a case that has ended."""
         self._ended(record.id, record.seconds)
-        mark = "[green]ok[/]" if status_of(record) == "ok" else f"[yellow]{escape(status_of(record))}[/]"
+        status = status_of(record)
         self._console.print(
-            f"  \\[{self._count}/{self._total}] {escape(record.case.method)}  {mark}"
-            f"  [dim]{seconds(record.seconds)}[/]"
+            Text.assemble(
+                f"  [{self._count}/{self._total}] {record.case.method}  ",
+                (status, "green" if status == "ok" else "yellow"),
+                (f"  {seconds(record.seconds)}", "dim"),
+            )
         )
         self._say_sometimes(self._summary())
 
@@ -103,7 +105,7 @@ class Live:
 
     def say(self, words: str) -> None:
         """Print a sentence."""
-        self._console.print(escape(words))
+        self._console.print(words)
 
     @property
     def elapsed(self) -> float:
@@ -135,7 +137,9 @@ class Live:
         bar = ProgressBar(total=max(self._total, 1), completed=self._count, width=24)
         head = Table.grid(padding=(0, 1))
         minutes, rest = divmod(int(self.elapsed), 60)
-        head.add_row(self._title, bar, f"{self._summary()}  [dim]{minutes}:{rest:02d}[/]")
+        head.add_row(
+            self._title, bar, Text.assemble(f"{self._summary()}  ", (f"{minutes}:{rest:02d}", "dim"))
+        )
         lines = Table.grid(padding=(0, 2))
         now = time.monotonic()
         shown = sorted(self._since.values(), key=lambda item: item[1])

@@ -14,6 +14,19 @@ VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
 MEASURED = ("vector_bits", "clock_ghz")
 """What `describe` measures: it may differ from one look at a processor to the next."""
 
+COLUMNS = (
+    "Columns: LLVM's name of the processor and how wide its arithmetic is, where that was measured; -avx2: "
+    "all that numba compiles, which is our code and the forces and fields handed to REBOUND and SciPy, "
+    "without AVX-512."
+)
+"""What `kind` says, for under a table."""
+
+AVX2 = (
+    "Without AVX-512 in all that numba compiles: our code, and the forces and fields handed to REBOUND "
+    "and SciPy."
+)
+"""What the option --avx2 does."""
+
 FEATURES = "NUMBA_CPU_FEATURES"
 NAME = "NUMBA_CPU_NAME"
 
@@ -57,9 +70,15 @@ def same(a: Mapping[str, str | int], b: Mapping[str, str | int]) -> bool:
 
 
 def kind(described: Mapping[str, str | int]) -> str:
-    """Return the kind of processor in one word, for file names and columns: ``znver4``, ``znver4-avx2``."""
-    built = described.get("ours_built_for")
-    words = [str(described.get("llvm_processor", "unknown")), *([str(built).lower()] if built else [])]
+    """Return the kind of processor in one word, for file names and columns.
+
+    ``znver4-256bit``: LLVM's name and how wide the arithmetic is, where that was measured, for
+    it differs among processors of one name; ``znver4-256bit-avx2`` with code restricted to AVX2.
+    """
+    bits, built = described.get("vector_bits"), described.get("ours_built_for")
+    words = [str(described.get("llvm_processor", "unknown"))]
+    words += [f"{bits}bit"] if bits else []
+    words += [str(built).lower()] if built else []
     return "-".join(words).replace(" ", "-").replace("/", "-")
 
 
@@ -76,7 +95,8 @@ def sentence(described: Mapping[str, str | int]) -> str:
         + f", {described.get('vector_instructions', 'vector instructions not recorded')}, {width}"
         + (f", {clock} GHz" if clock else "")
         + (
-            f"; what numba compiles, our code, was restricted to {built}, the peers' own code was not"
+            f"; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
+            f"was restricted to {built}, the peers' own code was not"
             if built
             else ""
         )

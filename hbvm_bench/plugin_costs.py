@@ -35,7 +35,7 @@ class Cost:
         What ran.
     energy, position : float
         Largest relative error of the energy over the states it returned, and the position
-        error at the end (`hbvm_bench.measure.POSITION`).
+        error at the end (`hbvm_bench.measure.POSITION`, with the true start and end for stored times).
     seconds : ndarray
         One of each round.
     """

@@ -19,7 +19,7 @@ T = TypeVar("T")
 SCHEMA = 2  # 1 had position errors in units of length
 COMPILING = "compiling"
 # They command a terminal, or turn the direction in which a line is read.
-COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
 
@@ -32,9 +32,12 @@ def decoded(content: bytes, type_: type[T]) -> T:
     msgspec.MsgspecError
         If it is no JSON, or not that of the type.
     ValueError
-        If it is no UTF-8.
+        If it is no UTF-8, or nested too deep.
     """
-    return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
+    try:
+        return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
+    except RecursionError:
+        raise ValueError("it is nested too deep") from None
 
 
 def printable(text: str) -> str:

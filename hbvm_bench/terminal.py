@@ -26,8 +26,11 @@ PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded 
 
 
 def console(*, stderr: bool = False) -> Console:
-    """Return a console that does not fold tables when its output is a file or a pipe."""
-    made = Console(stderr=stderr, highlight=False)
+    """Return a console that does not fold tables when its output is a file or a pipe.
+
+    Nor does it take brackets in a text for a style: what is printed may be somebody else's.
+    """
+    made = Console(stderr=stderr, highlight=False, markup=False)
     if not made.is_terminal:
         made.width = PIPE_WIDTH
     return made

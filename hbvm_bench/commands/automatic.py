@@ -30,9 +30,7 @@ def automatic(
     limit: Annotated[
         float, typer.Option(help="With --general: seconds after which a run is given up.")
     ] = 30.0,
-    avx2: Annotated[
-        bool, typer.Option("--avx2", help="Compile our code, not heyoka's, without AVX-512.")
-    ] = False,
+    avx2: Annotated[bool, typer.Option("--avx2", help=machine.AVX2)] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", help="Keep the result there, as <kind of processor>.json, with a page of all."),
@@ -82,7 +80,8 @@ def _measured(
     if code != 0:
         print(f"hbvm-bench: the process that measures ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(1)
-    return automatic_.load(scratch / "result.json")
+    (result,) = automatic_.load(scratch / "result.json")
+    return result
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:

@@ -1,5 +1,6 @@
 """The command ``hbvm-bench headline``."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -7,26 +8,41 @@ import typer
 
 from hbvm_bench import automatic, machine
 from hbvm_bench.cells import in_markdown
-from hbvm_bench.race import results, tables
+from hbvm_bench.race import report, results, tables
 from hbvm_bench.race.contests import CONTESTS
+from hbvm_bench.race.results import Race
+from hbvm_bench.report.markdown import plain
 from problems.errors import InputError
 
 
 def headline(
     reports: Annotated[Path, typer.Argument(help="Where race/ and automatic/ lie.")] = Path("reports"),
 ) -> None:
-    """Print the README's tables of times as markdown, from stored results alone."""
+    """Print the README's tables of times as markdown, from stored results alone.
+
+    For every kind of processor the ratios, the goals with what was measured, and the settings
+    that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.
+    """
     races = results.by_kind(reports / "race", list(CONTESTS))
     duels = automatic.by_kind(reports / "automatic")
     if not races and not duels:
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
-    said = [one.machine for found in races.values() for one in found]
-    parts = [f"{kind}\n\n{in_markdown(tables.headline(found))}" for kind, found in races.items()]
+    parts = []
+    for kind, found in races.items():
+        parts += [f"**{plain(kind)}**", *(plain(said) for said in _processors(found))]
+        shown = [tables.headline(found), tables.goals(found), tables.behind(found)]
+        parts += [in_markdown(table) for table in shown if table.rows]
+        parts += dict.fromkeys(plain(said) for race in found for said in report.earlier_definition(race))
     parts += [in_markdown(tables.kinds(races))] if len(races) > 1 else []
-    parts += [in_markdown(automatic.ratios(duels))] if duels else []
-    said += [one.machine for one in duels.values()]
-    parts += dict.fromkeys(f"{machine.kind(one)}: {machine.sentence(one)}" for one in said)
+    if duels:
+        parts += [in_markdown(automatic.ratios(duels))]
+        for kind, runs in duels.items():
+            parts += [plain(f"{kind}: {said}") for said in _processors(runs)]
     print("\n\n".join(parts))
+
+
+def _processors(measured: Sequence[Race] | Sequence[automatic.Result]) -> list[str]:
+    return list(dict.fromkeys(machine.sentence(one.machine) for one in measured))
 
 
 __all__ = ["headline"]

@@ -29,7 +29,7 @@ def plugins(
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
         return
     print(plugin_costs.markdown(plugin_costs.measure(host, rounds)))
-    print(f"\n{POSITION}")
+    print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
 
 

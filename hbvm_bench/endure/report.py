@@ -106,8 +106,9 @@ def tables(result: Endurance) -> list[Table]:
             ("method", "starts", *heads, *after),
             rows,
             "rms over the starts. Mean at the end: over the starts, with its standard error, after the "
-            "offset of each has been taken off; called a drift beyond 3 of them (with few starts, beyond "
-            "Student's 95 % interval), whatever the power of t. Power of t and drift per year with 95 % "
+            "offset of each has been taken off. "
+            + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
+            + "Power of t and drift per year with 95 % "
             "intervals over the starts. Time: median of one trajectory.",
             words=(2 + len(heads),),
         )

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hbvm_bench import machine, processes, terminal
 from hbvm_bench.identity import make_method, make_problem
 from hbvm_bench.race.accuracy import GOLDEN
+from hbvm_bench.records import decoded
 from hbvm_bench.store import atomic
 from integrators.protocol import Program, Status
 from problems import measure
@@ -251,12 +252,12 @@ def load(directory: Path) -> Endurance:
     """
     path = directory / FILE
     try:
-        result = msgspec.json.decode(path.read_bytes(), type=Endurance)
+        result = decoded(path.read_bytes(), Endurance)
     except OSError:
         raise InputError(
             f"there is no result of endure in {str(directory)!r}; run: hbvm-bench endure --out DIR."
         ) from None
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, ValueError) as error:
         raise InputError(f"{str(path)!r} is not the result of endure: {error}.") from None
     if result.schema != SCHEMA:
         raise InputError(f"{str(path)!r} was written by another version; run endure again.")

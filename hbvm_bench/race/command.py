@@ -36,9 +36,7 @@ def race(
         bool | None,
         typer.Option("--compile/--no-compile", help="Compile times in fresh processes; not with --quick."),
     ] = None,
-    avx2: Annotated[
-        bool, typer.Option("--avx2", help="Compile our code, not the peers', without AVX-512.")
-    ] = False,
+    avx2: Annotated[bool, typer.Option("--avx2", help=machine.AVX2)] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="Where the results and the report go; default runs/race.")
     ] = None,

@@ -123,11 +123,7 @@ def remarks(race: Race) -> list[str]:
     absent = [FAMILIES[f].title for f, n in per_family.items() if not n]
     if absent:
         said.append(f"Does not apply: {', '.join(absent)}.")
-    if race.schema < SCHEMA:
-        said.append(
-            "The position errors are of an earlier definition: in the 2-norm over all bodies, relative to "
-            "that of the true positions at the end."
-        )
+    said += earlier_definition(race)
     if race.quick:
         said.append("This is the quick run: a tenth of the span and few settings; its ratios mean little.")
     calibration = calibrated(race)
@@ -144,6 +140,16 @@ def remarks(race: Race) -> list[str]:
             f"{race.load.stolen:.0%} of one{doubt}."
         )
     return said
+
+
+def earlier_definition(race: Race) -> list[str]:
+    """Return what to know of a race's position errors where the definition has changed since."""
+    if race.schema == SCHEMA:
+        return []
+    return [
+        "The position errors are of an earlier definition: in the 2-norm over all bodies, relative to "
+        "that of the true positions at the end."
+    ]
 
 
 def markdown(sections: Sequence[Section], top: Sequence[Table]) -> str:

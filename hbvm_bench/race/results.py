@@ -11,6 +11,7 @@ from statistics import median, quantiles
 import msgspec
 
 from hbvm_bench import machine
+from hbvm_bench.records import decoded
 from hbvm_bench.store import atomic, ensure_writable
 from problems.errors import InputError
 
@@ -320,10 +321,12 @@ def _in(directory: Path, order: list[str]) -> list[Race]:
         if not path.is_file():
             continue
         try:
-            race = msgspec.json.decode(path.read_bytes(), type=Race)
-        except msgspec.MsgspecError as error:
+            race = decoded(path.read_bytes(), Race)
+        except (msgspec.MsgspecError, ValueError) as error:
             raise InputError(f"{str(path)!r} is not the result of a race: {error}.") from None
         if race.schema not in READABLE:
             raise InputError(f"{str(path)!r} was written by another version; run the race again.")
+        if race.contest.key != key:  # files are named after it
+            raise InputError(f"{str(path)!r} is the result of another contest, {race.contest.key!r}.")
         found.append(race)
     return found

@@ -20,9 +20,9 @@ class Ratio:
     ours, theirs : Outcome or None
         The fastest settings that are accurate enough; ``None`` where none is.
     value : float or None
-        Ratio of the medians.
+        Median of the ratios within each interleaved round.
     low, high : float or None
-        Quartiles of the ratios within each interleaved round.
+        Quartiles of the same.
     """
 
     ours: Outcome | None
@@ -71,7 +71,7 @@ def ratio(ours: Outcome | None, theirs: Outcome | None) -> Ratio:
         b / a for a, b in zip(ours.seconds, theirs.seconds, strict=True) if a is not None and b is not None
     ]
     low, high = (None, None) if len(pairs) < 2 else quantiles(pairs, n=4, method="inclusive")[::2]
-    return Ratio(ours, theirs, theirs.median / ours.median, low, high)
+    return Ratio(ours, theirs, median(pairs) if pairs else None, low, high)
 
 
 def at(race: Race, family: str, energy: float, position: float, ours: str = OURS) -> Ratio:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from statistics import median
 
+from hbvm_bench import machine
 from hbvm_bench.cells import Table
 from hbvm_bench.race import standings
 from hbvm_bench.race.results import Outcome, Probe, Race
@@ -38,8 +39,25 @@ def headline(races: Sequence[Race]) -> Table:
         "How many times as long as our fastest setting each peer's fastest takes, at the same accuracy",
         ("problem", "energy, position", "ours", *(FAMILIES[peer].short for peer in peers)),
         rows,
-        "Medians over interleaved rounds; in brackets the quartiles of the ratio within each round. A ratio "
-        "below 1 means that the peer is faster.",
+        "The median of the ratio within each interleaved round, in brackets its quartiles. A ratio below 1 "
+        "means that the peer is faster.",
+    )
+
+
+def behind(races: Sequence[Race]) -> Table:
+    """Return the settings whose times `headline` compares."""
+    peers = [
+        f for f in FAMILIES if f != OURS and any(standings.best(race, f, *asked(race)) for race in races)
+    ]
+    rows = []
+    for race in races:
+        best = (standings.best(race, family, *asked(race)) for family in (OURS, *peers))
+        rows.append((race.contest.title, *(NONE if one is None else one.setting.method for one in best)))
+    return Table(
+        "The settings behind these ratios",
+        ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
+        rows,
+        words=tuple(range(1, len(peers) + 2)),
     )
 
 
@@ -64,9 +82,9 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
         "The same ratios by kind of processor",
         ("problem", "peer", *by_kind),
         rows,
-        "How many times as long as our fastest setting each peer's fastest takes. Columns: LLVM's name of "
-        "the processor; -avx2: our code compiled without AVX-512, the peers' as ever. Left out: peers "
-        "without a ratio anywhere.",
+        "How many times as long as our fastest setting each peer's fastest takes. "
+        + machine.COLUMNS
+        + " Left out: peers without a ratio anywhere.",
         words=(1,),
     )
 

@@ -73,7 +73,8 @@ def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture |
         f"Drift of the {invariant.replace('_', ' ')} and its law",
         f"Markers: root mean square of the error over {over}. Lines: the law that was fitted, "
         "a floor with a growth; its power of t stands with its 95 % interval. Bounded or t^1/2 is the best "
-        "there is; a law is what these samples show, not a proof.",
+        "there is; a law is what these samples show, not a proof."
+        + (f" {drift.told(starts)}." if starts > 1 and invariant == "energy" else ""),
         "Law of each case. "
         + "; ".join(f"{c.record.case.method}: {text(laws[c.record.id])}" for c in shown)
         + ".",

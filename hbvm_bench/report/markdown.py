@@ -50,6 +50,11 @@ def code(text: object) -> str:
     return f"{fence}{pad}{escaped}{pad}{fence}"
 
 
+def block(text: object) -> str:
+    """Return text as a block of code, which nothing in it can end."""
+    return "\n".join(f"    {one_line(line)}" for line in str(text).splitlines())
+
+
 def row_cells(columns: "Sequence[Metric]", row: Row) -> list[str]:
     """Return the cells of a row: void ones in brackets, times with their quartiles."""
     made = []

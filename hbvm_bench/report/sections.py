@@ -105,7 +105,7 @@ def section(
     return Section(
         problem=problem,
         title=f"{problem.title}{at_once(ensemble)}",
-        summary=words.summary(records),
+        summary=[*words.summary(records), *([words.WITNESSES] if ensemble is not None else [])],
         shortcomings=words.shortcomings(records),
         groups=[
             (title_of(key, members), members)

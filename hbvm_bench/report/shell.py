@@ -12,7 +12,7 @@ from plotly.offline import get_plotlyjs
 
 from hbvm_bench.report import pack
 from hbvm_bench.report.canvas import Picture, inline_svg
-from hbvm_bench.report.markdown import plain
+from hbvm_bench.report.markdown import block, plain
 from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, Look
 
 HERE = "hbvm_bench.report"
@@ -48,7 +48,7 @@ def environment(package: str, *, autoescape: bool) -> Environment:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    made.filters["plain"] = plain
+    made.filters |= {"plain": plain, "block": block}
     return made
 
 

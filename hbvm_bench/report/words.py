@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from statistics import median
 
+from hbvm_bench import ensemble
 from hbvm_bench.measure import POSITION
 from hbvm_bench.metrics import GUARD_TOLERANCE, METRICS
 from hbvm_bench.records import Record
@@ -13,6 +14,12 @@ from hbvm_bench.table import group_of, seconds, status_of
 RIGHT_POSITION = 1e-8
 RIGHT_ENERGY = 1e-13
 UNDISTURBED = 0.9  # of a core, in the timing pass
+
+WITNESSES = (
+    f"The position errors are of {ensemble.WITNESSES} of the trajectories, whose ends are known in 128 bits, "
+    "relative to the largest distance of a body from the origin at these ends."
+)
+"""Of an ensemble, where the size differs from `POSITION`'s."""
 
 RULES_TEXT = f"""
 Every integrator starts from the same doubles and receives the same vector field, written down

@@ -9,7 +9,7 @@ import numpy as np
 from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
-from integrators.events.step import Step
+from integrators.events.step import Step, UnresolvedError
 from integrators.integrate import user_error
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper
 from problems import Problem
@@ -53,7 +53,7 @@ class Found:
     stats : Stats
         Counters of the work done.
     error : Exception or None
-        What a function of the user raised.
+        What a function of the user raised, or why it could not be followed.
     """
 
     events: dict[str, Occurrences]
@@ -120,9 +120,9 @@ class Search:
         while self._t != self._end and self._terminal is None and not self._failed:
             try:
                 self._go_on()
-            except InputError:
-                raise
-            except Exception as error:  # of a function of the user
+            except Exception as error:  # of a function of the user, or one that cannot be followed
+                if isinstance(error, InputError) and not isinstance(error, UnresolvedError):
+                    raise
                 self._error, self._failed = error, True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
@@ -153,7 +153,8 @@ class Search:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
             return {"status": Status.EVENT, "reason": reason}
         if self._error is not None:
-            said = user_error(self._error)
+            unresolved = isinstance(self._error, UnresolvedError)
+            said = str(self._error) if unresolved else user_error(self._error)
             return {
                 "status": Status.USER_ERROR,
                 "reason": f"{said}: events are known up to t = {self._looked!r} only.",

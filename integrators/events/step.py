@@ -15,6 +15,10 @@ ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump 
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
 
 
+class UnresolvedError(InputError):
+    """An event's function varies too fast for as many samples as are taken in a step."""
+
+
 class Step:
     """An own step, or the beginning of one, in which something may happen.
 
@@ -48,7 +52,7 @@ class Step:
 
         Raises
         ------
-        problems.errors.InputError
+        UnresolvedError
             If g varies too fast for as many samples as are taken in a step.
         """
         degree = places.size // roots.FINE
@@ -62,10 +66,10 @@ class Step:
         if unresolved:  # at a pole, a jump or a corner the polynomial between the samples means nothing
             places, fine = places[:: roots.FINE], fine[:: roots.FINE]
             if np.count_nonzero(np.diff(np.sign(fine))) > ISOLATED:
-                raise InputError(
+                raise UnresolvedError(
                     f"the event {self._g.name!r} varies too fast to be followed between t = "
                     f"{float(self._t[0])!r} and {float(self._t[-1])!r}, where {FINEST} samples do not show "
-                    "how: give the method shorter steps, or the event a smoother function."
+                    "how: give the method shorter steps, or the event a smoother function"
                 )
         if not roots.suspects(fine[np.newaxis])[0]:
             return []

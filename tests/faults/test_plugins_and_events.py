@@ -2,12 +2,13 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
-from integrators import HBVM, Event, Gauss, integrate
+from integrators import HBVM, Event, Gauss, Status, integrate
 from problems import Problem, VectorField
 
-from .fault import Fault, is_met
+from .fault import Fault, is_met, sentence
 
 
 def installed(**options: Any) -> object:
@@ -51,20 +52,26 @@ FAULTS = (
 )
 
 
-def too_fast() -> object:
-    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
-    return integrate(slow, HBVM(k=8, s=4, h=1.0), events=Event(lambda t, m: m.sin(1e7 * t), name="fast"))
-
-
-FAULTS += (
-    Fault(
-        "an event that no samples of a step can follow",
-        too_fast,
-        r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps",
-    ),
-)
-
-
 @pytest.mark.parametrize("fault", FAULTS, ids=str)
 def test_a_fault_gets_its_sentence(fault: Fault) -> None:
     is_met(fault)
+
+
+def test_an_event_that_no_samples_can_follow_costs_no_trajectory() -> None:
+    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=20.0)
+    events = [
+        Event(lambda t, m: m.sin(1e7 * (m.tanh(50.0 * (t - 15.0)) + 1.0)), name="fast"),
+        Event(lambda y, m: y[0], name="plain"),
+    ]
+    times = np.linspace(0.0, 20.0, 41)
+    found = integrate(slow, HBVM(k=8, s=4, h=0.25), times=times, events=events)
+    assert found.status is Status.USER_ERROR
+    sentence(
+        found.reason,
+        r"'fast' varies too fast .* between t = 1\d\.\d+ and 1\d.*: events are known up to",
+    )
+    assert np.array_equal(found.t, times)  # the event changes nothing of the trajectory
+    known = np.pi * (np.arange(6) + 0.5)
+    kept = found.events["plain"].t
+    assert kept.size >= 2
+    assert np.allclose(kept, known[: kept.size], atol=1e-9)

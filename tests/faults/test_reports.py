@@ -1,8 +1,19 @@
 """What a report must survive: ensembles, names that attack, bytes that command a terminal."""
 
+import re
+
+import msgspec
 import pytest
 
-from hbvm_bench import cli
+from hbvm_bench import automatic, cli
+from hbvm_bench.endure import runs as endure
+from hbvm_bench.race import results
+from hbvm_bench.race.contests import CONTESTS
+from hbvm_bench.records import printable
+from hbvm_bench.report.markdown import code
+from problems.errors import InputError
+from tests.hbvm_bench.race.conftest import made_up as a_race
+from tests.hbvm_bench.test_endure import made as an_endurance
 
 ENSEMBLE = """
 name = "both"
@@ -33,6 +44,8 @@ def test_a_campaign_with_an_ensemble_is_run_and_reported_as_it_is_typed(tmp_path
     assert "| `Gauss(s=2, h=0.25)` |" in ours
     assert "| `Gauss(s=3, h=0.25)` |" not in ours
     assert "| `Gauss(s=3, h=0.25)` |" in together
+    assert "at these ends" in together
+    assert "at these ends" not in ours
     assert "3 trajectories at once" in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
 
 
@@ -47,3 +60,73 @@ def test_a_report_that_cannot_be_made_leaves_no_directory(tmp_path, monkeypatch,
     assert cli.main(command) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["empty"]
+
+
+HOSTILE = "\x1b]0;named\x07\x1b[2J<script>alert(1)</script> [/bold] ``` \u200f![x](http://example.org)"
+
+
+def stored_results(directory):
+    """Store results of all three kinds whose texts attack whoever shows them; return each page's maker."""
+    said = {"machine": {"processor": HOSTILE, "llvm_processor": HOSTILE}, "versions": {HOSTILE: HOSTILE}}
+    said |= {"command": f"{HOSTILE}\n```\n{HOSTILE}", "started": HOSTILE}
+    results.save(msgspec.structs.replace(a_race(), **said), directory / "race")
+    endure.save(msgspec.structs.replace(an_endurance(years=1e4, starts=3), **said), directory / "endure")
+    ours = automatic.Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
+    duels = [automatic.Duel("kepler", 2.0, ours, ours)]
+    (directory / "automatic").mkdir()
+    automatic.save([automatic.Result(duels=duels, **said)], directory / "automatic" / "one.json")
+
+
+@pytest.mark.parametrize(
+    ("command", "page"),
+    [
+        (["headline", "."], None),
+        (["race", "--redraw", "--out", "race"], "race/README.md"),
+        (["endure", "--redraw", "--out", "endure"], "endure/README.md"),
+    ],
+)
+def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
+    tmp_path, monkeypatch, capsys, command, page
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "endure").mkdir()
+    stored_results(tmp_path)
+    assert cli.main(command) == 0
+    said = capsys.readouterr().out
+    assert "\x1b" not in said
+    assert "\u200f" not in said
+    if page is not None:
+        said = (tmp_path / page).read_text(encoding="utf-8")
+        assert "<script>alert" not in (tmp_path / page).with_name("index.html").read_text(encoding="utf-8")
+    for line in said.splitlines():
+        assert line.startswith("    ") or not re.search(r"(?<!\\)<script|^```|[^\\`]```", line)
+
+
+def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
+    (tmp_path / "endure").mkdir()
+    stored_results(tmp_path)
+    page = automatic.markdown(automatic.by_kind(tmp_path / "automatic"))
+    assert "\x1b" not in page
+    assert not re.search(r"(?<!\\)<script", page.replace(code(printable(f"{HOSTILE} ``` {HOSTILE}")), ""))
+
+
+def test_a_race_whose_contest_is_not_its_file_is_refused(tmp_path):
+    """Its key names the files of the report."""
+    contest = msgspec.structs.replace(a_race().contest, key="../../elsewhere")
+    path = tmp_path / "outer_solar_system.json"
+    path.write_bytes(msgspec.json.encode(msgspec.structs.replace(a_race(), contest=contest)))
+    with pytest.raises(InputError, match="result of another contest"):
+        results.load(tmp_path, list(CONTESTS))
+
+
+@pytest.mark.parametrize("content", [b"\xff", b'"\xff"', b"[" * 100_000])
+def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
+    for name in ("kepler.json", endure.FILE, "one.json"):
+        (tmp_path / name).write_bytes(content)
+    for read in (
+        lambda: results.load(tmp_path, list(CONTESTS)),
+        lambda: endure.load(tmp_path),
+        lambda: automatic.load(tmp_path / "one.json"),
+    ):
+        with pytest.raises(InputError, match="is not the result of"):
+            read()

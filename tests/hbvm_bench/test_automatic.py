@@ -1,10 +1,12 @@
 """The race of HBVM without settings."""
 
+import numpy as np
 import pytest
 
 from hbvm_bench import automatic
 from hbvm_bench.cli import main
 from problems.errors import InputError
+from problems.problem import Problem
 
 
 def test_both_sides_are_measured_on_the_same_trajectory():
@@ -28,3 +30,11 @@ def test_other_problems_and_too_few_rounds_are_refused(capsys):
         automatic.duels(["kepler"], rounds=1)
     assert main(["automatic", "keppler"]) == 2
     assert "did you mean 'kepler'" in capsys.readouterr().err
+
+
+def test_a_peer_on_another_trajectory_is_not_compared(monkeypatch):
+    pytest.importorskip("heyoka")
+    lost = {"off_axis": np.array([0.0, 1e-3])}
+    monkeypatch.setattr(Problem, "guards", lambda self, y, t: lost)
+    with pytest.raises(InputError, match=r"loses what a symmetry .* keeps at 0: off_axis"):
+        automatic.duels(["henon_heiles"], rounds=2)

@@ -17,11 +17,11 @@ def walks(seed, starts=8, every=10.0):
     return np.cumsum(steps, axis=1)[:, (T / every).astype(int) - 1]
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=12, deadline=None)
+@pytest.mark.parametrize("seed", range(12))
 def test_a_random_walk_grows_like_the_square_root_and_has_no_drift(seed):
+    """Of these twelve none is a false alarm; how many there are see below."""
     law = drift.fit(T, walks(seed))
-    assert law.law in ("square root", "power", "drift")
+    assert law.law in ("square root", "power")
     # measured over 200 seeds: slope 0.36 to 0.66
     assert 0.25 < law.slope < 0.8
     assert law.rate_low < law.rate < law.rate_high
@@ -55,10 +55,11 @@ def test_the_mean_finds_a_drift_of_known_size():
     assert max(abs(one.value + 3.0 * SCATTER) for one in found) < 4.0 * SCATTER / math.sqrt(8.0)
 
 
-@pytest.mark.parametrize("starts", [8, 3])
-def test_random_walks_are_seldom_called_a_drift(starts):
-    # Student's t is beyond the limit in 2 % of cases with eight starts, in 5 % with three; measured 3 and 6
-    assert sum(drift.mean(T, walks(seed, starts)).drifts is True for seed in range(100)) <= 10
+@pytest.mark.parametrize(("starts", "share", "called"), [(8, "2 %", 2), (3, "5 %", 4)])
+def test_random_walks_are_called_a_drift_as_seldom_as_the_pages_say(starts, share, called):
+    assert drift.told(starts).endswith(f"chance puts {share} there")
+    # of 100 walks 2 +- 1.4 and 5 +- 2.2 are expected
+    assert sum(drift.mean(T, walks(seed, starts)).drifts is True for seed in range(100)) == called
 
 
 def test_an_offset_is_no_drift():

@@ -87,6 +87,10 @@ def test_a_drift_below_the_allowed_rate_is_a_drift_all_the_same():
     assert ours.drift.law == "drift"
     (table, _) = report.tables(result)
     assert "0 of 8 positive" in str(table.rows[0])
+    assert (
+        "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 2 %"
+        in table.note
+    )
 
 
 def test_the_stored_report_says_what_its_own_numbers_say():

@@ -54,7 +54,7 @@ def test_what_was_not_recorded_is_said_and_not_guessed():
     assert "znver5" in machine.sentence(ZEN5)
     assert "arithmetic 256 bits wide, 3.7 GHz." in machine.sentence(ZEN4)
     restricted = machine.sentence(ZEN4 | {"ours_built_for": "AVX2"})
-    assert "our code, was restricted to AVX2, the peers' own code was not" in restricted
+    assert "handed to REBOUND and SciPy, was restricted to AVX2, the peers' own code was not" in restricted
     assert "not recorded" in machine.sentence({})
 
 
@@ -130,14 +130,40 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     automatic.keep(of(ZEN4), tmp_path)
     automatic.keep(of(ZEN5, 3.0), tmp_path)
     page = automatic.keep(of(ZEN4, 1.5, "henon_heiles"), tmp_path).read_text(encoding="utf-8")
-    assert {path.name for path in tmp_path.iterdir()} == {"README.md", "znver4.json", "znver5.json"}
-    assert "| problem | goal | znver4 | znver5 |" in page
-    assert re.search(r"kepler \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
+    assert {path.name for path in tmp_path.iterdir()} == {"README.md", "znver4-256bit.json", "znver5.json"}
+    assert "| problem | against | goal | znver4-256bit | znver5 |" in page
+    assert re.search(r"kepler \| Taylor\(tol=1e-15\) \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
     assert re.search(r"henon\\_heiles \| .* \| not run", page)
     assert "256 bits wide" in page
-    (tmp_path / "znver4.json").write_bytes(b"{}")
+    (tmp_path / "znver4-256bit.json").write_bytes(b"{}")
     with pytest.raises(InputError, match="not the result of automatic"):
         automatic.by_kind(tmp_path)
+
+
+def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
+    """Its machine, versions, command and date, when another problem is run on the same kind later."""
+    first = of(ZEN4 | {"cores": 2})
+    later = msgspec.structs.replace(
+        of(ZEN4 | {"cores": 64, "clock_ghz": "2.6"}, problem="henon_heiles"),
+        versions={"numpy": "3"},
+        command="hbvm-bench automatic henon_heiles",
+        started="2027-01-02T03:04:05+00:00",
+    )
+    automatic.keep(first, tmp_path)
+    page = automatic.keep(later, tmp_path).read_text(encoding="utf-8")
+    assert automatic.load(tmp_path / "znver4-256bit.json") == [first, later]
+    assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
+    assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
+    again = msgspec.structs.replace(later, duels=of(ZEN4).duels)
+    automatic.keep(again, tmp_path)
+    assert automatic.load(tmp_path / "znver4-256bit.json") == [later, again]
+
+
+def test_arithmetic_of_another_width_is_another_kind(tmp_path):
+    for bits, ratio in ((512, 2.0), (256, 3.0)):
+        page = automatic.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path).read_text(encoding="utf-8")
+    assert "| znver5-256bit | znver5-512bit |" in page
+    assert re.search(r"\| 3\.00× reached \| 2\.00× reached \|", page)
 
 
 def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
@@ -146,17 +172,28 @@ def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
     results.save(one, tmp_path / "race")
     results.save(two, tmp_path / "race" / "znver4-avx2")
     found = results.by_kind(tmp_path / "race", list(CONTESTS))
-    assert list(found) == ["znver5", "znver4-avx2"]
+    assert list(found) == ["znver5", "znver4-256bit-avx2"]
     table = tables.kinds(found)
-    assert table.head == ("problem", "peer", "znver5", "znver4-avx2")
+    assert table.head == ("problem", "peer", "znver5", "znver4-256bit-avx2")
     assert table.rows[0][1] == "heyoka"
     assert table.rows[0][2] == table.rows[0][3] == "15.0× (15.0–15.0)"
     path, _ = report.write([one], tmp_path / "race")
     text = path.read_text(encoding="utf-8")
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
+    automatic.keep(of(ZEN4), tmp_path / "automatic")
+    automatic.keep(of(ZEN5, 1.5), tmp_path / "automatic")
     assert main(["headline", str(tmp_path)]) == 0
-    assert "was restricted to AVX2" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "was restricted to AVX2" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | heyoka | 1e-13, 1e-10 | ≥ 10 | 15.0×" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | Gauss(s=8, h=1.5) | Taylor() |" in said
+    assert "| problem | against | goal | znver4-256bit | znver5 |" in said
+    assert "| kepler | Taylor(tol=1e-15) | ≥ 2 | 2.00× reached | 1.50× missed |" in said
+    assert "earlier definition" not in said
+    results.save(msgspec.structs.replace(one, schema=1), tmp_path / "race")
+    assert main(["headline", str(tmp_path)]) == 0
+    assert "position errors are of an earlier definition" in capsys.readouterr().out
 
 
 def test_without_results_there_is_no_headline(tmp_path, capsys):

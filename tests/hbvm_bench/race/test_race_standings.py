@@ -3,6 +3,7 @@ import math
 import msgspec
 import pytest
 
+from hbvm_bench import automatic
 from hbvm_bench.race import standings
 from hbvm_bench.race.results import Goal
 
@@ -23,11 +24,31 @@ def test_void_stalled_and_untimed_settings_are_never_best(race):
     assert standings.best(race, "leapfrog", 1.0, 1.0) is None
 
 
-def test_a_ratio_is_of_the_medians_with_quartiles_of_the_rounds(race):
+def test_a_ratio_is_the_median_of_the_rounds(race):
     ratio = standings.at(race, "heyoka", 1e-13, 1e-10)
     assert ratio.value == pytest.approx(15.0)
     assert ratio.low == pytest.approx(15.0)
     assert ratio.high == pytest.approx(15.0)
+
+
+def test_a_ratio_lies_within_its_quartiles(race):
+    """Where a machine changes its speed during the rounds, the ratio of the medians does not."""
+    ours = msgspec.structs.replace(race.outcomes[0], seconds=[1.0, 1.0, 2.0, 2.0, 2.0])
+    theirs = msgspec.structs.replace(race.outcomes[4], seconds=[3.0, 3.0, 3.0, 6.0, 6.0])
+    ratio = standings.ratio(ours, theirs)
+    assert ratio.value is not None
+    assert ratio.low is not None
+    assert ratio.high is not None
+    # of the medians 1.5; of the rounds 3, 3, 1.5, 3, 3
+    assert ratio.low <= ratio.value <= ratio.high
+    duel = automatic.Duel(
+        "kepler",
+        2.0,
+        automatic.Side("HBVM()", 1e-15, 1e-12, 1, ours.taken),
+        automatic.Side("Taylor()", 1e-15, 1e-12, 1, theirs.taken),
+    )
+    assert duel.quartiles[0] <= duel.ratio <= duel.quartiles[1]
+    assert duel.ratio == ratio.value == 3.0
 
 
 def test_where_nobody_is_accurate_enough_there_is_no_ratio(race):
