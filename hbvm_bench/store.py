@@ -189,7 +189,7 @@ class Store:
         if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
             raise InputError(
                 f"{self.directory / INDEX} is damaged: {len(set(index.ids))} ids of {len(cases)} cases; "
-                f"what has run is kept, {_again(index, self.directory)}."
+                f"what has run is kept, {again(index, self.directory)}."
             )
         return index
 
@@ -209,7 +209,7 @@ class Store:
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
-                made.append(_unread(case_id, case, error, _again(index, self.directory)))
+                made.append(_unread(case_id, case, error, again(index, self.directory)))
                 continue
             words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
             made.append(msgspec.structs.replace(record, case=words))
@@ -292,7 +292,7 @@ def _unread(case_id: str, case: Case, error: Exception, again: str) -> Record:
     return Record(id=case_id, case=case, role=role, library=method.library, order=method.order, result=result)
 
 
-def _again(index: Index, directory: Path) -> str:
+def again(index: Index, directory: Path) -> str:
     """Say how to repair a run; its own command may be a stranger's, and is not for pasting."""
     return f"run the campaign {index.campaign.name!r} again with --out {shlex.quote(str(directory))}"
 
