@@ -19,8 +19,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
-from scipy.stats import t as student
 
 from problems.errors import InputError
 
@@ -154,7 +152,13 @@ def limit(starts: int) -> float:
 
     `STANDARD_ERRORS`, or Student's 95 % quantile where few starts make that larger.
     """
-    return max(STANDARD_ERRORS, float(student.ppf(0.5 + CONFIDENCE / 2, starts - 1)))
+    return max(STANDARD_ERRORS, _quantile(starts))
+
+
+def _quantile(starts: int) -> float:
+    from scipy.special import stdtrit  # few cases ask for a law, and every process would load it
+
+    return float(stdtrit(starts - 1, 0.5 + CONFIDENCE / 2))
 
 
 def false_alarms(starts: int) -> float:
@@ -280,6 +284,8 @@ def _growth(law: str, t: Array) -> Callable[[Array], Array]:
 
 def _fitted(law: str, t: Array, values: Array) -> _Fit:
     """Fit ln sqrt(floor^2 + g(t)^2) to ln of the values by least squares."""
+    from scipy.optimize import least_squares  # as in _quantile
+
     logs = np.log(values)
     n = logs.size
     if law == "bounded":
@@ -349,7 +355,7 @@ def _slope(t: Array, rows: Array, whole: _Fit) -> tuple[float, float, float]:
 def _interval(mean: float, error: float, count: int) -> tuple[float, float]:
     if count < 2:
         return -math.inf, math.inf
-    half = float(student.ppf(0.5 + CONFIDENCE / 2, count - 1)) * error
+    half = _quantile(count) * error
     return mean - half, mean + half
 
 

@@ -13,7 +13,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,21 @@ import problems.registry
 from hbvm_bench import reference
 from hbvm_bench.campaign import Case, Checks
 from hbvm_bench.spec import Spec, parse_spec
+from integrators.kernel import store as kept
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
-WORKER = "hbvm_bench.worker"  # the process that makes the numbers
+# What makes numbers of a solution; a worker process does nothing else with it.
+MEASURES = tuple(
+    f"hbvm_bench.{name}" for name in ("solve", "measure", "metrics", "checks", "ensemble", "timing")
+)
+# They say, name and keep what is run; all that a number can depend on of it is in the key.
+BOOKKEEPING = frozenset(
+    f"hbvm_bench.{name}"
+    for name in ("campaign", "entries", "grid", "identity", "records", "spec", "store", "sweep")
+)
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
@@ -148,51 +156,82 @@ def is_ours(method: MethodBase) -> bool:
 def source_digest(method: MethodBase, case: Case) -> str:
     """Return the sha256 of the sources that decide about the measured numbers of a case.
 
-    They are those that the worker process imports: its own, the method's and the problem's, and
-    what these import of our packages, at their heads or anywhere below. So a row of a peer is
-    not stale because our kernel changed, nor one of ours because of a peer, nor any because of a report.
+    They are those of `MEASURES`, of the method and of the problem, and what these import, at
+    their heads or anywhere below, of our packages and of the method's and the problem's own. So
+    a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
+    nor any because of a report. Comments, docstrings and the layout do not count.
     """
     problem = problems.registry.factory(parse_spec(case.problem).name)
-    return _digest((WORKER, type(method).__module__, problem.__module__))
+    return _digest((*MEASURES, type(method).__module__, problem.__module__))
 
 
 @cache
 def _digest(modules: tuple[str, ...]) -> str:
-    digest = hashlib.sha256()
-    for name, path in sorted(sources(modules).items()):
-        digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
+    return hashlib.sha256(json.dumps(sources(modules), sort_keys=True).encode()).hexdigest()
 
 
-def sources(modules: Iterable[str]) -> dict[str, Path]:
-    """Return the files of modules, and of what they import of our packages, by the modules' names."""
-    found: dict[str, Path] = {}
+def sources(modules: Iterable[str]) -> dict[str, str]:
+    """Return the digests of modules, and of what they import of our packages and theirs, by name."""
     left = list(modules)
+    packages = {*OWN_PACKAGES, *(name.partition(".")[0] for name in left)}
+    found: dict[str, str] = {}
     while left:
         name = left.pop()
-        if name not in found and (path := _file_of(name)) is not None:
-            found[name] = path
-            left += [other for other in _imported(path, name) if other.partition(".")[0] in OWN_PACKAGES]
+        if name in found or name in BOOKKEEPING or (path := _file_of(name)) is None:
+            continue
+        found[name], imported = _read(name, path)
+        left += [other for other in imported if other.partition(".")[0] in packages]
     return found
 
 
 @cache
 def _file_of(module: str) -> Path | None:
-    """Return a module's file; for a third party's it must have been imported."""
+    """Return a module's file; its outermost package has been imported."""
     package, *rest = module.split(".")
-    if package not in OWN_PACKAGES:
-        file = getattr(sys.modules.get(module), "__file__", None)
+    top = sys.modules.get(package)
+    if not hasattr(top, "__path__"):
+        file = None if rest else getattr(top, "__file__", None)
         return Path(file) if file else None
-    base = Path(str(files(package))).joinpath(*rest)
-    return next((path for path in (base.with_suffix(".py"), base / "__init__.py") if path.is_file()), None)
+    bases = [Path(place, *rest) for place in getattr(top, "__path__", ())]
+    paths = [path for base in bases for path in (base / "__init__.py", base.with_name(f"{base.name}.py"))]
+    return next((path for path in paths if path.is_file()), None)
+
+
+def _read(module: str, path: Path) -> tuple[str, list[str]]:
+    """Return the digest of a file's code and the modules that it names; kept by its content."""
+    content = path.read_bytes()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    key = kept.key("source", _rule(), platform.python_version(), package, content)
+    if (known := kept.get(key)) is not None:
+        return json.loads(known)
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):  # a third party's, compiled
+        return hashlib.sha256(content).hexdigest(), []
+    imported = _imported(tree, package)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            body[:] = [part for part in body if not _is_text(part)]
+    made = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
+    kept.put(key, json.dumps(made).encode())
+    return made
 
 
 @cache
-def _imported(path: Path, module: str) -> frozenset[str]:
-    """Return the modules, and what may be modules, that a file names in its imports."""
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+def _rule() -> bytes:
+    # digests that another version of this module made are of no use
+    return Path(__file__).read_bytes()
+
+
+def _is_text(node: ast.AST) -> bool:
+    """Whether a statement is a string alone: the docstring of what it stands in, or of what is before it."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+def _imported(tree: ast.Module, package: str) -> set[str]:
+    """Return the modules, and what may be modules, that the imports of a file in a package name."""
     found: set[str] = set()
-    left: list[Any] = [ast.parse(path.read_bytes())]
+    left: list[Any] = [tree]
     while left:
         node = left.pop()
         if isinstance(node, ast.Import):
@@ -205,7 +244,7 @@ def _imported(path: Path, module: str) -> frozenset[str]:
             for blocks in ("body", "orelse", "finalbody", "handlers", "cases"):  # statements only: quick
                 block = getattr(node, blocks, ())
                 left += block if isinstance(block, list) else ()
-    return frozenset(found)
+    return found
 
 
 def _reference_digest(problem: Problem) -> str:

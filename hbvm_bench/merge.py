@@ -14,7 +14,7 @@ from problems.errors import InputError
 T = TypeVar("T")
 
 
-def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
+def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
     """Write the cases of several runs into a new one.
 
     A case that several runs have, by its id, is taken from the one that got further with
@@ -30,8 +30,9 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
 
     Returns
     -------
-    cases, records : int
-        How many there are now, and how many of them have run.
+    cases, records, left_out : int
+        How many there are now, how many of them have run, and how many have only records that are
+        damaged or of another version.
 
     Raises
     ------
@@ -47,13 +48,15 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
             cases.setdefault(case_id, case)
     out.prepare()
     with out.locked():
-        made = 0
+        made = left_out = 0
         for case_id in cases:
             found = [(record, run) for run in runs if (record := run.load(case_id)) is not None]
             if found:
                 record, run = max(found, key=lambda pair: progress(pair[0]))
                 out.save(record, run.series_file(case_id) or None)
                 made += 1
+            else:
+                left_out += any(run.has(case_id) for run in runs)
         places = [shlex.quote(str(run.directory)) for run in runs]
         index = Index(
             campaign=_together([index.campaign for index in indices]),
@@ -63,7 +66,7 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int]:
             cases=list(cases.values()),
         )
         out.write_index(index)
-    return len(cases), made
+    return len(cases), made, left_out
 
 
 def stores(directories: Sequence[Path]) -> list[Store]:

@@ -21,7 +21,7 @@ COMPILING = "compiling"
 # They command a terminal, or turn the direction in which a line is read.
 COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
-Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused"]
+Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused", "damaged", "outdated"]
 
 
 def decoded(content: bytes, type_: type[T]) -> T:
@@ -32,12 +32,12 @@ def decoded(content: bytes, type_: type[T]) -> T:
     msgspec.MsgspecError
         If it is no JSON, or not that of the type.
     ValueError
-        If it is no UTF-8, or nested too deep.
+        If it is no UTF-8, or nested too deeply.
     """
     try:
         return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
     except RecursionError:
-        raise ValueError("it is nested too deep") from None
+        raise ValueError("it is nested too deeply") from None
 
 
 def printable(text: str) -> str:
@@ -181,7 +181,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     Attributes
     ----------
     outcome : str
-        ``ok``, ``stalled``, ``refused`` or ``crashed``; the other outcomes are seen from outside.
+        ``ok``, ``stalled``, ``refused`` or ``crashed``; ``timeout`` and ``killed`` are seen from
+        outside, and ``damaged`` or ``outdated`` is said of a record that the store cannot use.
     status : str
         The solution's own status; empty without a solution, `COMPILING` for a timeout before it began.
     reason : str

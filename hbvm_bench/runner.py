@@ -11,7 +11,7 @@ from hbvm_bench.execute import InterruptedRunError, Reply, execute, task_of
 from hbvm_bench.executors import Pool
 from hbvm_bench.identity import Resolved, resolve
 from hbvm_bench.records import COMPILING, Record, decoded
-from hbvm_bench.store import Store, damage
+from hbvm_bench.store import Store, damage, is_of
 from hbvm_bench.worker import STALE
 from problems.errors import InputError
 
@@ -51,7 +51,7 @@ def is_done(record: Record | None, limits: Limits) -> bool:
 def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
     """Whether the store has a case as a run under these limits leaves it, its series with it."""
     record = store.load(resolved.id)
-    if record is None or not is_done(record, limits):
+    if record is None or not is_of(record.case, resolved.case) or not is_done(record, limits):
         return False
     return not damage(record, store.series(resolved.id), resolved.problem.system.dim)
 

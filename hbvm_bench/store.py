@@ -12,14 +12,15 @@ does what is missing. Nothing is pickled.
 
 import fcntl
 import io
+import math
 import os
 import re
+import shlex
 import tempfile
 import threading
 import time
 import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
@@ -29,7 +30,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import Campaign, Case
-from hbvm_bench.records import SCHEMA, Record, Result, decoded
+from hbvm_bench.identity import is_ours, make_method, make_problem
+from hbvm_bench.records import SCHEMA, Outcome, Record, Result, decoded
+from hbvm_bench.spec import Spec, parse_spec
+from problems import limits
 from problems.errors import InputError
 
 INDEX = "campaign.json"
@@ -67,6 +71,14 @@ class Index(msgspec.Struct, frozen=True, kw_only=True):
     def listed(self) -> list[tuple[str, Case]]:
         """Return the ids with their cases, in order."""
         return list(zip(self.ids, self.cases or self.campaign.cases(), strict=True))
+
+
+class _Version(msgspec.Struct):
+    schema: int = SCHEMA
+
+
+class OtherVersionError(ValueError):
+    """A record is sound, but an earlier or later version of this package wrote it."""
 
 
 class Store:
@@ -118,8 +130,12 @@ class Store:
         """Return the record of a case, or ``None`` if it is missing or unreadable."""
         try:
             return self._read(case_id)
-        except (FileNotFoundError, ValueError):
+        except (OSError, ValueError):
             return None
+
+    def has(self, case_id: str) -> bool:
+        """Whether there is a record of a case, be it readable or not."""
+        return self._record_path(case_id).exists()
 
     def save(self, record: Record, series: Mapping[str, NDArray[np.float64]] | bytes | None = None) -> None:
         """Store a record, its series first so that a record never lacks them."""
@@ -136,10 +152,10 @@ class Store:
         return decode_series(self.series_file(case_id))
 
     def series_file(self, case_id: str) -> bytes:
-        """Return the ``.npz`` file of a case as it is; empty where it has none."""
+        """Return the ``.npz`` file of a case as it is; empty where it has none, or none that can be read."""
         try:
             return self._series_path(case_id).read_bytes()
-        except FileNotFoundError:
+        except OSError:
             return b""
 
     def write_index(self, index: Index) -> None:
@@ -173,7 +189,7 @@ class Store:
         if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
             raise InputError(
                 f"{self.directory / INDEX} is damaged: {len(set(index.ids))} ids of {len(cases)} cases; "
-                f"what has run is kept, write it anew with: {index.command}."
+                f"what has run is kept, {again(index, self.directory)}."
             )
         return index
 
@@ -188,10 +204,12 @@ class Store:
         for case_id, case in index.listed():
             try:
                 record = self._read(case_id)
+                if not is_of(record.case, case):
+                    raise ValueError("it is the record of another case")
             except FileNotFoundError:
                 continue
-            except ValueError as error:
-                made.append(_unreadable(case_id, case, " ".join(str(error).split()), index.command))
+            except (OSError, ValueError) as error:
+                made.append(_unread(case_id, case, error, again(index, self.directory)))
                 continue
             words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
             made.append(msgspec.structs.replace(record, case=words))
@@ -208,9 +226,14 @@ class Store:
                 yield record
 
     def _read(self, case_id: str) -> Record:
-        record = decoded(self._record_path(case_id).read_bytes(), Record)
-        if record.id != case_id or record.schema != SCHEMA:
-            raise ValueError("it is the record of another case, or of another version")
+        content = self._record_path(case_id).read_bytes()
+        schema = decoded(content, _Version).schema
+        if schema != SCHEMA:
+            when = "an earlier" if schema < SCHEMA else "a later"
+            raise OtherVersionError(f"measured by {when} version of hbvm-bench")
+        record = decoded(content, Record)
+        if record.id != case_id:
+            raise ValueError("it is the record of another case")
         return record
 
     def _record_path(self, case_id: str) -> Path:
@@ -220,11 +243,58 @@ class Store:
         return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
 
 
-def _unreadable(case_id: str, case: Case, why: str, command: str) -> Record:
-    """Return the row of a case whose record is damaged."""
-    reason = f"its record in the store is damaged ({why}); run it again with: {command}"
-    result = Result(outcome="crashed", reason=reason)
-    return Record(id=case_id, case=case, role="peer", library="", order=None, result=result)
+def is_of(stored: Case, asked: Case) -> bool:
+    """Whether the case of a record is the one asked for; labels and notes are words and do not count."""
+    words = msgspec.structs.replace(
+        asked, problem=stored.problem, method=stored.method, settings=stored.settings, note=stored.note
+    )
+    return (
+        words == stored
+        and _prints_as(asked.problem, stored.problem, _problem)
+        and _prints_as(asked.method, stored.method, _method)
+    )
+
+
+def _prints_as(asked: str, stored: str, printed: Callable[[str], str]) -> bool:
+    if asked == stored:
+        return True
+    try:
+        return printed(asked) == stored
+    except InputError:  # of a plugin that is not here
+        with suppress(InputError):
+            return parse_spec(asked).name == parse_spec(stored).name
+        return False
+
+
+def _problem(text: str) -> str:
+    return repr(make_problem(text))
+
+
+def _method(text: str) -> str:
+    return str(Spec(parse_spec(text).name, make_method(text).options()))
+
+
+def _unread(case_id: str, case: Case, error: Exception, again: str) -> Record:
+    """Return the row of a case whose record cannot be used."""
+    outcome: Outcome = "damaged"
+    reason = f"its record in the store is damaged ({' '.join(str(error).split())}); {again}"
+    if isinstance(error, OtherVersionError):
+        outcome, reason = "outdated", f"{error}; {again}"
+    result = Result(outcome=outcome, reason=reason)
+    with suppress(InputError):
+        case = msgspec.structs.replace(case, problem=_problem(case.problem))
+    try:
+        case = msgspec.structs.replace(case, method=_method(case.method))
+        method = make_method(case.method)
+    except InputError:  # of a plugin that is not here
+        return Record(id=case_id, case=case, role="peer", library="", order=None, result=result)
+    role = "ours" if is_ours(method) else "peer"
+    return Record(id=case_id, case=case, role=role, library=method.library, order=method.order, result=result)
+
+
+def again(index: Index, directory: Path) -> str:
+    """Say how to repair a run; its own command may be a stranger's, and is not for pasting."""
+    return f"run the campaign {index.campaign.name!r} again with --out {shlex.quote(str(directory))}"
 
 
 def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) -> str:
@@ -239,6 +309,8 @@ def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) 
     dim : int
         Length of a state.
     """
+    if record.result.outcome in ("damaged", "outdated"):
+        return "there is no record of them"
     if record.result.outcome not in ("ok", "stalled"):
         return ""
     if absent := [name for name in SERIES if name not in series]:
@@ -284,16 +356,35 @@ def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
 def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
     """Return the arrays of a ``.npz`` file by name; empty if it is not one of ours.
 
-    It may be cut or something else; have pickles, texts or complex numbers; or have names that
-    are none, for names go into pages and file names.
+    It may be cut or something else; be far larger than it looks; have pickles, texts or complex
+    numbers; or have names that are none, for names go into pages and file names.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the environment's limit of memory is no number.
     """
+    most = limits.limit("GIB") * 2**30
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            found = {name: np.atleast_1d(stored[name]) for name in stored.files}
-            ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in found.items())
-            return found if ours else {}
-    except (ValueError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error):
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            if sum(member.file_size for member in archive.infolist()) > most:
+                return {}
+            found = {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
+    except Exception:  # zipfile and numpy raise a dozen kinds, and the content is a stranger's
         return {}
+    ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in found.items())
+    return found if ours else {}
+
+
+def _array(content: bytes) -> NDArray[np.float64]:
+    """Read a ``.npy`` file whose header promises no more than follows it, for numpy makes room first."""
+    stream = io.BytesIO(content)
+    np.lib.format.read_magic(stream)
+    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    if math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+        raise ValueError("its header says another size")
+    stream.seek(0)
+    return np.atleast_1d(np.load(stream, allow_pickle=False))
 
 
 @contextmanager

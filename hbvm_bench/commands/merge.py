@@ -14,8 +14,10 @@ def merge(
     out: Annotated[Path, typer.Option("--out", help="A new directory.")],
 ) -> None:
     """Put several runs together in a new one; of a case in several, the one that got further."""
-    cases, records = merging.merge(merging.stores(runs), Store(out))
+    cases, records, left_out = merging.merge(merging.stores(runs), Store(out))
     print(f"{records} of {cases} cases in {out}")
+    if left_out:
+        print(f"{left_out} left out: damaged, or measured by another version of hbvm-bench; run them again")
 
 
 __all__ = ["merge"]

@@ -20,7 +20,7 @@ from hbvm_bench.report.plots import Axis, Panel, Plot, Trace, as_csv
 from hbvm_bench.report.png import small
 from hbvm_bench.report.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
 from hbvm_bench.spec import parse_spec
-from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.store import write_all
 from hbvm_bench.summaries import fairness
 from hbvm_bench.table import seconds
 
@@ -58,11 +58,7 @@ def write(result: Endurance, directory: Path) -> Path:
         files[f"figures/{one.key}.svg"] = one.svg.encode()
         files[f"figures/{one.key}.png"] = small(one.png)
         files[f"data/{one.key}.csv"] = data["csv"].encode()
-    for folder in {(directory / name).parent for name in files}:
-        ensure_writable(folder)
-    for name, text in files.items():
-        with atomic(directory / name) as path:
-            path.write_bytes(text)
+    write_all({directory / name: text for name, text in files.items()})
     return directory / "README.md"
 
 

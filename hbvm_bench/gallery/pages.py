@@ -9,6 +9,7 @@ from typing import Any
 import problems
 from hbvm_bench import engines, reference
 from hbvm_bench.gallery import pictures
+from hbvm_bench.store import write_all
 from problems import inspection, registry
 from problems.latex import latex
 from problems.problem import Problem
@@ -120,15 +121,14 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     """
     drawn = [name for name in problems.names() if name in pictures.PICTURES]
     names = [name for name in drawn if not pictures.PICTURES[name].arguments]
-    directory.mkdir(parents=True, exist_ok=True)
-    written = [directory / "problems.md", directory / "engines.md"]
-    for path, page in zip(written, (text(names), ENGINES + engines.markdown(names)), strict=True):
-        path.write_text(page, encoding="utf-8")
+    made = {
+        directory / "problems.md": text(names).encode(),
+        directory / "engines.md": (ENGINES + engines.markdown(names)).encode(),
+    }
     for name in drawn if with_pictures else ():
-        path = directory / "problems" / f"{name}.svg"
-        pictures.draw(name, path)
-        written.append(path)
-    return written
+        made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
+    write_all(made)
+    return list(made)
 
 
 def _overview(loaded: dict[str, Problem]) -> str:

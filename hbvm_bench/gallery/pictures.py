@@ -1,8 +1,8 @@
 """One picture of each problem: orbits, a phase portrait, a curve in time or a lattice in space and time."""
 
+import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -179,15 +179,18 @@ PICTURES = {
 }
 
 
-def draw(name: str, path: Path) -> None:
+def draw(name: str) -> str:
     """Draw one of the built-in problems as SVG.
 
     Parameters
     ----------
     name : str
         Its name; drawn at its default arguments, a system given as text at those of the table.
-    path : Path
-        Where the file goes.
+
+    Returns
+    -------
+    str
+        The picture.
 
     Raises
     ------
@@ -224,8 +227,7 @@ def draw(name: str, path: Path) -> None:
     with plt.rc_context(look):
         figure, ax = plt.subplots(figsize=(4.2, 3.0), layout="constrained")
         picture.draw(ax, problem, found.t, found.y)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None}, dpi=110)
+        svg = io.StringIO()
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None}, dpi=110)
         plt.close(figure)
-    text = path.read_text(encoding="utf-8")
-    path.write_text("\n".join(line.rstrip() for line in text.splitlines()) + "\n", encoding="utf-8")
+    return "\n".join(line.rstrip() for line in svg.getvalue().splitlines()) + "\n"

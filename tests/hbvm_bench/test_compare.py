@@ -171,7 +171,7 @@ def test_merged_runs_keep_of_each_case_what_got_further(tmp_path):
     two = make(tmp_path / "b", seed=1, edit=lambda i, r: None if i == 0 else r)
     other = make(tmp_path / "c", 1, prefix="9")
     out = Store(tmp_path / "out")
-    assert merge([one, two, other], out) == (4, 4)
+    assert merge([one, two, other], out) == (4, 4, 0)
     records = out.records()
     assert [record.result.outcome for record in records] == 4 * ["ok"]
     assert records[0] == one.records()[0]

@@ -1,5 +1,7 @@
 """A stored case is stale when what its numbers depend on changed, and only then."""
 
+import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +10,7 @@ import pytest
 
 from hbvm_bench import identity
 from hbvm_bench.campaign import Case
-from hbvm_bench.identity import WORKER, resolve, sources
+from hbvm_bench.identity import BOOKKEEPING, MEASURES, resolve, sources
 
 OURS, PEER = "Gauss(s=2, h=0.5)", "IAS15()"
 LOADED = """
@@ -28,13 +30,16 @@ print(*(name for name in sys.modules if name.partition(".")[0] in packages))
 def test_nothing_that_a_worker_loads_is_left_out(method, module):
     command = [sys.executable, "-c", LOADED.format(method=method)]
     loaded = set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
-    kept = set(sources([WORKER, module, "problems.kepler"]))
+    kept = set(sources([*MEASURES, module, "problems.kepler"]))
+    assert loaded >= BOOKKEEPING
+    assert not kept & BOOKKEEPING
     made_by = {"problems", "integrators", "hbvm_bench.worker", module, "problems.kepler", "problems.dd"}
     assert made_by <= loaded
-    empty = {
-        name for name in loaded - kept if not identity._file_of(name).read_text().strip('\n"').count("\n")
-    }
-    assert loaded - kept <= empty  # packages with a line of text only
+    left_out = (
+        loaded - kept - BOOKKEEPING - {"hbvm_bench.worker", "integrators.kernel.store"}
+    )  # keeps the digests
+    lines = {name: identity._file_of(name).read_text().strip('\n"') for name in left_out}
+    assert not [name for name, text in lines.items() if "\n" in text]  # packages with a line of text only
 
 
 # What is edited, and whether a case of ours and one of a peer are stale then.
@@ -49,32 +54,69 @@ EDITED = {
     "integrators/plugins/scipy.py": [False, False],
     "integrators/testing.py": [False, False],
     "hbvm_bench/metric.py": [True, True],
-    "hbvm_bench/records.py": [True, True],
     "hbvm_bench/measure.py": [True, True],
+    "hbvm_bench/drift.py": [True, True],
+    "hbvm_bench/timing.py": [True, True],
+    "hbvm_bench/records.py": [False, False],
+    "hbvm_bench/store.py": [False, False],
+    "hbvm_bench/campaign.py": [False, False],
+    "hbvm_bench/worker.py": [False, False],
     "hbvm_bench/cli.py": [False, False],
     "hbvm_bench/table.py": [False, False],
     "hbvm_bench/report/sections.py": [False, False],
 }
 
 
-def test_a_peers_case_outlives_a_change_of_the_kernel_and_ours_a_change_of_a_peer(monkeypatch):
-    def ids():
-        identity._digest.cache_clear()
-        return [resolve(Case(problem="kepler", method=method)).id for method in (OURS, PEER)]
+def ids():
+    identity._digest.cache_clear()
+    return [resolve(Case(problem="kepler", method=method)).id for method in (OURS, PEER)]
 
-    def stale(part):
+
+@pytest.fixture
+def stale(monkeypatch):
+    """Return whether a case of ours and one of a peer are stale once files have been edited."""
+    untouched = ids()
+
+    def edited(end, edit):
         read = Path.read_bytes
         monkeypatch.setattr(
-            Path, "read_bytes", lambda path: read(path) + (b"#" if path.as_posix().endswith(part) else b"")
+            Path, "read_bytes", lambda path: edit(read(path)) if path.as_posix().endswith(end) else read(path)
         )
         found = [now != before for now, before in zip(ids(), untouched, strict=True)]
         monkeypatch.undo()
         return found
 
-    untouched = ids()
-    found = {part: stale(f"/{part}") for part in EDITED}
+    yield edited
     identity._digest.cache_clear()
+
+
+def test_a_peers_case_outlives_a_change_of_the_kernel_and_ours_a_change_of_a_peer(stale):
+    found = {part: stale(f"/{part}", lambda source: source + b"EDITED = 1\n") for part in EDITED}
     assert found == EDITED
+
+
+def test_another_comment_docstring_or_layout_makes_no_case_stale(stale):
+    def reworded(source):
+        source = re.sub(rb'^( *)"""[^"]*"""$', rb'\1"""Said otherwise."""', source, flags=re.MULTILINE)
+        return b"# another comment\n\n" + source + b"\n\n# and one\n"
+
+    assert b"Said otherwise" in reworded(Path(identity.__file__).read_bytes())
+    assert stale(".py", reworded) == [False, False]
+
+
+def test_what_a_plugins_module_imports_of_its_own_package_belongs_to_it(tmp_path, monkeypatch):
+    package = tmp_path / "somebody"
+    (package / "deep").mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "deep" / "__init__.py").write_text("")
+    (package / "methods.py").write_text("def compile():\n    from .deep import helper\n    import json\n")
+    (package / "deep" / "helper.py").write_text("import integrators.one_thread\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.import_module("somebody.methods")
+    theirs = {"somebody.methods", "somebody.deep", "somebody.deep.helper", "integrators.one_thread"}
+    assert set(sources(["somebody.methods"])) - {"problems.errors"} == theirs
+    monkeypatch.delitem(sys.modules, "somebody.methods")
+    monkeypatch.delitem(sys.modules, "somebody")
 
 
 def test_another_reference_makes_a_case_stale(monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 
 import problems
 from hbvm_bench import cli
-from hbvm_bench.gallery import compile_times, pictures
+from hbvm_bench.gallery import compile_times, pages, pictures
 from hbvm_bench.spec import parse_spec
 from problems import registry
 from problems.errors import InputError
@@ -49,12 +49,21 @@ def test_every_problem_has_a_picture_with_something_in_it(name):
     assert path.stat().st_size < 200_000
 
 
-def test_a_picture_is_drawn_from_a_run(tmp_path):
+def test_a_picture_is_drawn_from_a_run():
     for name in ("kepler", "morse", "expression"):
-        pictures.draw(name, tmp_path / f"{name}.svg")
-        assert (tmp_path / f"{name}.svg").read_text(encoding="utf-8").rstrip().endswith("</svg>")
+        assert pictures.draw(name).endswith("</svg>\n")
     with pytest.raises(InputError, match="has no picture"):
-        pictures.draw("keppler", tmp_path / "keppler.svg")
+        pictures.draw("keppler")
+
+
+def test_pages_are_written_all_or_none(tmp_path, monkeypatch):
+    def failing(name):
+        raise InputError("it cannot be drawn.")
+
+    monkeypatch.setattr(pictures, "draw", failing)
+    with pytest.raises(InputError, match="cannot be drawn"):
+        pages.write(tmp_path / "docs")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_page_on_compile_times_has_every_case():
