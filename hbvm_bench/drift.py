@@ -163,14 +163,17 @@ def _quantile(starts: int) -> float:
 
 def false_alarms(starts: int) -> float:
     """Return in what share of errors without a drift chance puts the mean beyond `limit`."""
-    return 2.0 * float(student.sf(limit(starts), starts - 1))
+    from scipy.special import stdtr  # as in _quantile
+
+    return 2.0 * float(stdtr(starts - 1, -limit(starts)))
 
 
 def told(starts: int) -> str:
     """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
     return (
         f"Called a drift where the mean over the {starts} starts is more than {limit(starts):.3g} of its "
-        f"standard errors from 0; of errors that do not drift, chance puts {100.0 * false_alarms(starts):.0f} % there"
+        f"standard errors from 0; of errors that do not drift, chance puts {100.0 * false_alarms(starts):.0f} % "
+        "there"
     )
 
 
