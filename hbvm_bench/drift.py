@@ -172,8 +172,8 @@ def told(starts: int) -> str:
     """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
     return (
         f"Called a drift where the mean over the {starts} starts is more than {limit(starts):.3g} of its "
-        f"standard errors from 0; of errors that do not drift, chance puts {100.0 * false_alarms(starts):.0f} % "
-        "there"
+        "standard errors from 0; of errors that do not drift, chance puts "
+        f"{100.0 * false_alarms(starts):.0f} % there"
     )
 
 

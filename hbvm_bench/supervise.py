@@ -22,6 +22,7 @@ from hbvm_bench.campaign import Limits
 Cause = Literal["exit", "compiling", "timeout", "memory", "stopped"]
 POLL = 0.02  # seconds, at first
 LONGEST_POLL = 0.2  # of a case that takes long: the runner needs little of the machine
+WALK = 1.0  # seconds between walks over all processes: they take milliseconds that a timing must not lose
 KEPT_OUTPUT = 64  # chunks of at most 4 KiB
 
 _children: set[subprocess.Popen[bytes]] = set()
@@ -99,10 +100,12 @@ def run(
     reader = threading.Thread(target=_drain, args=(child.stdout, kept), daemon=True)
     reader.start()
     cause: Cause = "exit"
-    peak, delay = 0.0, POLL
+    peak, delay, walked = 0.0, POLL, start
     try:
         while child.poll() is None:
-            peak = max(peak, _peak_gib(child.pid), _together_gib(child.pid))
+            peak = max(peak, _peak_gib(child.pid))
+            if time.monotonic() - walked > WALK:
+                peak, walked = max(peak, _together_gib(child.pid)), time.monotonic()
             if _stopping.is_set():
                 cause = "stopped"
             elif peak > limits.memory_gib:

@@ -162,7 +162,7 @@ def _others(results: Results) -> Table:
             for row in rows
         ),
         numbers=frozenset(range(1, 6)),
-        caption="One setting per method, as its authors advise for accuracy. Evaluations: of the vector "
+        caption="One setting per method, chosen by us for accuracy. Evaluations: of the vector "
         "field, where the library counts them. `hbvm-bench run sitnikov` has "
         "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
         "nothing.",

@@ -1,6 +1,7 @@
 """What a report must survive: ensembles, names that attack, bytes that command a terminal."""
 
 import re
+from typing import Any
 
 import msgspec
 import pytest
@@ -66,8 +67,11 @@ HOSTILE = "\x1b]0;named\x07\x1b[2J<script>alert(1)</script> [/bold] ``` \u200f![
 
 
 def stored_results(directory):
-    """Store results of all three kinds whose texts attack whoever shows them; return each page's maker."""
-    said = {"machine": {"processor": HOSTILE, "llvm_processor": HOSTILE}, "versions": {HOSTILE: HOSTILE}}
+    """Store results of all three kinds whose texts attack whoever shows them."""
+    said: dict[str, Any] = {
+        "machine": {"processor": HOSTILE, "llvm_processor": HOSTILE},
+        "versions": {HOSTILE: HOSTILE},
+    }
     said |= {"command": f"{HOSTILE}\n```\n{HOSTILE}", "started": HOSTILE}
     results.save(msgspec.structs.replace(a_race(), **said), directory / "race")
     endure.save(msgspec.structs.replace(an_endurance(years=1e4, starts=3), **said), directory / "endure")

@@ -125,6 +125,13 @@ def test_memory_of_processes_that_it_starts_counts_too():
     assert ended.seconds < 10
 
 
+def test_all_processes_are_walked_over_once_in_a_second_only(monkeypatch):
+    walks = []
+    monkeypatch.setattr(supervise, "_processes", lambda: walks.append(time.monotonic()) or [])
+    supervise.run([sys.executable, "-c", "import time; time.sleep(1.6)"], {}, GENEROUS)
+    assert len(walks) == 1  # one at every poll would be more than ten
+
+
 def test_a_lost_symmetry_voids_position_and_time(toys, store):
     record = run(store, "Straying()")
     assert "off axis reached 0.001" in record.result.violation

@@ -39,6 +39,22 @@ def verdicts(runs, steps):
     return {claim.words[:14]: claim.verdict for claim in found}
 
 
+def said(runs, steps, words):
+    """Return what was measured beside the claim that begins so."""
+    growth = [Growth(e, 1.0, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
+    found = claims(runs, [100.0] * 20, 32, steps, growth, [(17, 1e-14, None)])
+    return next(claim.here for claim in found if claim.words.startswith(words))
+
+
+def test_the_sentences_follow_from_the_verdicts(runs, steps):
+    assert "because rounding keeps the symmetry" in said(runs, steps, "Both methods")
+    astray = {key: dataclasses.replace(run, off_axis=0.1, plane=0.0) for key, run in runs.items()}
+    assert said(astray, steps, "Both methods") == "off the axis: 0.1. The plane drifts along z by up to 0"
+    assert "But z itself is off" in said(runs, steps, "Under HBVM")
+    alike = runs | {"hbvm": dataclasses.replace(runs["hbvm"], z=runs["truth"].z)}
+    assert ". z itself is off by up to 0.00" in said(alike, steps, "Under HBVM")
+
+
 def test_verdicts_change_with_what_was_measured(runs, steps):
     before = verdicts(runs, steps)
     assert before["Both methods l"] == "partly"
