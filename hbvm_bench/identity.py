@@ -153,11 +153,12 @@ def source_digest(method: MethodBase, case: Case) -> str:
     not stale because our kernel changed, nor one of ours because of a peer, nor any because of a report.
     """
     problem = problems.registry.factory(parse_spec(case.problem).name)
-    return _digest((WORKER, type(method).__module__, problem.__module__))
+    return digest_of((WORKER, type(method).__module__, problem.__module__))
 
 
 @cache
-def _digest(modules: tuple[str, ...]) -> str:
+def digest_of(modules: tuple[str, ...]) -> str:
+    """Return the sha256 of the `sources` of modules."""
     digest = hashlib.sha256()
     for name, path in sorted(sources(modules).items()):
         digest.update(f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest())

@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.options import load
@@ -92,7 +92,7 @@ class Lanes:
                 y[first : first + size, place] = state.T[: n - first]
         for first, lanes in ended:
             result.steps[first : first + size] += [one[3] for one in lanes][: n - first]
-        broken: NDArray[np.bool_] = ~np.isfinite(y).all(axis=2)
+        broken: Any = ~np.isfinite(y).all(axis=2)
         for i in np.flatnonzero(broken.any(axis=1)).tolist():
             if result.status[i] is Status.FINISHED:  # so in the very step that came to the time
                 place = int(np.argmax(broken[i]))
