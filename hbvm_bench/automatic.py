@@ -348,22 +348,17 @@ def _duel(key: str, problem: Problem, rounds: int) -> Duel:
     runs = [Run.of(problem, method) for method in methods]
     errors = [_errors(problem, method, run, true) for method, run in zip(methods, runs, strict=True)]
     seconds: list[list[float]] = [[], []]
-    for _ in range(rounds):
-        for samples, run in zip(seconds, runs, strict=True):
-            samples.append(_seconds(run))
+    for number in range(rounds):
+        for i in (0, 1) if number % 2 else (1, 0):  # so that neither is always the first
+            spent, reached = runs[i].seconds(clock=time.thread_time)
+            if reached.status is not Status.FINISHED:
+                raise InputError(f"{methods[i]!r} did not finish: {reached.reason}")
+            seconds[i].append(spent)
     ours, theirs = (
         Side(repr(method), *error, seconds=samples)
         for method, error, samples in zip(methods, errors, seconds, strict=True)
     )
     return Duel(key, GOALS[key], ours, theirs)
-
-
-def _seconds(run: Run) -> float:
-    """Return the processor's time for one run; other work on the machine does not count."""
-    stepper = run.program.start(run.y0, run.par, run.t0)
-    start = time.thread_time()
-    stepper.advance(np.array([run.t_end]), sample=run.sample)
-    return time.thread_time() - start
 
 
 def _errors(

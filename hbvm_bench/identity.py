@@ -162,11 +162,12 @@ def source_digest(method: MethodBase, case: Case) -> str:
     nor any because of a report. Comments, docstrings and the layout do not count.
     """
     problem = problems.registry.factory(parse_spec(case.problem).name)
-    return _digest((*MEASURES, type(method).__module__, problem.__module__))
+    return digest_of((*MEASURES, type(method).__module__, problem.__module__))
 
 
 @cache
-def _digest(modules: tuple[str, ...]) -> str:
+def digest_of(modules: tuple[str, ...]) -> str:
+    """Return the sha256 of the `sources` of modules."""
     return hashlib.sha256(json.dumps(sources(modules), sort_keys=True).encode()).hexdigest()
 
 

@@ -1,7 +1,9 @@
 """Every peer alone, as its own documentation writes it: what `hbvm_bench.peer_check` compares the bench with.
 
 Each function takes a problem and the method whose options to use, prepares and compiles, and returns a
-`Script`. Nothing of our adapters takes part but the vector field, emitted from the same traced definition.
+`Script`. The vector field is emitted from the same traced definition. Two small helpers of our adapters
+take part, in neither of which anything is integrated: `same_arithmetic`, which restores the processor's modes
+after WHFast512, and `_pointer`, which makes an address of REBOUND's a pointer in compiled code.
 """
 
 from collections.abc import Callable
@@ -12,6 +14,7 @@ import numpy as np
 from integrators.peers.options import load
 from integrators.protocol import Array, MethodBase
 from problems import emit
+from problems.jacobian import jacobian
 from problems.problem import Problem
 
 
@@ -52,26 +55,30 @@ def heyoka(problem: Problem, method: MethodBase) -> Script:
 
 
 def heyoka_batch(problem: Problem, method: MethodBase, starts: Array) -> Script:
-    """``taylor_adaptive_batch(...).propagate_until([t_end] * n)``, one start in each lane."""
+    """``taylor_adaptive_batch(...).propagate_until([t_end] * lanes)``, as many starts at a time as lanes."""
     hy = load("heyoka")
-    n = len(starts)
+    lanes, n = hy.recommended_simd_size(), len(starts)
     ta = hy.taylor_adaptive_batch(
         emit.heyoka(problem.system),
-        np.ascontiguousarray(starts.T),
-        pars=np.tile(problem.par[:, None], (1, n)),
+        np.zeros((problem.system.dim, lanes)),
+        pars=np.tile(problem.par[:, None], (1, lanes)),
         **method.options(defaults=True),
     )
+    filled = starts[np.minimum(np.arange(-(-n // lanes) * lanes), n - 1)]
 
-    def begin() -> Any:
-        ta.set_time(problem.t0)
-        ta.state[:] = starts.T
-        return ta
+    def go(y: Array) -> list[Any]:
+        end, ended = np.full(lanes, problem.t_end), []
+        for i in range(0, len(filled), lanes):
+            ta.set_time(problem.t0)
+            ta.state[:] = filled[i : i + lanes].T
+            ta.propagate_until(end)
+            y[i : i + lanes] = ta.state.T
+            ended += ta.propagate_res
+        return ended
 
-    def end(ta: Any, made: Any) -> tuple[int, Array]:
-        del made
-        return sum(steps for *_, steps in ta.propagate_res), ta.state.T
-
-    return Script(begin, lambda ta: ta.propagate_until(np.full(n, problem.t_end)), end)
+    return Script(
+        lambda: np.zeros(filled.shape), go, lambda y, ended: (sum(one[3] for one in ended[:n]), y[:n])
+    )
 
 
 def rebound(problem: Problem, method: Any) -> Script:
@@ -199,10 +206,22 @@ def scipy(problem: Problem, method: Any) -> Script:
         field(t, y, par, out)
         return out
 
+    known = {}
+    if type(method).__name__ == "Radau" and (pattern := jacobian(problem.system)) is not None:
+        entries = emit.numba(problem.system, "jacobian")
+
+        def jac(t: float, y: Array) -> Array:
+            matrix, values = np.zeros((y.size, y.size)), np.empty(pattern.rows.size)
+            entries(t, y, par, values)
+            matrix[pattern.rows, pattern.columns] = values
+            return matrix
+
+        known["jac"] = jac
+
     def go(run: None) -> Any:
         return solve_ivp(
             f, (problem.t0, problem.t_end), problem.y0, method=type(method).__name__,
-            rtol=method.rtol, atol=method.atol,
+            rtol=method.rtol, atol=method.atol, **known,
         )  # fmt: skip
 
     return Script(lambda: None, go, lambda run, solution: (solution.t.size - 1, solution.y[:, -1]))
