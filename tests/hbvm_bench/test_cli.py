@@ -106,8 +106,8 @@ def test_citations_are_printed_once(capsys):
 
 
 def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
-    arguments = ["run", "-p", SHORT, "-m", "Steady()", "-m", "Raising()", "--out", "r", "--report", "rep"]
-    assert cli.main(arguments) == 0
+    arguments = ["run", "-p", SHORT, "-m", "Steady()", "-m", "Raising()", "--out", "r"]
+    assert cli.main([*arguments, "--report", "rep"]) == 0
     first = capsys.readouterr()
     assert "Steady()" in first.out
     assert "something <b>broke</b>" in first.out

@@ -90,7 +90,7 @@ def test_one_start_cannot_tell_a_drift():
 
 
 @given(st.floats(1e-20, 1e-3), st.sampled_from([-1.0, 1.0]), st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_a_biased_walk_drifts_and_its_rate_is_the_bias(bias, sign, seed):
     law = drift.fit(T, sign * bias * T + bias * walks(seed))
     assert law.law == "drift"
@@ -99,7 +99,7 @@ def test_a_biased_walk_drifts_and_its_rate_is_the_bias(bias, sign, seed):
 
 
 @given(st.floats(1e-18, 1e-2), st.integers(0, 1000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_noise_of_one_size_is_bounded(size, seed):
     law = drift.fit(T, size * np.random.default_rng(seed).standard_normal((8, T.size)))
     assert law.law == "bounded"
@@ -130,7 +130,7 @@ def test_another_power_is_called_a_power():
 
 
 @given(st.floats(1e-12, 1e12), st.floats(1e-6, 1e6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_the_law_does_not_depend_on_the_units(scale, unit):
     errors = walks(11)
     plain, other = drift.fit(T, errors), drift.fit(unit * T, scale * errors)
