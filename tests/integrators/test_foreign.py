@@ -2,6 +2,8 @@
 
 import math
 import re
+from collections import deque
+from functools import partial
 
 import numba
 import numpy as np
@@ -246,6 +248,92 @@ def test_a_fingerprint_follows_from_globals_defaults_and_the_functions_it_calls(
     assert of(calling) != before
     assert of(lambda t, y, a=1.0: [a * y[0]]) != of(lambda t, y, a=2.0: [a * y[0]])
     assert of(lambda t, y, *, a=1.0: [a * y[0]]) != of(lambda t, y, *, a=2.0: [a * y[0]])
+
+
+A, B = 1.0, 1.0
+RATES = {"first": 1.0, "second": 1.0}
+
+
+class Rate:
+    def __init__(self, k):
+        self.k = k
+
+    def field(self, t, y):
+        return [self.k * y[0]]
+
+    def __call__(self, t, y):
+        return [self.k * y[0]]
+
+
+class OtherRate(Rate):
+    def __call__(self, t, y):
+        return [-self.k * y[0]]
+
+
+OtherRate.__qualname__ = Rate.__qualname__
+
+
+class Slotted:
+    __slots__ = ("k",)
+
+    def __init__(self, k):
+        self.k = k
+
+    def __call__(self, t, y):
+        return [self.k * y[0]]
+
+
+def with_rate(t, y, a):
+    return [a * y[0]]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        pytest.param(Rate(1.0).field, Rate(2.0).field, id="a method's object"),
+        pytest.param(Rate(1.0), Rate(2.0), id="an object that is called"),
+        pytest.param(Rate(1.0), OtherRate(1.0), id="what runs when it is called"),
+        pytest.param(Slotted(1.0), Slotted(2.0), id="an object with slots"),
+        pytest.param(partial(with_rate, a=1.0), partial(with_rate, a=2.0), id="partial"),
+        pytest.param(lambda t, y: [int(t) in {1, 2}], lambda t, y: [int(t) in {1, 3}], id="set"),
+        pytest.param(lambda t, y, a=deque([1]): y, lambda t, y, a=deque([2]): y, id="deque"),
+    ],
+)
+def test_a_fingerprint_follows_from_the_object_behind_a_field(one, other):
+    before, after = (Foreign(f, dim=1, name="same").fingerprint for f in (one, other))
+    assert before == Foreign(one, dim=1, name="same").fingerprint
+    assert before != after
+
+
+def test_a_fingerprint_follows_from_every_global_and_every_item(monkeypatch):
+    def of(f):
+        return Foreign(f, dim=1, name="same").fingerprint
+
+    def two(t, y):
+        return [-A * B * y[0]]
+
+    def items(t, y):
+        return [-RATES["first"] * RATES["second"] * y[0]]
+
+    before = of(two), of(items)
+    for name in ("A", "B"):
+        with monkeypatch.context() as changed:
+            changed.setitem(globals(), name, 2.0)
+            assert of(two) != before[0], name
+    for name in RATES:
+        with monkeypatch.context() as changed:
+            changed.setitem(RATES, name, 2.0)
+            assert of(items) != before[1], name
+    assert (of(two), of(items)) == before
+
+
+def test_a_fingerprint_tells_which_of_two_lists_comes_again():
+    one, two = [1.0], [2.0]
+
+    def of(*lists):
+        return Foreign(partial(with_rate, a=lists), dim=1, name="same").fingerprint
+
+    assert of(one, two, one) != of(one, two, two)
 
 
 def test_the_field_on_arrays_is_the_function_state_by_state():
