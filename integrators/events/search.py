@@ -10,8 +10,7 @@ from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
 from integrators.events.step import Step
-from integrators.integrate import user_error
-from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper
+from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper, UserError
 from problems import Problem
 from problems.errors import InputError
 
@@ -120,10 +119,8 @@ class Search:
         while self._t != self._end and self._terminal is None and not self._failed:
             try:
                 self._go_on()
-            except InputError:
-                raise
-            except Exception as error:  # of a function of the user
-                self._error, self._failed = error, True
+            except UserError as raised:
+                self._error, self._failed = raised.error, True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
         steppers = (self._walker, self._probe)
@@ -134,7 +131,7 @@ class Search:
             t_stop=stop,
             **self._outcome(stop),
             stats=replace(self._walker.stats, **work),
-            error=self._error,
+            error=self._error or getattr(self._walker, "error", None) or getattr(self._probe, "error", None),
         )
 
     def _go_on(self) -> None:
@@ -153,10 +150,9 @@ class Search:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
             return {"status": Status.EVENT, "reason": reason}
         if self._error is not None:
-            said = user_error(self._error)
             return {
                 "status": Status.USER_ERROR,
-                "reason": f"{said}: events are known up to t = {self._looked!r} only.",
+                "reason": f"{UserError(self._error)}: events are known up to t = {self._looked!r} only.",
             }
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
@@ -298,4 +294,7 @@ def search(
     problem: Problem, method: MethodBase, program: Program, events: dict[str, Event], end: float
 ) -> Found:
     """Search for events from the problem's start to a time; see `Search`."""
-    return Search(problem, method, program, events, end).run()
+    try:
+        return Search(problem, method, program, events, end).run()
+    except UserError as raised:  # at the start
+        raise raised.error from None

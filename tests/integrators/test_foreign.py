@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import integrators
+import integrators.events.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.protocol import Status
 from problems import Foreign, InputError, Problem, VectorField, emit
@@ -132,18 +133,28 @@ def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
 
 
 def test_any_other_error_is_the_users_to_see():
+    times = []
+
     def broken(t, y):
+        times.append(t)
         if t > last:
             raise LookupError("no such table")
         return [1.0]
 
     problem = Problem(Foreign(broken, dim=1), y0=[0.0], t_end=9.0)
-    for method in (HBVM(k=4, s=2, h=0.1), HBVM(k=4, s=2, tol=1e-6), Gauss(s=2, h=0.1, solver="newton")):
+    for method in (
+        HBVM(k=4, s=2, h=0.1),
+        HBVM(k=4, s=2, tol=1e-6),
+        Gauss(s=2, h=0.1, solver="newton"),
+        integrators.DOP853(rtol=1e-8, atol=1e-8),
+        integrators.Radau(rtol=1e-6, atol=1e-8),
+    ):
         last = -1.0
         with pytest.raises(LookupError, match="no such table"):  # nothing is reached that could be kept
             integrate(problem, method)
         last = 8.0
-        for sample in ("side", "steps"):
+        for sample in ("side", "steps", "land"):
+            times.clear()
             made = integrate(problem, method, np.linspace(0.0, 9.0, 91), sample=sample)
             assert made.status is Status.USER_ERROR
             assert made.status.failed
@@ -151,10 +162,43 @@ def test_any_other_error_is_the_users_to_see():
             assert made.reason.startswith(
                 "a function of yours raised LookupError (no such table) in the step"
             )
-            assert 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
+            peer = not hasattr(method, "k")
+            assert peer or 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
             assert made.t[-1] <= made.t_stop
-            assert made.t[-1] > made.t_stop - 0.11
+            assert peer or made.t[-1] > made.t_stop - 0.11
+            assert times.count(0.0) <= 4, "integrated twice"
             assert np.abs(made.y[:, 0] - made.t).max() < 1e-13  # measured 2e-15
+
+
+@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), HBVM(k=4, s=2, tol=1e-6)], ids=str)
+def test_an_error_ends_its_own_member_of_a_batch_only(method):
+    def broken(t, y):
+        if np.hypot(*y) > (4.0 if t > 1.0 else 10.0):
+            raise LookupError("no such table")
+        return [y[1], -y[0]]
+
+    starts = [[1.0, 0.0], [5.0, 0.0], [2.0, 0.0], [20.0, 0.0]]
+    made = method.compile(Foreign(broken, dim=2)).batch(starts, times=[0.5, 2.0])
+    assert made.status == [Status.FINISHED, Status.USER_ERROR, Status.FINISHED, Status.USER_ERROR]
+    assert "LookupError (no such table) in the step from t = " in made.reason[1]
+    exact = np.cos([0.5, 2.0])
+    assert np.abs(made.y[[0, 2], :, 0] - [exact, 2.0 * exact]).max() < 1e-5  # measured 5.5e-7
+    assert made.y[1, 0, 0] == pytest.approx(5.0 * exact[0], abs=1e-5)
+    assert np.isnan(made.y[1, 1]).all()
+    assert np.isnan(made.y[3]).all()
+    assert made.t_stop[3] == 0.0
+
+
+def test_what_is_no_function_of_the_user_is_not_said_to_be_one(monkeypatch):
+    """An error of our own is to be seen as what it is."""
+
+    def wrong(*arguments):
+        raise ZeroDivisionError("ours")
+
+    monkeypatch.setattr(integrators.events.search, "Step", wrong)
+    problem = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=9.0)
+    with pytest.raises(ZeroDivisionError, match="ours"):
+        integrate(problem, HBVM(k=4, s=2, h=0.1), events=lambda y: y[0])
 
 
 @pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), HBVM()], ids=str)
