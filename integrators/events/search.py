@@ -131,7 +131,6 @@ class Search:
             t_stop=stop,
             **self._outcome(stop),
             stats=replace(self._walker.stats, **work),
-            error=self._error or getattr(self._walker, "error", None) or getattr(self._probe, "error", None),
         )
 
     def _go_on(self) -> None:
@@ -144,7 +143,7 @@ class Search:
                 self._look(before, t, y)
 
     def _outcome(self, stop: float) -> dict[str, Any]:
-        """Return status and reason by name."""
+        """Return status, reason and, if there is one, error by name."""
         unknown = [name for name, known in zip(self._names, self._finite, strict=True) if not known]
         if self._terminal is not None:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
@@ -153,10 +152,12 @@ class Search:
             return {
                 "status": Status.USER_ERROR,
                 "reason": f"{UserError(self._error)}: events are known up to t = {self._looked!r} only.",
+                "error": self._error,
             }
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
-                return {"status": stepper.status, "reason": stepper.reason}
+                error = getattr(stepper, "error", None)
+                return {"status": stepper.status, "reason": stepper.reason, "error": error}
         if unknown:
             reason = (
                 f"the event function {', '.join(unknown)} was finite at none of the states between "
