@@ -20,6 +20,7 @@ SURE = 10.0  # an extremum this many times the polynomial's error away from zero
 UNRESOLVED = 1e-3  # of the largest coefficient: a tail as large says that there are too few samples
 EXTREMUM = 1e-10  # of the step: where an extremum is, if the values near it can be told apart
 BLUR = 1e-7  # of the step: how well a minimizer that compares values finds an extremum, with room
+CORNER = 3.0  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
 BESIDE = 1e-6  # of the step: extrema as close to its end are looked for from both sides
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
 APART = 1e4  # units that times can be told apart by: a pole is looked at from a distance of as many
@@ -239,9 +240,17 @@ class Finder:
         return [value for value in values if np.isfinite(value)]
 
     def _blur(self, x: float) -> float:
-        """Return by how much the value at an extremum of g may differ from that where a minimizer ended."""
-        here = self.value(x)
-        return max((abs(value - here) for value in self._beside(x, BLUR)), default=0.0)
+        """Return by how much the value at an extremum of g may differ from that where a minimizer ended.
+
+        At a corner the minimizer ends closer: there g is as different beside it as it is steep.
+        """
+
+        def change(distance: float) -> float:
+            return max((abs(value - self.value(x)) for value in self._beside(x, distance)), default=0.0)
+
+        near = max(BLUR, APART * self._resolution / 100.0)
+        corner = change(2.0 * near) < CORNER * change(near)
+        return change(max(10.0 * EXTREMUM, 10.0 * self._resolution)) if corner else change(near)
 
     def _around(self, a: int, b: int) -> tuple[float, float]:
         return float(self.x[max(a - 1, 0)]), float(self.x[min(b + 1, self.x.size - 1)])

@@ -9,7 +9,7 @@ import numpy as np
 from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
-from integrators.events.step import Step
+from integrators.events.step import Step, Unresolved
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper, UserError
 from problems import Problem
 from problems.errors import InputError
@@ -46,7 +46,8 @@ class Found:
         Where the search ended.
     status : Status
         How: ``EVENT``, ``FINISHED``, or a failure of the method; ``NOT_FINITE`` also
-        where one of the functions was finite nowhere.
+        where one of the functions was finite nowhere, ``STALLED`` where one varies too
+        fast to be followed.
     reason : str
         One sentence, unless it is ``FINISHED``.
     stats : Stats
@@ -111,6 +112,7 @@ class Search:
         self._terminal: str | None = None
         self._failed = False
         self._error: Exception | None = None
+        self._unresolved = ""
         self._looked = problem.t0
         self._zero = self._rests(problem)
 
@@ -121,6 +123,8 @@ class Search:
                 self._go_on()
             except UserError as raised:
                 self._error, self._failed = raised.error, True
+            except Unresolved as unresolved:
+                self._unresolved, self._failed = str(unresolved), True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
         steppers = (self._walker, self._probe)
@@ -154,6 +158,9 @@ class Search:
                 "reason": f"{UserError(self._error)}: events are known up to t = {self._looked!r} only.",
                 "error": self._error,
             }
+        if self._unresolved:
+            reason = f"{self._unresolved} Events are known up to t = {self._looked!r} only."
+            return {"status": Status.STALLED, "reason": reason}
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
                 error = getattr(stepper, "error", None)

@@ -2,12 +2,14 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from integrators import HBVM, Event, Gauss, integrate
+from integrators.protocol import Status
 from problems import Problem, VectorField
 
-from .fault import Fault, is_met
+from .fault import Fault, is_met, sentence
 
 
 def installed(**options: Any) -> object:
@@ -51,20 +53,17 @@ FAULTS = (
 )
 
 
-def too_fast() -> object:
-    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=1.0)
-    return integrate(slow, HBVM(k=8, s=4, h=1.0), events=Event(lambda t, m: m.sin(1e7 * t), name="fast"))
-
-
-FAULTS += (
-    Fault(
-        "an event that no samples of a step can follow",
-        too_fast,
-        r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps",
-    ),
-)
-
-
 @pytest.mark.parametrize("fault", FAULTS, ids=str)
 def test_a_fault_gets_its_sentence(fault: Fault) -> None:
     is_met(fault)
+
+
+def test_an_event_that_no_samples_can_follow_ends_the_search_with_a_status() -> None:
+    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=4.0)
+    method = HBVM(k=8, s=4, h=0.5)
+    fast = Event(lambda t, m: m.sin(1e7 * t), name="fast")
+    made = integrate(slow, method, [1.0, 4.0], events=fast)
+    assert made.status is Status.STALLED
+    sentence(made.reason, r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps")
+    sentence(made.reason, r"known up to t = 0\.0 only")
+    assert np.array_equal(made.y, integrate(slow, method, [1.0, 4.0]).y)

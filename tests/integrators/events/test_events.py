@@ -182,6 +182,30 @@ def test_a_function_that_ends_with_the_integration_is_not_asked_beyond_it_in_vai
     assert (zeros.t.tolist(), zeros.direction.tolist()) == ([2.0], [1])
 
 
+@pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.1), HBVM()], ids=str)
+def test_what_is_zero_but_for_rounding_all_along_is_no_event(method):
+    """An invariant's error: only rounding decides its sign."""
+    made, (energy,) = happened(
+        oscillator(phase=0.3, t_end=20.0),
+        method,
+        Event(lambda q, p: q[0] ** 2 + p[0] ** 2 - 1, name="energy"),
+    )
+    assert made.status is Status.FINISHED
+    assert len(energy) == 0
+
+
+@pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.5), HBVM()], ids=str)
+def test_a_corner_above_zero_is_no_touch(method):
+    _, (above, touch) = happened(
+        oscillator(phase=0.3, t_end=5.0),
+        method,
+        Event(lambda q, m: m.abs(q[0]) + 1e-8, name="above"),
+        Event(lambda q, m: m.abs(q[0]), name="touch"),
+    )
+    assert len(above) == 0
+    assert np.allclose(touch.t, [np.pi - 0.3], rtol=0, atol=1e-8)
+
+
 def test_a_jump_across_zero_is_where_the_sign_changes():
     jump = Event(lambda q: 1.0 if float(q[0]) > 0.5 else -1.0)
     _, (zeros,) = happened(oscillator(t_end=3.0), HBVM(k=10, s=8, h=0.5), jump)
