@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.protocol import Array, MethodBase, Samples, Stats, Status, Stepper, as_numbers, check_times
+from integrators.protocol import Array, MethodBase, Samples, Stats, Status, UserError, as_numbers, check_times
 from problems import limits
 from problems.errors import InputError, shown
 from problems.foreign import Foreign
@@ -136,7 +136,7 @@ def integrate(
         If the method does not accept the problem, or for times, samplings, events and
         initial states that cannot be used.
     Exception
-        What a `problems.Foreign` field raises in the very first step. Later ones, and those of an event's
+        What a `problems.Foreign` field raises in the very first step. Later errors, and those of an event's
         function, end the integration as ``USER_ERROR``, with the trajectory up to there.
     """
     if method is None:
@@ -156,17 +156,17 @@ def integrate(
         found = search(problem, method, program, named(events), float(check_times(grid, problem.t0)[-1]))
         if found.terminal:
             grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
-    stepper = program.start(problem.y0, problem.par, problem.t0)
+    try:
+        stepper = program.start(problem.y0, problem.par, problem.t0)
+    except UserError as raised:
+        raise raised.error from None
     samples = Samples(grid, np.empty((0, problem.system.dim)), Status.FINISHED)
     error: Exception | None = None
     if grid.size:
-        try:
-            samples = stepper.advance(grid, sample=sample)
-        except Exception as raised:
-            if not isinstance(problem.system, Foreign) or stepper.t == problem.t0:
-                raise
-            error, stop = raised, stepper.t
-            samples = _before(raised, stop, program.start(problem.y0, problem.par, problem.t0), grid, sample)
+        samples = stepper.advance(grid, sample=sample)
+        error = getattr(stepper, "error", None)
+        if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
+            raise error
     finished = samples.status is Status.FINISHED
     stats = replace(stepper.stats)
     if isinstance(problem.system, Foreign):
@@ -185,28 +185,6 @@ def integrate(
         error=error,
     )
     return solution if found is None else _with_events(solution, found)
-
-
-def _before(error: Exception, stop: float, stepper: Stepper, grid: Array, sample: str | None) -> Samples:
-    """Return the samples up to the time ``stop``, after which a function raised ``error``."""
-    status, reason = Status.USER_ERROR, f"{user_error(error)} in the step from t = {stop!r}."
-    direction = np.sign(grid[-1] - stepper.t)
-    reached = grid[(grid - stop) * direction <= 0.0]
-    if sample == "steps" and (not reached.size or reached[-1] != stop):
-        reached = np.append(reached, stop)
-    if not reached.size:
-        return Samples(reached, np.empty((0, stepper.y.size)), status, reason)
-    try:
-        made = stepper.advance(reached, sample=sample)
-    except Exception:  # a function that does not do the same twice
-        raise error from None
-    return Samples(made.t, made.y, status, reason)
-
-
-def user_error(error: Exception) -> str:
-    """Return the beginning of a sentence on what a function of the user raised."""
-    said = " ".join(str(error).split())
-    return f"a function of yours raised {type(error).__name__}{f' ({said})' if said else ''}"
 
 
 def check(problem: Problem, method: MethodBase) -> None:

@@ -64,6 +64,21 @@ class Status(StrEnum):
         return self not in (Status.RUNNING, Status.FINISHED, Status.EVENT)
 
 
+class UserError(Exception):
+    """What a function of the user raised, on its way through a method to whoever keeps what was made so far.
+
+    Attributes
+    ----------
+    error : Exception
+        The user's own.
+    """
+
+    def __init__(self, error: Exception):
+        said = " ".join(str(error).split())
+        super().__init__(f"a function of yours raised {type(error).__name__}{f' ({said})' if said else ''}")
+        self.error = error
+
+
 @dataclass
 class Stats:
     """Counters of the work done; ``None`` where a library has no such counter.
@@ -194,7 +209,9 @@ class Program(Protocol):
         """Whether compiled code came from a cache; ``None`` where nothing is compiled."""
         ...
 
-    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> Stepper: ...
+    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> Stepper:
+        """Return a stepper at ``t0``; `UserError` where a function of the user raises there."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,9 +2,10 @@
 
 import hashlib
 import inspect
+import pickle
 from collections.abc import Callable, Mapping
-from functools import cached_property
-from types import CodeType, FunctionType, MappingProxyType, ModuleType
+from functools import cached_property, partial
+from types import CodeType, FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ class Foreign(System):
     def fingerprint(self) -> str:
         """SHA-256 of the function's code and of what it takes from around it, not of parameters' values."""
         digest = hashlib.sha256(f"foreign {self.dim} {self.name}\n".encode())
-        _feed(digest, self.f, set())
+        _feed(digest, self.f, {})
         return digest.hexdigest()
 
 
@@ -168,20 +169,24 @@ def _form(f: Callable[..., Any]) -> tuple[bool, bool]:
     return takes_parameters, rest == 1
 
 
-def _feed(digest: Any, value: Any, seen: set[int]) -> None:
+def _feed(digest: Any, value: Any, seen: dict[int, tuple[int, Any]]) -> None:
     """Add to a digest what a value is, the same from process to process.
 
     Of a function that is its code and all that it takes from around it: defaults, variables of
-    functions around it, globals, and the functions among these likewise.
+    functions around it, globals, and the functions among these likewise; of a bound method also the
+    object, of an object that can be called what is run then. ``seen`` numbers what may contain itself,
+    by id, and keeps it: an id names a value only while that lives.
     """
     value = getattr(value, "py_func", value)
     if isinstance(value, int | float | complex | str | bytes | np.generic | None):
         digest.update(f"{value!r};".encode())
         return
     digest.update(f"{type(value).__module__}.{type(value).__qualname__}:".encode())
-    if id(value) in seen:
-        return
-    seen.add(id(value))
+    if not isinstance(value, np.ndarray | CodeType | tuple | set | frozenset):
+        if id(value) in seen:
+            digest.update(f"{seen[id(value)][0]};".encode())
+            return
+        seen[id(value)] = (len(seen), value)
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
         digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
     elif isinstance(value, CodeType):
@@ -192,17 +197,39 @@ def _feed(digest: Any, value: Any, seen: set[int]) -> None:
         named = {
             name: value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__
         }
-        _feed(digest, [value.__code__, value.__defaults__, value.__kwdefaults__, cells, named], seen)
+        _feed(digest, (value.__code__, value.__defaults__, value.__kwdefaults__, tuple(cells), named), seen)
+    elif isinstance(value, MethodType):
+        _feed(digest, (value.__func__, value.__self__), seen)
+    elif isinstance(value, partial):
+        _feed(digest, (value.func, value.args, value.keywords), seen)
     elif isinstance(value, dict):
         for key, item in value.items():
-            _feed(digest, [key, item], seen)
+            _feed(digest, key, seen)
+            _feed(digest, item, seen)
+    elif isinstance(value, set | frozenset):  # whose own order is that of hashes: another in each process
+        _feed(digest, tuple(sorted(repr(item) for item in value)), seen)
     elif isinstance(value, list | tuple):
         for item in value:
             _feed(digest, item, seen)
     elif isinstance(value, ModuleType | type) or (callable(value) and hasattr(value, "__qualname__")):
         digest.update(getattr(value, "__qualname__", value.__name__).encode())
     else:
-        _feed(digest, getattr(value, "__dict__", None), seen)
+        run = type(value).__call__ if callable(value) else None
+        _feed(digest, (_held(value), run if isinstance(run, FunctionType) else None), seen)
+
+
+def _held(value: Any) -> Any:
+    """Return what an object holds: its attributes, those in slots too, or else its pickled form."""
+    slots = [getattr(kind, "__slots__", ()) for kind in type(value).__mro__]
+    names = [name for group in slots for name in ((group,) if isinstance(group, str) else group)]
+    held = {name: getattr(value, name) for name in names if name != "__dict__" and hasattr(value, name)}
+    held |= getattr(value, "__dict__", {})
+    if held:
+        return held
+    try:
+        return pickle.dumps(value, 4)
+    except Exception:  # whatever a library raises for what it does not pickle
+        return None
 
 
 def _names(code: CodeType) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from integrators.protocol import Array
+from integrators.protocol import Array, UserError
 from problems import Problem, emit
 from problems.errors import InputError
 
@@ -59,6 +59,7 @@ class EventFunction:
     def __call__(self, t: Array, y: Array) -> Array:
         if self.traced:
             return self._all(t, y.T, self._par)[0]
+        # Raises a `UserError` for what g raises.
         values = np.full(t.size, np.nan)
         with np.errstate(all="ignore"):
             for i in range(t.size):
@@ -66,6 +67,8 @@ class EventFunction:
                     values[i] = self._one(float(t[i]), y[i].copy())
                 except UNDEFINED:
                     continue
+                except Exception as error:
+                    raise UserError(error) from error
         return values
 
     def noise(self, t: float, y: Array) -> float:

@@ -12,18 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from integrators.protocol import Array
+from integrators.protocol import Array, UserError
 
 FINE = 8  # places between two samples of the polynomial where zeros are looked for
 NEAR = 0.1  # of the largest value in the step: an extremum below this may reach zero
 SURE = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
 UNRESOLVED = 1e-3  # of the largest coefficient: a tail as large says that there are too few samples
-FLAT = 1e-3  # of the largest slope: g has no slope here
 EXTREMUM = 1e-10  # of the step: where an extremum is, if the values near it can be told apart
 BLUR = 1e-7  # of the step: how well a minimizer that compares values finds an extremum, with room
+CORNER = 3.0  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
 BESIDE = 1e-6  # of the step: extrema as close to its end are looked for from both sides
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
-POLE = 1e3  # where g is as many times larger than BESIDE it, its sign changes through infinity
+APART = 1e4  # units that times can be told apart by: a pole is looked at from a distance of as many
+POLE, ROOM = 1e3, 10.0  # where g is as many times larger than beside it, its sign changes through infinity
+BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the step: how far beyond its end g may have a sign again
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,8 @@ class Finder:
         Parts of the step, 0 and 1 included, and values there: exact at 0 and 1, those of
         the polynomial between; NaN where there is none.
     g : callable
-        The exact value at a part of the step, by a partial step; NaN where there is none.
+        The exact value at a part of the step, or a little beyond it, by a partial step; NaN where there
+        is none.
     noise : callable
         The value that rounding may make at a part of the step.
     resolution : float
@@ -148,7 +151,16 @@ class Finder:
             found.append(Zero(1.0, self._at_end(marks[-1][1])))
         elif marks and self.x[-1] == 1.0 and marks[-1][1] != np.sign(self.p[-1]):
             found += self._solve(marks[-1][0], 1.0, int(np.sign(self.p[-1])))
-        return sorted(found, key=lambda zero: zero.x)
+        crossings = [zero.x for zero in found if zero.direction]
+        return sorted(
+            (
+                zero
+                for zero in found
+                if zero.direction
+                or all(abs(zero.x - x) > BESIDE for x in crossings)  # else the crossing's own
+            ),
+            key=lambda zero: zero.x,
+        )
 
     def _runs(self) -> list[tuple[int, int]]:
         """Return first and last places of the stretches of one sign; zeros are in none."""
@@ -184,9 +196,8 @@ class Finder:
         """Note what g does at an extremum where the polynomial comes near zero and turns back."""
         x, p = float(self.x[low]), float(self.p[low])
         value = self.value(x)
-        near = self.p[
-            max(low - 1, 0) : low + 2
-        ]  # between these it may fall by as much as it rises, at a corner
+        # Between these it may fall by as much as it rises, at a corner.
+        near = self.p[max(low - 1, 0) : low + 2]
         reach = float(np.abs(near - p).max()) + SURE * abs(value - p)
         if not np.isfinite(value) or (np.sign(value) == sign and abs(value) > reach):
             return
@@ -229,18 +240,32 @@ class Finder:
         return [value for value in values if np.isfinite(value)]
 
     def _blur(self, x: float) -> float:
-        """Return by how much the value at an extremum of g may differ from that where a minimizer ended."""
-        here = self.value(x)
-        return max((abs(value - here) for value in self._beside(x, BLUR)), default=0.0)
+        """Return by how much the value at an extremum of g may differ from that where a minimizer ended.
+
+        At a corner the minimizer ends closer: there g is as different beside it as it is steep.
+        """
+
+        def change(distance: float) -> float:
+            return max((abs(value - self.value(x)) for value in self._beside(x, distance)), default=0.0)
+
+        near = max(BLUR, APART * self._resolution / 100.0)
+        corner = change(2.0 * near) < CORNER * change(near)
+        return change(max(10.0 * EXTREMUM, 10.0 * self._resolution)) if corner else change(near)
 
     def _around(self, a: int, b: int) -> tuple[float, float]:
         return float(self.x[max(a - 1, 0)]), float(self.x[min(b + 1, self.x.size - 1)])
 
     def _at_end(self, before: int) -> int:
-        """Return the direction of a zero at the very end of the step."""
-        slopes = np.diff(self.p) / np.diff(self.x)
-        flat = abs(slopes[-1]) <= FLAT * np.abs(slopes).max()
-        return 0 if flat else -before
+        """Return the direction of a zero at the very end of the step: by the sign of g just beyond it."""
+        for distance in BEYOND:
+            x = 1.0 + max(distance, 100.0 * self._resolution)
+            try:
+                value, noise = self.value(x), self._noise(x)
+            except UserError:  # a function that goes no farther than the integration
+                break
+            if abs(value) > noise:
+                return 0 if np.sign(value) == before else -before
+        return -before
 
     def value(self, x: float) -> float:
         """Return g at a part of the step."""
@@ -259,8 +284,10 @@ class Finder:
 
         options: dict[str, Any] = {"xtol": self._resolution, "rtol": 1e-15, "maxiter": 200}
         x = float(brentq(continued, a, b, **options))  # type: ignore[arg-type]
-        sides = [abs(value) for value in self._beside(x, BESIDE)]
-        return [] if sides and not abs(self.value(x)) <= POLE * max(sides) else [Zero(x, after)]
+        distance = min(max(BESIDE, APART * self._resolution), (b - a) / 2)
+        sides = [abs(value) for value in self._beside(x, distance)]
+        most = min(POLE, distance / (ROOM * self._resolution))  # times cannot be closer to the pole
+        return [] if sides and not abs(self.value(x)) <= most * max(sides) else [Zero(x, after)]
 
     def _extremum(self, between: tuple[float, float], sign: int) -> tuple[float, float]:
         """Return where ``sign * g`` is largest between two parts, or the first found where it is positive.

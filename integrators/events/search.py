@@ -9,9 +9,8 @@ import numpy as np
 from integrators.events import roots
 from integrators.events.event import Event, Occurrences
 from integrators.events.function import EventFunction
-from integrators.events.step import Step, UnresolvedError
-from integrators.integrate import user_error
-from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper
+from integrators.events.step import Step, Unresolved
+from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper, UserError
 from problems import Problem
 from problems.errors import InputError
 
@@ -47,7 +46,8 @@ class Found:
         Where the search ended.
     status : Status
         How: ``EVENT``, ``FINISHED``, or a failure of the method; ``NOT_FINITE`` also
-        where one of the functions was finite nowhere.
+        where one of the functions was finite nowhere, ``STALLED`` where one varies too
+        fast to be followed.
     reason : str
         One sentence, unless it is ``FINISHED``.
     stats : Stats
@@ -112,6 +112,7 @@ class Search:
         self._terminal: str | None = None
         self._failed = False
         self._error: Exception | None = None
+        self._unresolved = ""
         self._looked = problem.t0
         self._zero = self._rests(problem)
 
@@ -120,10 +121,10 @@ class Search:
         while self._t != self._end and self._terminal is None and not self._failed:
             try:
                 self._go_on()
-            except Exception as error:  # of a function of the user, or one that cannot be followed
-                if isinstance(error, InputError) and not isinstance(error, UnresolvedError):
-                    raise
-                self._error, self._failed = error, True
+            except UserError as raised:
+                self._error, self._failed = raised.error, True
+            except Unresolved as unresolved:
+                self._unresolved, self._failed = str(unresolved), True
             self._count = min(4 * self._count, self._most)
         stop = self._hits[-1].t if self._terminal is not None else self._t
         steppers = (self._walker, self._probe)
@@ -134,7 +135,6 @@ class Search:
             t_stop=stop,
             **self._outcome(stop),
             stats=replace(self._walker.stats, **work),
-            error=self._error,
         )
 
     def _go_on(self) -> None:
@@ -147,21 +147,24 @@ class Search:
                 self._look(before, t, y)
 
     def _outcome(self, stop: float) -> dict[str, Any]:
-        """Return status and reason by name."""
+        """Return status, reason and, if there is one, error by name."""
         unknown = [name for name, known in zip(self._names, self._finite, strict=True) if not known]
         if self._terminal is not None:
             reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
             return {"status": Status.EVENT, "reason": reason}
         if self._error is not None:
-            unresolved = isinstance(self._error, UnresolvedError)
-            said = str(self._error) if unresolved else user_error(self._error)
             return {
                 "status": Status.USER_ERROR,
-                "reason": f"{said}: events are known up to t = {self._looked!r} only.",
+                "reason": f"{UserError(self._error)}: events are known up to t = {self._looked!r} only.",
+                "error": self._error,
             }
+        if self._unresolved:
+            reason = f"{self._unresolved} Events are known up to t = {self._looked!r} only."
+            return {"status": Status.STALLED, "reason": reason}
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
-                return {"status": stepper.status, "reason": stepper.reason}
+                error = getattr(stepper, "error", None)
+                return {"status": stepper.status, "reason": stepper.reason, "error": error}
         if unknown:
             reason = (
                 f"the event function {', '.join(unknown)} was finite at none of the states between "
@@ -299,4 +302,7 @@ def search(
     problem: Problem, method: MethodBase, program: Program, events: dict[str, Event], end: float
 ) -> Found:
     """Search for events from the problem's start to a time; see `Search`."""
-    return Search(problem, method, program, events, end).run()
+    try:
+        return Search(problem, method, program, events, end).run()
+    except UserError as raised:  # at the start
+        raise raised.error from None

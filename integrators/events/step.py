@@ -7,16 +7,16 @@ import numpy as np
 from integrators.events import roots
 from integrators.events.function import EventFunction
 from integrators.protocol import Array, Stepper
-from problems.errors import InputError
 
 FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
 DEEPEST = 8  # times that a step is halved where they do not resolve g
 ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
+LOST = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
 
 
-class UnresolvedError(InputError):
-    """An event's function varies too fast for as many samples as are taken in a step."""
+class Unresolved(Exception):  # noqa: N818 -- it ends a search, with a status
+    """An event's function that the samples do not show."""
 
 
 class Step:
@@ -52,9 +52,11 @@ class Step:
 
         Raises
         ------
-        UnresolvedError
+        Unresolved
             If g varies too fast for as many samples as are taken in a step.
         """
+        if self._vanishes(places, fine):
+            return []
         degree = places.size // roots.FINE
         span = float(self._t[-1] - self._t[0])
         resolution = float(np.spacing(max(abs(self._t[0]), abs(self._t[-1])))) / abs(span)
@@ -66,15 +68,21 @@ class Step:
         if unresolved:  # at a pole, a jump or a corner the polynomial between the samples means nothing
             places, fine = places[:: roots.FINE], fine[:: roots.FINE]
             if np.count_nonzero(np.diff(np.sign(fine))) > ISOLATED:
-                raise UnresolvedError(
+                raise Unresolved(
                     f"the event {self._g.name!r} varies too fast to be followed between t = "
                     f"{float(self._t[0])!r} and {float(self._t[-1])!r}, where {FINEST} samples do not show "
-                    "how: give the method shorter steps, or the event a smoother function"
+                    "how: give the method shorter steps, or the event a smoother function."
                 )
         if not roots.suspects(fine[np.newaxis])[0]:
             return []
         found = roots.Finder(places, fine, self._value, self._noise, resolution).zeros()
         return [(*self._state(zero.x), zero.direction) for zero in found]
+
+    def _vanishes(self, places: Array, fine: Array) -> bool:
+        """Whether g is no more than rounding all along: at both ends, and where the samples are largest."""
+        size = np.where(np.isfinite(fine), np.abs(fine), 0.0)
+        largest = float(places[1 + int(np.argmax(size[1:-1]))])
+        return all(abs(self._value(x)) <= LOST * self._noise(x) for x in (0.0, 1.0, largest, 0.5))
 
     def _halves(self, depth: int) -> list[tuple[float, Array, int]]:
         """Return what `events` does from both halves."""

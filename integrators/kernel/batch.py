@@ -21,7 +21,7 @@ from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import whole
-from integrators.protocol import Array, Status, as_numbers, check_state, check_times
+from integrators.protocol import Array, Status, UserError, as_numbers, check_state, check_times
 from integrators.trajectories import Trajectories
 from problems import limits
 from problems.errors import InputError, unknown
@@ -151,20 +151,24 @@ class _Work:
                 for context in (contexts[member], contexts[size + member]):
                     program.load(context, self.parameters[i])
                 self._reset(contexts[member], self.starts[i])
-            made = 0
+            made, broken = 0, False
             while made < times.size:
                 started = perf_counter()
-                made = engine.call(
-                    engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample], times.size,
-                    times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
-                    made, y[group[0] :].ctypes.data, budget,
-                )  # fmt: skip
+                try:
+                    made = engine.call(
+                        engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
+                        times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
+                        made, y[group[0] :].ctypes.data, budget,
+                    )  # fmt: skip
+                except UserError:  # of which of them is not known: each by itself
+                    broken = True
+                    break
                 if self.stop.is_set():
                     return
                 soon = perf_counter() - started < SOON
                 budget = min(4 * budget, CHUNK) if soon else max(budget // 2, 1)
             for member, i in enumerate(group):
-                if contexts[member].words[layout.WANTED]:
+                if broken or contexts[member].words[layout.WANTED]:
                     self.alone(i)
                 else:
                     self._report(i, contexts[member])
@@ -172,7 +176,12 @@ class _Work:
     def alone(self, i: int) -> None:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
         result = self.result
-        stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
+        try:
+            stepper = self.program.start(self.starts[i], self.parameters[i], self.t0)
+        except UserError as raised:
+            result.y[i], result.t_stop[i], result.status[i] = np.nan, self.t0, Status.USER_ERROR
+            result.reason[i] = f"{raised} at the start, t = {self.t0!r}."
+            return
         stepper.stop = self.stop
         samples = stepper.advance(result.t, sample=self.sample)
         result.y[i, : samples.t.size], result.y[i, samples.t.size :] = samples.y, np.nan

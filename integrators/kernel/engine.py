@@ -44,7 +44,7 @@ def _function() -> Any:
 def call(what: int, *arguments: int) -> int:
     """Call the kernel; missing arguments are 0. The interpreter's lock is released meanwhile.
 
-    What a field in Python raised is raised here.
+    What a field in Python raised is raised here, as a `UserError`; the memory holds what was made before.
     """
     outcome = _function()(what, *arguments, *[0] * (10 - len(arguments)))
     raise_error()

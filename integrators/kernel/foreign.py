@@ -15,6 +15,7 @@ import numpy as np
 
 from integrators.kernel import native
 from integrators.kernel.field import ONE_BY_ONE, compile_field
+from integrators.protocol import UserError
 from problems.foreign import Foreign
 from problems.system import System
 
@@ -50,9 +51,17 @@ def field_of(system: System, what: str, lanes: int) -> native.Native:
 
 
 def raise_error() -> None:
-    """Raise what a function of a user has raised in this thread since the last call."""
-    if _raised.error is not None:
-        error, _raised.error = _raised.error, None
+    """Raise what a function of a user has raised in this thread since the last call.
+
+    Raises
+    ------
+    integrators.protocol.UserError
+        For its exceptions; Ctrl-C and the like are raised as they are.
+    """
+    error, _raised.error = _raised.error, None
+    if isinstance(error, Exception):
+        raise UserError(error) from error
+    if error is not None:
         raise error
 
 

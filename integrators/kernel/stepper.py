@@ -13,7 +13,7 @@ from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
 from integrators.one_thread import one_thread
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_state, check_times
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_state, check_times
 from problems.errors import unknown
 
 if TYPE_CHECKING:
@@ -66,6 +66,8 @@ class HBVMStepper:
     """
 
     _kind: ClassVar[type[Checkpoint]] = Checkpoint
+    error: Exception | None = None
+    """What a function of the user raised, where the status is ``USER_ERROR``."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: "HBVMProgram", y: Array, par: Array, t0: float):
@@ -104,7 +106,7 @@ class HBVMStepper:
         if self._context.reals[layout.H] != self._program.h:
             self._set_step(self._program.h)
         self._begin(start, t0)
-        self._status, self._reason = Status.RUNNING, ""
+        self._status, self._reason, self.error = Status.RUNNING, "", None
         return self._run(layout.LAND, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
 
     @property
@@ -283,7 +285,7 @@ class HBVMStepper:
             context[name][:] = array
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
-        self._status, self._reason = checkpoint.status, checkpoint.reason
+        self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
 
     @property
     def _identity(self) -> Identity:
@@ -302,19 +304,28 @@ class HBVMStepper:
         while outcome == layout.BUDGET:
             if context.words[layout.WANTED]:
                 self._take_implicit()
-            outcome = engine.call(
-                engine.ADVANCE, context.address, self._side.address, between, times.size,
-                *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
-            )  # fmt: skip
+            try:
+                outcome = engine.call(
+                    engine.ADVANCE, context.address, self._side.address, between, times.size,
+                    *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
+                )  # fmt: skip
+            except UserError as raised:
+                outcome, self.error = layout.NOT_FINITE, raised.error
             made = int(context.words[layout.MADE])
             self._heed_stop()
             for workspace in self._implicit or ():
                 workspace.raise_what_is_no_failure()
         status = Status.FINISHED
         if outcome != layout.DONE:
-            status, self._reason = failure(outcome, self.t, context.reals, self._solver)
+            status, self._reason = self._failure(outcome)
             self._status = status
         return Samples(times[:made], out[:made], status, self._reason)
+
+    def _failure(self, outcome: int) -> tuple[Status, str]:
+        """Return the status that an outcome stands for, and the reason as a sentence."""
+        if self.error is not None:
+            return Status.USER_ERROR, f"{UserError(self.error)} in the step from t = {self.t!r}."
+        return failure(outcome, self.t, self._context.reals, self._solver)
 
 
 def failure(outcome: int, t: float, reals: Array, solver: str = "fixed-point") -> tuple[Status, str]:

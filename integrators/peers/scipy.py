@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from integrators.crawl import Crawl
 from integrators.peers.options import load, number
 from integrators.peers.stepper import PeerProgram, PeerStepper
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, UserError
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -205,7 +205,10 @@ class SciPyStepper(PeerStepper):
 
     def _field(self, t: float, y: Array) -> Array:
         out = np.empty(y.size)
-        self._program.field(t, y, self._par, out)
+        try:
+            self._program.field(t, y, self._par, out)
+        except Exception as error:
+            raise UserError(error) from error
         return out
 
     def _jacobian(self, t: float, y: Array) -> Any:
@@ -251,7 +254,11 @@ class SciPyStepper(PeerStepper):
                 if not self._step(watch):
                     return grid[:i], states[:i]
             self._solver.status = "running"  # also where it came to its bound
-            states[i] = self._solver.y if self._solver.t == t else self._aside(t)
+            try:
+                states[i] = self._solver.y if self._solver.t == t else self._aside(t)
+            except UserError as raised:
+                self._broken(raised, float(self._solver.t_old))
+                return grid[:i], states[:i]
             if not np.isfinite(states[i]).all():
                 return grid[: i + 1], states[: i + 1]
         return grid, states
@@ -285,8 +292,12 @@ class SciPyStepper(PeerStepper):
         """Take one own step; return whether it succeeded."""
         solver, stats = self._solver, self._stats
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
-        with np.errstate(all="ignore"):
-            message = solver.step()
+        try:
+            with np.errstate(all="ignore"):
+                message = solver.step()
+        except UserError as raised:
+            self._broken(raised, before)
+            return False
         self._note("jacobians", solver.njev - jacobians)
         self._note("factorizations", solver.nlu - factored)
         if solver.status == "failed":
@@ -297,6 +308,10 @@ class SciPyStepper(PeerStepper):
         if stalled:
             self._fail(Status.STALLED, float(solver.t), stalled)
         return not stalled
+
+    def _broken(self, raised: UserError, t: float) -> None:
+        self.error = raised.error
+        self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
 
     def _aside(self, t: float) -> Array:
         """Return the state at ``t``, within the last own step, from a throw-away solver."""

@@ -84,6 +84,8 @@ class PeerStepper:
 
     samplings: ClassVar[tuple[str, ...]] = ()
     identity: Identity
+    error: Exception | None = None
+    """What a function of the user raised, where the status is ``USER_ERROR``."""
 
     def __init__(self, y: Array, t: float):
         self._at_work = threading.RLock()
@@ -188,7 +190,7 @@ class PeerStepper:
         """
         self.identity.check(checkpoint, Checkpoint)
         self._t, self._y = checkpoint.t, checkpoint.y.copy()
-        self._status, self._reason = checkpoint.status, checkpoint.reason
+        self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
         self._load(checkpoint.inner)
 
     def _arrive(self, t: float, y: Array) -> None:

@@ -93,6 +93,26 @@ def test_another_system_of_the_same_dimension(case):
     refused("system", start(case.method), other, "on springs, not .* on kepler")
 
 
+class Rate:
+    def __init__(self, k):
+        self.k = k
+
+    def field(self, t, y):
+        return [self.k * y[0]]
+
+
+@pytest.mark.parametrize(
+    "make", [lambda k: Rate(k).field, lambda k: lambda t, y: [k * y[0]]], ids=["method", "closure"]
+)
+def test_another_field_of_the_same_name_that_is_not_traced(make):
+    growing, falling = (
+        problems.Problem(problems.Foreign(make(k), dim=1, name="rate"), y0=[1.0], t_end=1.0)
+        for k in (1.0, -5.0)
+    )
+    other = start(CASES[0].method, growing).checkpoint()
+    refused("field", start(CASES[0].method, falling), other, "on rate, not .* on rate as it is defined here")
+
+
 @pytest.mark.parametrize("case", ANYWHERE, ids=str)
 def test_other_parameters(case):
     problem = bodies() if type(case.method).__name__ == "WHFast" else WEIGHTED

@@ -65,13 +65,24 @@ def test_an_event_that_no_samples_can_follow_costs_no_trajectory() -> None:
     ]
     times = np.linspace(0.0, 20.0, 41)
     found = integrate(slow, HBVM(k=8, s=4, h=0.25), times=times, events=events)
-    assert found.status is Status.USER_ERROR
+    assert found.status is Status.STALLED
     sentence(
         found.reason,
-        r"'fast' varies too fast .* between t = 1\d\.\d+ and 1\d.*: events are known up to",
+        r"'fast' varies too fast .* between t = 1\d\.\d+ and 1\d.* Events are known up to",
     )
     assert np.array_equal(found.t, times)  # the event changes nothing of the trajectory
     known = np.pi * (np.arange(6) + 0.5)
     kept = found.events["plain"].t
     assert kept.size >= 2
     assert np.allclose(kept, known[: kept.size], atol=1e-9)
+
+
+def test_an_event_that_no_samples_can_follow_ends_the_search_with_a_status() -> None:
+    slow = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1.0, 0.0], t_end=4.0)
+    method = HBVM(k=8, s=4, h=0.5)
+    fast = Event(lambda t, m: m.sin(1e7 * t), name="fast")
+    made = integrate(slow, method, [1.0, 4.0], events=fast)
+    assert made.status is Status.STALLED
+    sentence(made.reason, r"'fast' varies too fast .* between t = 0\.0 and 0\.00\d+, .* shorter steps")
+    sentence(made.reason, r"known up to t = 0\.0 only")
+    assert np.array_equal(made.y, integrate(slow, method, [1.0, 4.0]).y)

@@ -12,6 +12,7 @@ import pytest
 import problems
 from integrators import HBVM, LineIntegral, registry
 from integrators.kernel import engine, foreign, layout, program
+from integrators.protocol import Status
 from tests.faults.fault import Fault, is_met
 
 KEPLER = problems.load("kepler")
@@ -39,6 +40,7 @@ def test_parameters_of_another_thread_are_not_taken_for_its_own():
 
     made._known_velocity = (Key(heavy.tobytes()), expected)
     assert np.array_equal(made._velocity(heavy), expected)
+    assert others == [light], "the other thread never came between"
 
 
 def test_memory_is_there_for_other_threads_only_when_it_is_complete():
@@ -82,8 +84,9 @@ def test_an_error_of_a_function_stays_in_its_thread(monkeypatch):
         inner()
 
     monkeypatch.setattr(engine, "raise_error", raise_error)
-    with pytest.raises(LookupError, match="mine"):
-        run(bad)
+    made = run(bad)
+    assert (made.status, len(others)) == (Status.USER_ERROR, 1)
+    assert "LookupError (mine)" in made.reason
     assert np.array_equal(others[0].y, alone.y)
 
 

@@ -2,12 +2,15 @@
 
 import math
 import re
+from collections import deque
+from functools import partial
 
 import numba
 import numpy as np
 import pytest
 
 import integrators
+import integrators.events.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.protocol import Status
 from problems import Foreign, InputError, Problem, VectorField, emit
@@ -130,18 +133,28 @@ def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
 
 
 def test_any_other_error_is_the_users_to_see():
+    times = []
+
     def broken(t, y):
+        times.append(t)
         if t > last:
             raise LookupError("no such table")
         return [1.0]
 
     problem = Problem(Foreign(broken, dim=1), y0=[0.0], t_end=9.0)
-    for method in (HBVM(k=4, s=2, h=0.1), HBVM(k=4, s=2, tol=1e-6), Gauss(s=2, h=0.1, solver="newton")):
+    for method in (
+        HBVM(k=4, s=2, h=0.1),
+        HBVM(k=4, s=2, tol=1e-6),
+        Gauss(s=2, h=0.1, solver="newton"),
+        integrators.DOP853(rtol=1e-8, atol=1e-8),
+        integrators.Radau(rtol=1e-6, atol=1e-8),
+    ):
         last = -1.0
         with pytest.raises(LookupError, match="no such table"):  # nothing is reached that could be kept
             integrate(problem, method)
         last = 8.0
-        for sample in ("side", "steps"):
+        for sample in ("side", "steps", "land"):
+            times.clear()
             made = integrate(problem, method, np.linspace(0.0, 9.0, 91), sample=sample)
             assert made.status is Status.USER_ERROR
             assert made.status.failed
@@ -149,10 +162,43 @@ def test_any_other_error_is_the_users_to_see():
             assert made.reason.startswith(
                 "a function of yours raised LookupError (no such table) in the step"
             )
-            assert 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
+            peer = not hasattr(method, "k")
+            assert peer or 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
             assert made.t[-1] <= made.t_stop
-            assert made.t[-1] > made.t_stop - 0.11
+            assert peer or made.t[-1] > made.t_stop - 0.11
+            assert times.count(0.0) <= 4, "integrated twice"
             assert np.abs(made.y[:, 0] - made.t).max() < 1e-13  # measured 2e-15
+
+
+@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), HBVM(k=4, s=2, tol=1e-6)], ids=str)
+def test_an_error_ends_its_own_member_of_a_batch_only(method):
+    def broken(t, y):
+        if np.hypot(*y) > (4.0 if t > 1.0 else 10.0):
+            raise LookupError("no such table")
+        return [y[1], -y[0]]
+
+    starts = [[1.0, 0.0], [5.0, 0.0], [2.0, 0.0], [20.0, 0.0]]
+    made = method.compile(Foreign(broken, dim=2)).batch(starts, times=[0.5, 2.0])
+    assert made.status == [Status.FINISHED, Status.USER_ERROR, Status.FINISHED, Status.USER_ERROR]
+    assert "LookupError (no such table) in the step from t = " in made.reason[1]
+    exact = np.cos([0.5, 2.0])
+    assert np.abs(made.y[[0, 2], :, 0] - [exact, 2.0 * exact]).max() < 1e-5  # measured 5.5e-7
+    assert made.y[1, 0, 0] == pytest.approx(5.0 * exact[0], abs=1e-5)
+    assert np.isnan(made.y[1, 1]).all()
+    assert np.isnan(made.y[3]).all()
+    assert made.t_stop[3] == 0.0
+
+
+def test_what_is_no_function_of_the_user_is_not_said_to_be_one(monkeypatch):
+    """An error of our own is to be seen as what it is."""
+
+    def wrong(*arguments):
+        raise ZeroDivisionError("ours")
+
+    monkeypatch.setattr(integrators.events.search, "Step", wrong)
+    problem = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=9.0)
+    with pytest.raises(ZeroDivisionError, match="ours"):
+        integrate(problem, HBVM(k=4, s=2, h=0.1), events=lambda y: y[0])
 
 
 @pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), HBVM()], ids=str)
@@ -246,6 +292,92 @@ def test_a_fingerprint_follows_from_globals_defaults_and_the_functions_it_calls(
     assert of(calling) != before
     assert of(lambda t, y, a=1.0: [a * y[0]]) != of(lambda t, y, a=2.0: [a * y[0]])
     assert of(lambda t, y, *, a=1.0: [a * y[0]]) != of(lambda t, y, *, a=2.0: [a * y[0]])
+
+
+A, B = 1.0, 1.0
+RATES = {"first": 1.0, "second": 1.0}
+
+
+class Rate:
+    def __init__(self, k):
+        self.k = k
+
+    def field(self, t, y):
+        return [self.k * y[0]]
+
+    def __call__(self, t, y):
+        return [self.k * y[0]]
+
+
+class OtherRate(Rate):
+    def __call__(self, t, y):
+        return [-self.k * y[0]]
+
+
+OtherRate.__qualname__ = Rate.__qualname__
+
+
+class Slotted:
+    __slots__ = ("k",)
+
+    def __init__(self, k):
+        self.k = k
+
+    def __call__(self, t, y):
+        return [self.k * y[0]]
+
+
+def with_rate(t, y, a):
+    return [a * y[0]]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        pytest.param(Rate(1.0).field, Rate(2.0).field, id="a method's object"),
+        pytest.param(Rate(1.0), Rate(2.0), id="an object that is called"),
+        pytest.param(Rate(1.0), OtherRate(1.0), id="what runs when it is called"),
+        pytest.param(Slotted(1.0), Slotted(2.0), id="an object with slots"),
+        pytest.param(partial(with_rate, a=1.0), partial(with_rate, a=2.0), id="partial"),
+        pytest.param(lambda t, y: [int(t) in {1, 2}], lambda t, y: [int(t) in {1, 3}], id="set"),
+        pytest.param(lambda t, y, a=deque([1]): y, lambda t, y, a=deque([2]): y, id="deque"),
+    ],
+)
+def test_a_fingerprint_follows_from_the_object_behind_a_field(one, other):
+    before, after = (Foreign(f, dim=1, name="same").fingerprint for f in (one, other))
+    assert before == Foreign(one, dim=1, name="same").fingerprint
+    assert before != after
+
+
+def test_a_fingerprint_follows_from_every_global_and_every_item(monkeypatch):
+    def of(f):
+        return Foreign(f, dim=1, name="same").fingerprint
+
+    def two(t, y):
+        return [-A * B * y[0]]
+
+    def items(t, y):
+        return [-RATES["first"] * RATES["second"] * y[0]]
+
+    before = of(two), of(items)
+    for name in ("A", "B"):
+        with monkeypatch.context() as changed:
+            changed.setitem(globals(), name, 2.0)
+            assert of(two) != before[0], name
+    for name in RATES:
+        with monkeypatch.context() as changed:
+            changed.setitem(RATES, name, 2.0)
+            assert of(items) != before[1], name
+    assert (of(two), of(items)) == before
+
+
+def test_a_fingerprint_tells_which_of_two_lists_comes_again():
+    one, two = [1.0], [2.0]
+
+    def of(*lists):
+        return Foreign(partial(with_rate, a=lists), dim=1, name="same").fingerprint
+
+    assert of(one, two, one) != of(one, two, two)
 
 
 def test_the_field_on_arrays_is_the_function_state_by_state():

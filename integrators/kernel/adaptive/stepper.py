@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from integrators.crawl import Crawl
 from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
-from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper, failure
+from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper
 from integrators.one_thread import one_thread
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_times
 from problems.errors import unknown
 
 if TYPE_CHECKING:
@@ -256,7 +256,10 @@ class AdaptiveStepper(HBVMStepper):
         """Call the kernel once; put the implicit solver to work where it is wanted."""
         if self._context.words[layout.WANTED]:
             self._take_implicit()
-        outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+        try:
+            outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+        except UserError as raised:
+            outcome, self.error = layout.NOT_FINITE, raised.error
         self._heed_stop()
         for workspace in self._implicit or ():
             workspace.raise_what_is_no_failure()
@@ -279,4 +282,4 @@ class AdaptiveStepper(HBVMStepper):
                 f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
                 "the solution may end or be singular here."
             )
-        return failure(outcome, self.t, self._context.reals, self._solver)
+        return super()._failure(outcome)

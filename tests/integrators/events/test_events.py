@@ -143,6 +143,69 @@ def test_a_pole_is_no_event(method):
     assert (tangent.direction == 1).all()
 
 
+@pytest.mark.parametrize("t0", [1e3, 1e4, 1e8])
+@pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.1), HBVM(k=6, s=4, h=0.02), HBVM()], ids=str)
+def test_a_pole_is_no_event_at_late_times_either(method, t0):
+    """Where a unit in the last place of time is much longer than at the start."""
+    phase = math.sin(0.3), math.cos(0.3)
+    problem = Problem(
+        VectorField(lambda y: [y[1], -y[0]], dim=2, name="late"), y0=[*phase], t0=t0, t_end=t0 + 7.0
+    )
+    _, (pole, cotangent) = happened(problem, method, Event(lambda y: 1 / y[0]), Event(lambda y: y[1] / y[0]))
+    assert len(pole) == 0
+    assert cotangent.direction.tolist() == [-1, -1]
+    assert np.allclose(cotangent.t, t0 - 0.3 + np.pi * np.array([0.5, 1.5]), rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+@pytest.mark.parametrize("t_end", [2.0, 4.0], ids=["at the end", "before it"])
+@pytest.mark.parametrize("h", [0.5, 0.1])
+def test_the_direction_of_a_zero_at_the_end_of_a_step_is_that_of_what_follows(h, t_end, power):
+    """A flat zero is a crossing too; only what turns back is a touch."""
+    traced = Event(lambda t: (t - 2.0) ** power * (1.0 + t), name="traced")
+    called = Event(lambda t: 0.0 if t == 2.0 else math.copysign(abs(t - 2.0) ** power, (t - 2.0) ** power))
+    _, found = happened(oscillator(t_end=t_end), HBVM(k=6, s=4, h=h), traced, called)
+    for zeros in found:
+        assert zeros.t.tolist() == [2.0]
+        assert zeros.direction.tolist() == [0 if power == 2 else 1]
+
+
+def test_a_function_that_ends_with_the_integration_is_not_asked_beyond_it_in_vain():
+    def table(t):
+        if t > 2.0:
+            raise LookupError("no such time")
+        return float(t - 2.0)
+
+    made, (zeros,) = happened(oscillator(t_end=2.0), HBVM(k=6, s=4, h=0.5), Event(table))
+    assert made.status is Status.FINISHED
+    assert made.error is None
+    assert (zeros.t.tolist(), zeros.direction.tolist()) == ([2.0], [1])
+
+
+@pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.1), HBVM()], ids=str)
+def test_what_is_zero_but_for_rounding_all_along_is_no_event(method):
+    """An invariant's error: only rounding decides its sign."""
+    made, (energy,) = happened(
+        oscillator(phase=0.3, t_end=20.0),
+        method,
+        Event(lambda q, p: q[0] ** 2 + p[0] ** 2 - 1, name="energy"),
+    )
+    assert made.status is Status.FINISHED
+    assert len(energy) == 0
+
+
+@pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.5), HBVM()], ids=str)
+def test_a_corner_above_zero_is_no_touch(method):
+    _, (above, touch) = happened(
+        oscillator(phase=0.3, t_end=5.0),
+        method,
+        Event(lambda q, m: m.abs(q[0]) + 1e-8, name="above"),
+        Event(lambda q, m: m.abs(q[0]), name="touch"),
+    )
+    assert len(above) == 0
+    assert np.allclose(touch.t, [np.pi - 0.3], rtol=0, atol=1e-8)
+
+
 def test_a_jump_across_zero_is_where_the_sign_changes():
     jump = Event(lambda q: 1.0 if float(q[0]) > 0.5 else -1.0)
     _, (zeros,) = happened(oscillator(t_end=3.0), HBVM(k=10, s=8, h=0.5), jump)
