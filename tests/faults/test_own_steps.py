@@ -85,6 +85,38 @@ def test_breakpoints_hold_on_the_way_back_and_are_read_from_a_command_line():
     assert np.abs(back - problem.y0).max() < 1e-12  # measured 6e-16
 
 
+OSCILLATOR = VectorField(lambda y: [y[1], -y[0]], dim=2, name="oscillator")
+
+
+@pytest.mark.parametrize("sample", [None, "steps"])
+def test_a_breakpoint_at_zero_is_passed(sample):
+    # Time is rounded at the size of a step there: 8 of 40 such starts went backwards for ever.
+    method = HBVM(breakpoints=[0.0], max_steps=1000)
+    program = method.compile(OSCILLATOR)
+    for i in range(40):
+        t0 = -(1.0 + 0.137 * i)
+        samples = program.start([1.0, 0.0], t0=t0).advance([5.0], sample=sample)
+        assert samples.status is Status.FINISHED, t0
+        exact = [math.cos(samples.t[-1] - t0), -math.sin(samples.t[-1] - t0)]
+        assert np.abs(samples.y[-1] - exact).max() < 1e-13  # measured 2e-15
+        assert sample is None or 0.0 in samples.t
+
+
+@pytest.mark.parametrize("apart", [1e-15, 2e-15, 3e-15, 5e-15])
+def test_breakpoints_that_no_step_fits_between_are_one(apart):
+    method = HBVM(breakpoints=np.array([1.0 + apart, 1.0]))
+    for t0 in (0.0, 1.0):
+        solution = integrators.integrate(Problem(OSCILLATOR, y0=[1.0, 0.0], t0=t0, t_end=3.0), method, [3.0])
+        assert solution.status is Status.FINISHED
+
+
+def test_a_largest_step_that_is_none_is_named():
+    problem = Problem(OSCILLATOR, y0=[1.0, 0.0], t0=1.0, t_end=3.0)
+    solution = integrators.integrate(problem, HBVM(max_step=1e-15), [3.0])
+    assert solution.status is Status.STEP_UNDERFLOW
+    sentence(solution.reason, r"a step of max_step=1e-15 from t = 1\.0 cannot be told from none; give more")
+
+
 def test_a_pulse_is_seen_with_a_largest_step():
     width = 0.005
 
@@ -134,6 +166,23 @@ def test_a_jump_of_the_force_is_found_and_named(method, most):
     assert min(np.abs(crossings - t).min() for t, _ in kinks) < 1e-2
     (warning,) = solution.warnings
     sentence(warning, "the field jumps or has a kink .* give breakpoints")
+
+
+def test_the_places_of_kinks_are_kept_the_first_first_and_go_with_a_checkpoint():
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    program = HBVM(k=8, s=4, tol=1e-10).compile(valley)
+    stepper, other = (program.start([1.0, 0.0]) for _ in range(2))
+    stepper.advance([10.0])
+    other.restore(stepper.checkpoint())
+    kinks = stepper.stats.extra["kinks"]
+    assert [round(t / math.sqrt(2.0)) for t, _ in kinks] == [3, 5, 7]  # at 1 a step ended
+    assert other.stats.extra["kinks"] == kinks
+    stepper.advance([500.0])
+    assert len(stepper.stats.extra["kinks"]) == 64
+    assert stepper.stats.extra["kinks"][: len(kinks)] == kinks
+    back = program.start([1.0, 0.0])
+    back.advance([-10.0])
+    assert [t for t, _ in back.stats.extra["kinks"]] == [-t for t, _ in kinks]
 
 
 @pytest.mark.parametrize(
@@ -212,6 +261,26 @@ def test_a_budget_of_steps_ends_the_run_with_its_status(sample):
     sentence(solution.reason, r"max_steps=20 steps came to t = \d")
     enough = integrators.integrate(problem, HBVM(max_steps=5000), [60.0])
     assert np.array_equal(enough.y, integrators.integrate(problem, HBVM(), [60.0]).y)
+
+
+@pytest.mark.parametrize("sample", [None, "steps"])
+def test_a_budget_of_just_the_steps_needed_is_enough(sample):
+    problem = problems.load("kepler", t_end=20.0)
+    needed = integrators.integrate(problem, HBVM(), [20.0]).stats.steps
+    enough = integrators.integrate(problem, HBVM(max_steps=needed), [0.0, 20.0], sample=sample)
+    assert (enough.status, enough.stats.steps) == (Status.FINISHED, needed)
+    less = integrators.integrate(problem, HBVM(max_steps=needed - 1), [0.0, 20.0], sample=sample)
+    assert (less.status, less.stats.steps) == (Status.MAX_STEPS, needed - 1)
+
+
+def test_a_budget_is_that_of_the_trajectory_also_after_going_back():
+    problem = problems.load("kepler")
+    stepper = HBVM(max_steps=50).compile(problem.system).start(problem.y0, problem.par)
+    start = stepper.checkpoint()
+    for _ in range(4):
+        assert stepper.advance([20.0]).status is Status.FINISHED  # 38 steps
+        stepper.restore(start)
+    assert stepper.stats.steps > 150
 
 
 @pytest.mark.parametrize("scale", [1e-160, 1e-100, 1e100, 1e160])
