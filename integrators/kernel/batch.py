@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from threading import Event
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import whole
+from integrators.pace import Pace
 from integrators.protocol import Array, Status, as_numbers, check_state, check_times
 from integrators.trajectories import Trajectories
 from problems import limits
@@ -28,8 +28,7 @@ from problems.errors import InputError, unknown
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
 
-FEWEST, CHUNK = 16, 1 << 14  # steps between two looks at Ctrl-C: as many as take SOON
-SOON = 0.05  # seconds
+CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
 
 
@@ -137,7 +136,7 @@ class _Work:
             context.point(program.scaled(self.h))
         addresses = np.array([context.address for context in contexts])
         y, times = self.result.y, self.result.t
-        budget = FEWEST
+        pace = Pace(CHUNK, self.starts.shape[1])
         for group in groups:
             here = np.concatenate([addresses[: len(group)], addresses[size : size + len(group)]])
             for member, i in enumerate(group):
@@ -146,16 +145,14 @@ class _Work:
                 self._reset(contexts[member], self.starts[i])
             made = 0
             while made < times.size:
-                started = perf_counter()
-                made = engine.call(
-                    engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample], times.size,
-                    times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
-                    made, y[group[0] :].ctypes.data, budget,
-                )  # fmt: skip
+                with pace:
+                    made = engine.call(
+                        engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
+                        times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
+                        made, y[group[0] :].ctypes.data, pace.steps,
+                    )  # fmt: skip
                 if self.stop.is_set():
                     return
-                soon = perf_counter() - started < SOON
-                budget = min(4 * budget, CHUNK) if soon else max(budget // 2, 1)
             for member, i in enumerate(group):
                 if contexts[member].words[layout.WANTED]:
                     self.alone(i)

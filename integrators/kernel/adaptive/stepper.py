@@ -220,7 +220,8 @@ class AdaptiveStepper(HBVMStepper):
         return out[:made], outcome, why
 
     def _budget(self, most: int) -> int:
-        """Return how many steps the kernel may take at a time: ``most``, or what is left of them all."""
+        """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
+        most = min(most, self._pace.steps)
         if self._program.max_steps is None:
             return most
         return max(0, min(most, self._program.max_steps - self._taken))
@@ -283,7 +284,8 @@ class AdaptiveStepper(HBVMStepper):
         """Call the kernel once; put the implicit solver to work where it is wanted."""
         if self._context.words[layout.WANTED]:
             self._take_implicit()
-        outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+        with self._pace:
+            outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
         self._heed_stop()
         for workspace in self._implicit or ():
             workspace.raise_what_is_no_failure()
