@@ -66,10 +66,10 @@ def block_size(ctx, room, b):
 
 
 @compiled
-def squared(h, missing, slope, size):
-    """Return h missing^2 / (slope size)."""
+def squared(h, missing, slope, size, part):
+    """Return h missing^2 / (slope size); ``part`` is h / slope / size."""
     if missing < SQUARABLE and missing * SQUARABLE > 1.0:
-        return h / slope / size * missing**2
+        return part * missing**2
     return h * (missing / size) * (missing / slope)
 
 
@@ -148,8 +148,9 @@ def estimate(ctx):
                     most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * size and not narrow:
                     put_int(ctx, at.KINKED, 1)
-            error = max(error, min(most, squared(h, missing, slope, size)))
-            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size)))
+            part = h / slope / size
+            error = max(error, min(most, squared(h, missing, slope, size, part)))
+            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size, part)))
     return error, defect
 
 
