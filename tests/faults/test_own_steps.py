@@ -9,7 +9,7 @@ import pytest
 import integrators
 import problems
 from hbvm_bench.spec import parse_spec
-from integrators import HBVM, Gauss
+from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
@@ -200,11 +200,54 @@ def test_a_kink_of_the_force_costs_no_more_than_the_tolerance(method, most):
     assert np.abs(solution.y[-1] - [1.0, 0.0]).max() < most
 
 
-def test_smooth_fields_have_no_kinks():
-    for name in ("kepler", "sitnikov", "double_pendulum"):
-        solution = integrators.integrate(problems.load(name, t_end=100.0), HBVM(), [100.0])
-        assert "kinks" not in solution.stats.extra
+@pytest.mark.parametrize(
+    "method",
+    [
+        HBVM(), HBVM(k=8, s=4, tol=1e-3), HBVM(k=8, s=4, tol=1e-6), HBVM(k=7, s=4, tol=1e-10),
+        HBVM(k=6, s=3, tol=1e-2), HBVM(k=5, s=3, tol=1e-10), HBVM(k=4, s=2, tol=1e-3),
+        HBVM(k=4, s=3, tol=1e-6), HBVM(k=4, s=3, tol=1e-10), Gauss(s=4, tol=1e-6), Gauss(s=4, tol=1e-10),
+        Gauss(s=8, tol=1e-5),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_smooth_fields_have_no_kinks(method):
+    # With k = 4 and loose tolerances double_pendulum, lennard_jones, sitnikov and solar_system had some.
+    for name in ("kepler", "sitnikov", "double_pendulum", "lennard_jones", "henon_heiles"):
+        problem = problems.load(name)
+        end = problem.t0 + min(problem.t_end - problem.t0, 100.0)
+        solution = integrators.integrate(problem, method, [end])
+        assert "kinks" not in solution.stats.extra, name
         assert solution.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("method", "why"),
+    [
+        (Gauss(s=4, tol=1e-10, solver="newton"), "not looked for with solver='newton'"),  # 0.485 off
+        (Gauss(s=3, tol=1e-8), "k=3 nodes do not tell a kink from a smooth field"),  # 2.26
+        (HBVM(k=4, s=2, h=0.1), "steps of one length are not cut there"),
+        (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not look for kinks"),  # 2e-3
+    ],
+    ids=repr,
+)
+def test_who_does_not_look_for_kinks_says_so(method, why):
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    solution = integrators.integrate(Problem(valley, q0=[1.0], p0=[0.0], t_end=2.0), method, [2.0])
+    (warning,) = solution.warnings
+    sentence(warning, why)
+    assert method.caveat(problems.load("kepler")) is None
+
+
+def test_newton_steps_over_a_kink_are_said():
+    # A stiff linear field with a kink far away: the implicit solver takes over, and does not look.
+    def field(y, m):
+        return [-2000.0 * y[0] + y[1] + m.abs(y[1] + 5.0), -y[1]]
+
+    problem = Problem(VectorField(field, dim=2, name="stiff"), y0=[1.0, 1.0], t_end=20.0)
+    solution = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-6), [20.0])
+    assert solution.stats.extra["implicit"]["steps"] > 0
+    (warning,) = solution.warnings
+    sentence(warning, r"not looked for in its \d+ Newton steps")
 
 
 def test_heyoka_says_that_it_does_not_see_a_kink():
@@ -240,6 +283,17 @@ def test_a_blow_up_is_seen_and_its_time_named(method, end):
     assert samples.status is Status.STALLED
     assert samples.t.tolist() == [0.1, 0.4]
     sentence(stepper.reason, r"seems to blow up at t = 0\.(4999|5000)")
+
+
+def test_a_close_approach_is_no_blow_up():
+    # From the apocentre of an orbit with e = 0.99999; was taken for a blow-up at the pericentre.
+    e = 0.99999
+    system = problems.load("kepler").system
+    start = {"q0": [1.0 + e, 0.0], "p0": [0.0, math.sqrt((1.0 - e) / (1.0 + e))]}
+    problem = Problem(system, **start, t_end=3.5)
+    solution = integrators.integrate(problem, HBVM(k=6, s=2, tol=1e-15), [3.5])
+    assert solution.status is Status.FINISHED
+    assert solution.t_stop == 3.5
 
 
 def test_oscillations_that_become_faster_are_no_blow_up():
