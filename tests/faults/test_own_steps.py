@@ -11,7 +11,7 @@ import problems
 from hbvm_bench.spec import parse_spec
 from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
-from problems import Hamiltonian, Problem, VectorField
+from problems import Foreign, Hamiltonian, Problem, VectorField
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -198,6 +198,19 @@ def test_a_kink_of_the_force_costs_no_more_than_the_tolerance(method, most):
     solution = integrators.integrate(Problem(kink, y0=[1.0, 0.0], t_end=8 * period), method, [8 * period])
     assert solution.status is Status.FINISHED
     assert np.abs(solution.y[-1] - [1.0, 0.0]).max() < most
+
+
+def test_a_look_at_the_ends_asks_for_two_values_of_the_field():
+    asked = []
+
+    def field(t, y):
+        asked.append(t)
+        return [y[1], -y[0] - 0.9 * abs(y[0])]
+
+    problem = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=20.0)
+    stats = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-8), [20.0]).stats
+    assert stats.extra["kinks"]
+    assert len(asked) - stats.evaluations in (0, 1)  # the first length takes one; 193 before
 
 
 @pytest.mark.parametrize(
