@@ -18,6 +18,9 @@ FIRST_LOOK, LOOKS = 1024, 4
 NEARER, LARGER = 0.9, 1.05
 """Of the way covered, and of the state's size, from one doubling to the next where a solution blows up."""
 
+STEADY = 0.7
+"""Part of the last share that the next is at least where a solution blows up."""
+
 
 class Crawl:
     """Sees that an adaptive method no longer gets anywhere, from its own times.
@@ -25,6 +28,8 @@ class Crawl:
     Twice as many steps cover twice the way where steps keep their length, and as much
     again where the solution oscillates exponentially faster. Where they cover less and less,
     and the state grows, there is a time that they do not pass: the solution blows up there.
+    So it looks also on the way to a close approach, but there each doubling covers a still smaller
+    share than the one before: either it is passed soon, or no step is short enough.
 
     Parameters
     ----------
@@ -35,7 +40,7 @@ class Crawl:
     def __init__(self, t: float, end: float):
         self._mark, self._end, self._count = t, end, 0
         self._total, self._looked, self._way, self._size, self._seen = 0, t, 0.0, 0.0, 0
-        self._look = FIRST_LOOK
+        self._look, self._share = FIRST_LOOK, 0.0
 
     @property
     def patience(self) -> int:
@@ -63,9 +68,9 @@ class Crawl:
 
     def _blows_up(self, t: float, size: float) -> str:
         way, share = t - self._looked, abs(t - self._looked) / abs(self._way) if self._way else math.inf
-        grows = share <= NEARER and size >= LARGER * self._size
+        grows = STEADY * self._share <= share <= NEARER and size >= LARGER * self._size
         self._seen = self._seen + 1 if grows else 0
-        self._look, self._looked, self._way, self._size = 2 * self._total, t, way, size
+        self._look, self._looked, self._way, self._share, self._size = 2 * self._total, t, way, share, size
         if self._seen < LOOKS:
             return ""
         goal = t + way * share / (1.0 - share)

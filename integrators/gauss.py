@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from integrators.caveats import blind, unseen
 from integrators.hbvm import HBVM
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -99,6 +100,10 @@ class Gauss(MethodBase):
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system of ordinary differential equations."""
         return None
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Name a field with kinks that these options do not look for; see `HBVM`."""
+        return unseen(problem, blind(self.s, self.tol, self.solver))
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from integrators.caveats import blind, unseen
 from integrators.options import landings, length, tolerance, whole
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError, shown, unknown
@@ -67,9 +68,12 @@ class HBVM(MethodBase):
     field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
     the field that nodes do see, such as those of ``m.abs``, are found, and steps cut until
     they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
-    ``warnings`` say so. That takes more than ``s`` nodes: with k = s (`Gauss`) and with a
-    loose tolerance a weak kink can cost more than the tolerance, and k < 4 nodes see none
-    (`test_own_steps`).
+    ``warnings`` say so. They are looked for in steps that vary (``tol``), that the
+    fixed-point iteration solves, and that have eight nodes, or four on a field with ``m.abs``;
+    with k = s (`Gauss`) and with a loose tolerance a weak kink can still cost more than the
+    tolerance. Everywhere else - with ``h``, with another solver and where ``"auto"`` goes
+    over to Newton, on Poisson systems - nobody looks, and ``warnings`` say this of a field
+    with ``m.abs`` (`test_own_steps`).
 
     These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -107,6 +111,16 @@ class HBVM(MethodBase):
         Newton takes over, and errors alone bound the steps. The Jacobian is traced, or taken
         by differences; its factors are kept while they serve. ``stats`` tells which solver did
         how much. Poisson systems: fixed point.
+
+    max_step : float, optional
+        Length that no step exceeds, > 0, in units of time; with ``tol``. For a field with pulses or
+        bumps that are shorter than the steps the estimate allows.
+    breakpoints : sequence of float, optional
+        Times at which the field jumps or has a kink, in any order; with ``tol``. A step ends at each
+        of them that is passed, and nothing from before it is used after it.
+    max_steps : int, optional
+        Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
+        with the status ``max_steps``. By default any number.
 
     Raises
     ------
@@ -180,6 +194,12 @@ class HBVM(MethodBase):
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system; Poisson systems with fixed-point iteration only."""
         return self._refusal(problem.system)
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Name a field with kinks that these options do not look for; see the class."""
+        poisson = problem.system.kind == "poisson"
+        why = "the steps that keep a Poisson system's energy do not look for kinks" if poisson else None
+        return unseen(problem, why or blind(self.k, self.tol, self.solver))
 
     def control(self) -> dict[str, Any]:
         """Return those of the options ``max_step``, ``breakpoints`` and ``max_steps`` that are given."""

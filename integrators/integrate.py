@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.protocol import Array, MethodBase, Samples, Stats, Status, UserError, as_numbers, check_times
+from integrators.caveats import unseen
+from integrators.protocol import (
+    Array,
+    MethodBase,
+    Samples,
+    Stats,
+    Status,
+    UserError,
+    as_numbers,
+    check_times,
+)
 from problems import limits
 from problems.errors import InputError, shown
 from problems.foreign import Foreign
@@ -74,8 +84,10 @@ class Solution:
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what a user should know about a solution although it did not fail."""
         caveat = self.method.caveat(self.problem)
+        kinks, implicit = (self.stats.extra.get(name) for name in ("kinks", "implicit"))
+        if caveat is None and not kinks and implicit and implicit["steps"]:
+            caveat = unseen(self.problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
         said = () if caveat is None else (caveat,)
-        kinks = self.stats.extra.get("kinks")
         if not kinks:
             return said
         t, h = kinks[0]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from integrators.caveats import unseen
 from integrators.hbvm import CITATION as BOOK
 from integrators.options import length, tolerance, whole
 from integrators.protocol import MethodBase, Program
@@ -139,6 +140,10 @@ class LineIntegral(MethodBase):
         except InputError as error:
             return str(error)
         return None
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Name a field with kinks: they are not looked for."""
+        return unseen(problem, "line integral methods do not look for kinks")
 
     def compile(self, system: System) -> Program:
         """Compile the vector field and the gradients, and the kernel if this machine has not yet.

@@ -4,11 +4,16 @@ import math
 import operator
 from typing import Any
 
+import numpy as np
+
 from problems import limits
 from problems.errors import InputError, shown
 
 SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
+
+SHORTEST = 2.0**-48
+"""Of the time: a shorter step cannot be told from none; as in `integrators.kernel.control`."""
 
 
 def whole(method: str, name: str, value: Any) -> int:
@@ -47,14 +52,23 @@ def tolerance(method: str, tol: Any) -> float:
 
 
 def landings(method: str, breakpoints: Any) -> tuple[float, ...]:
-    """Return breakpoints as ascending floats, or refuse them."""
+    """Return breakpoints, a list or array of times, as ascending floats, or refuse them.
+
+    Of those that are so close that no step between them could be told from none, the first.
+    """
+    if isinstance(breakpoints, np.ndarray):
+        breakpoints = breakpoints.tolist()
     values = [_number(t) for t in breakpoints] if isinstance(breakpoints, list | tuple) else [math.nan]
     if not all(math.isfinite(t) for t in values):
         raise InputError(
-            f"{method} needs breakpoints as a list of finite times, not breakpoints={breakpoints!r}; "
+            f"{method} needs breakpoints as a list of finite times, not breakpoints={shown(breakpoints)}; "
             "such as breakpoints=[1.0, 2.5]."
         )
-    return tuple(sorted(set(values)))
+    kept: list[float] = []
+    for t in sorted(values):
+        if not kept or t - kept[-1] > SHORTEST * max(abs(t), abs(kept[-1])):
+            kept.append(t)
+    return tuple(kept)
 
 
 def _number(value: Any) -> float:

@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
-from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import whole
+from integrators.pace import Pace
 from integrators.protocol import Array, Status, UserError, as_numbers, check_state, check_times
 from integrators.trajectories import Trajectories
 from problems import limits
@@ -29,8 +29,7 @@ from problems.errors import InputError, unknown
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
 
-FEWEST, CHUNK = 16, 1 << 14  # steps between two looks at Ctrl-C: as many as take SOON
-SOON = 0.05  # seconds
+CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
 
 
@@ -144,7 +143,7 @@ class _Work:
             context.point(program.scaled(self.h))
         addresses = np.array([context.address for context in contexts])
         y, times = self.result.y, self.result.t
-        budget = FEWEST
+        pace = Pace(CHUNK, self.starts.shape[1])
         for group in groups:
             here = np.concatenate([addresses[: len(group)], addresses[size : size + len(group)]])
             for member, i in enumerate(group):
@@ -153,20 +152,18 @@ class _Work:
                 self._reset(contexts[member], self.starts[i])
             made, broken = 0, False
             while made < times.size:
-                started = perf_counter()
                 try:
-                    made = engine.call(
-                        engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
-                        times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
-                        made, y[group[0] :].ctypes.data, budget,
-                    )  # fmt: skip
+                    with pace:
+                        made = engine.call(
+                            engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
+                            times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
+                            made, y[group[0] :].ctypes.data, pace.steps,
+                        )  # fmt: skip
                 except UserError:  # of which of them is not known: each by itself
                     broken = True
                     break
                 if self.stop.is_set():
                     return
-                soon = perf_counter() - started < SOON
-                budget = min(4 * budget, CHUNK) if soon else max(budget // 2, 1)
             for member, i in enumerate(group):
                 if broken or contexts[member].words[layout.WANTED]:
                     self.alone(i)

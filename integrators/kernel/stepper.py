@@ -13,13 +13,14 @@ from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
 from integrators.kernel.workspace import Integers
 from integrators.one_thread import one_thread
+from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_state, check_times
 from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
 
-CHUNK = 1 << 14  # steps between two looks at Ctrl-C
+CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 # What a checkpoint holds besides STATE and ERROR; F matters to the next start.
@@ -77,7 +78,7 @@ class HBVMStepper:
         self._side = program.context(side=True)
         for context in (self._context, self._side):
             program.load(context, par)
-        self._dim = y.size
+        self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._begin(y, t0)
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._context.words[layout.STRATEGY] = program.solver.strategy
@@ -305,10 +306,11 @@ class HBVMStepper:
             if context.words[layout.WANTED]:
                 self._take_implicit()
             try:
-                outcome = engine.call(
-                    engine.ADVANCE, context.address, self._side.address, between, times.size,
-                    *(array.ctypes.data for array in arrays), made, out.ctypes.data, CHUNK,
-                )  # fmt: skip
+                with self._pace:
+                    outcome = engine.call(
+                        engine.ADVANCE, context.address, self._side.address, between, times.size,
+                        *(array.ctypes.data for array in arrays), made, out.ctypes.data, self._pace.steps,
+                    )  # fmt: skip
             except UserError as raised:
                 outcome, self.error = layout.NOT_FINITE, raised.error
             made = int(context.words[layout.MADE])

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.caveats import unseen
 from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.heyoka_batch import Lanes
 from integrators.peers.options import UNTRACED, flag, load, number
 from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status
 from integrators.trajectories import Trajectories
-from problems.inspection import has_kinks
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)
@@ -97,12 +97,7 @@ class Taylor(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over its kink."""
-        if not problem.system.traced or not has_kinks(problem.system):
-            return None
-        return (
-            "its field has m.abs, and a Taylor series from one side of the kink knows nothing of the other: "
-            "steps go over it with any error, and the run ends as finished."
-        )
+        return unseen(problem, "a Taylor series from one side of a kink knows nothing of the other")
 
     def compile(self, system: System) -> "TaylorProgram":
         """Have heyoka compile the integrator for ``system``."""

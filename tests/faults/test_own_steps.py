@@ -9,9 +9,9 @@ import pytest
 import integrators
 import problems
 from hbvm_bench.spec import parse_spec
-from integrators import HBVM, Gauss
+from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
-from problems import Hamiltonian, Problem, VectorField
+from problems import Foreign, Hamiltonian, Problem, VectorField
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -85,6 +85,38 @@ def test_breakpoints_hold_on_the_way_back_and_are_read_from_a_command_line():
     assert np.abs(back - problem.y0).max() < 1e-12  # measured 6e-16
 
 
+OSCILLATOR = VectorField(lambda y: [y[1], -y[0]], dim=2, name="oscillator")
+
+
+@pytest.mark.parametrize("sample", [None, "steps"])
+def test_a_breakpoint_at_zero_is_passed(sample):
+    # Time is rounded at the size of a step there: 8 of 40 such starts went backwards for ever.
+    method = HBVM(breakpoints=[0.0], max_steps=1000)
+    program = method.compile(OSCILLATOR)
+    for i in range(40):
+        t0 = -(1.0 + 0.137 * i)
+        samples = program.start([1.0, 0.0], t0=t0).advance([5.0], sample=sample)
+        assert samples.status is Status.FINISHED, t0
+        exact = [math.cos(samples.t[-1] - t0), -math.sin(samples.t[-1] - t0)]
+        assert np.abs(samples.y[-1] - exact).max() < 1e-13  # measured 2e-15
+        assert sample is None or 0.0 in samples.t
+
+
+@pytest.mark.parametrize("apart", [1e-15, 2e-15, 3e-15, 5e-15])
+def test_breakpoints_that_no_step_fits_between_are_one(apart):
+    method = HBVM(breakpoints=np.array([1.0 + apart, 1.0]))
+    for t0 in (0.0, 1.0):
+        solution = integrators.integrate(Problem(OSCILLATOR, y0=[1.0, 0.0], t0=t0, t_end=3.0), method, [3.0])
+        assert solution.status is Status.FINISHED
+
+
+def test_a_largest_step_that_is_none_is_named():
+    problem = Problem(OSCILLATOR, y0=[1.0, 0.0], t0=1.0, t_end=3.0)
+    solution = integrators.integrate(problem, HBVM(max_step=1e-15), [3.0])
+    assert solution.status is Status.STEP_UNDERFLOW
+    sentence(solution.reason, r"a step of max_step=1e-15 from t = 1\.0 cannot be told from none; give more")
+
+
 def test_a_pulse_is_seen_with_a_largest_step():
     width = 0.005
 
@@ -136,6 +168,23 @@ def test_a_jump_of_the_force_is_found_and_named(method, most):
     sentence(warning, "the field jumps or has a kink .* give breakpoints")
 
 
+def test_the_places_of_kinks_are_kept_the_first_first_and_go_with_a_checkpoint():
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    program = HBVM(k=8, s=4, tol=1e-10).compile(valley)
+    stepper, other = (program.start([1.0, 0.0]) for _ in range(2))
+    stepper.advance([10.0])
+    other.restore(stepper.checkpoint())
+    kinks = stepper.stats.extra["kinks"]
+    assert [round(t / math.sqrt(2.0)) for t, _ in kinks] == [3, 5, 7]  # at 1 a step ended
+    assert other.stats.extra["kinks"] == kinks
+    stepper.advance([500.0])
+    assert len(stepper.stats.extra["kinks"]) == 64
+    assert stepper.stats.extra["kinks"][: len(kinks)] == kinks
+    back = program.start([1.0, 0.0])
+    back.advance([-10.0])
+    assert [t for t, _ in back.stats.extra["kinks"]] == [-t for t, _ in kinks]
+
+
 @pytest.mark.parametrize(
     ("method", "most"),
     [(HBVM(), 1e-10), (HBVM(k=8, s=4, tol=1e-10), 1e-6)],  # measured 3e-13, 3e-9; 4.6e-5, 6.1e-6 before
@@ -151,11 +200,67 @@ def test_a_kink_of_the_force_costs_no_more_than_the_tolerance(method, most):
     assert np.abs(solution.y[-1] - [1.0, 0.0]).max() < most
 
 
-def test_smooth_fields_have_no_kinks():
-    for name in ("kepler", "sitnikov", "double_pendulum"):
-        solution = integrators.integrate(problems.load(name, t_end=100.0), HBVM(), [100.0])
-        assert "kinks" not in solution.stats.extra
+def test_a_look_at_the_ends_asks_for_two_values_of_the_field():
+    asked = []
+
+    def field(t, y):
+        asked.append(t)
+        return [y[1], -y[0] - 0.9 * abs(y[0])]
+
+    problem = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=20.0)
+    stats = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-8), [20.0]).stats
+    assert stats.extra["kinks"]
+    assert len(asked) - stats.evaluations in (0, 1)  # the first length takes one; 193 before
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        HBVM(), HBVM(k=8, s=4, tol=1e-3), HBVM(k=8, s=4, tol=1e-6), HBVM(k=7, s=4, tol=1e-10),
+        HBVM(k=6, s=3, tol=1e-2), HBVM(k=5, s=3, tol=1e-10), HBVM(k=4, s=2, tol=1e-3),
+        HBVM(k=4, s=3, tol=1e-6), HBVM(k=4, s=3, tol=1e-10), Gauss(s=4, tol=1e-6), Gauss(s=4, tol=1e-10),
+        Gauss(s=8, tol=1e-5),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_smooth_fields_have_no_kinks(method):
+    # With k = 4 and loose tolerances double_pendulum, lennard_jones, sitnikov and solar_system had some.
+    for name in ("kepler", "sitnikov", "double_pendulum", "lennard_jones", "henon_heiles"):
+        problem = problems.load(name)
+        end = problem.t0 + min(problem.t_end - problem.t0, 100.0)
+        solution = integrators.integrate(problem, method, [end])
+        assert "kinks" not in solution.stats.extra, name
         assert solution.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("method", "why"),
+    [
+        (Gauss(s=4, tol=1e-10, solver="newton"), "not looked for with solver='newton'"),  # 0.485 off
+        (Gauss(s=3, tol=1e-8), "k=3 nodes do not tell a kink from a smooth field"),  # 2.26
+        (HBVM(k=4, s=2, h=0.1), "steps of one length are not cut there"),
+        (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not look for kinks"),  # 2e-3
+    ],
+    ids=repr,
+)
+def test_who_does_not_look_for_kinks_says_so(method, why):
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    solution = integrators.integrate(Problem(valley, q0=[1.0], p0=[0.0], t_end=2.0), method, [2.0])
+    (warning,) = solution.warnings
+    sentence(warning, why)
+    assert method.caveat(problems.load("kepler")) is None
+
+
+def test_newton_steps_over_a_kink_are_said():
+    # A stiff linear field with a kink far away: the implicit solver takes over, and does not look.
+    def field(y, m):
+        return [-2000.0 * y[0] + y[1] + m.abs(y[1] + 5.0), -y[1]]
+
+    problem = Problem(VectorField(field, dim=2, name="stiff"), y0=[1.0, 1.0], t_end=20.0)
+    solution = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-6), [20.0])
+    assert solution.stats.extra["implicit"]["steps"] > 0
+    (warning,) = solution.warnings
+    sentence(warning, r"not looked for in its \d+ Newton steps")
 
 
 def test_heyoka_says_that_it_does_not_see_a_kink():
@@ -193,6 +298,17 @@ def test_a_blow_up_is_seen_and_its_time_named(method, end):
     sentence(stepper.reason, r"seems to blow up at t = 0\.(4999|5000)")
 
 
+def test_a_close_approach_is_no_blow_up():
+    # From the apocentre of an orbit with e = 0.99999; was taken for a blow-up at the pericentre.
+    e = 0.99999
+    system = problems.load("kepler").system
+    start = {"q0": [1.0 + e, 0.0], "p0": [0.0, math.sqrt((1.0 - e) / (1.0 + e))]}
+    problem = Problem(system, **start, t_end=3.5)
+    solution = integrators.integrate(problem, HBVM(k=6, s=2, tol=1e-15), [3.5])
+    assert solution.status is Status.FINISHED
+    assert solution.t_stop == 3.5
+
+
 def test_oscillations_that_become_faster_are_no_blow_up():
     faster = VectorField(lambda y: [y[1], -y[0] * y[2], y[2]], dim=3, name="faster")
     problem = Problem(faster, y0=[1.0, 0.0, 1.0], t_end=21.0)
@@ -212,6 +328,26 @@ def test_a_budget_of_steps_ends_the_run_with_its_status(sample):
     sentence(solution.reason, r"max_steps=20 steps came to t = \d")
     enough = integrators.integrate(problem, HBVM(max_steps=5000), [60.0])
     assert np.array_equal(enough.y, integrators.integrate(problem, HBVM(), [60.0]).y)
+
+
+@pytest.mark.parametrize("sample", [None, "steps"])
+def test_a_budget_of_just_the_steps_needed_is_enough(sample):
+    problem = problems.load("kepler", t_end=20.0)
+    needed = integrators.integrate(problem, HBVM(), [20.0]).stats.steps
+    enough = integrators.integrate(problem, HBVM(max_steps=needed), [0.0, 20.0], sample=sample)
+    assert (enough.status, enough.stats.steps) == (Status.FINISHED, needed)
+    less = integrators.integrate(problem, HBVM(max_steps=needed - 1), [0.0, 20.0], sample=sample)
+    assert (less.status, less.stats.steps) == (Status.MAX_STEPS, needed - 1)
+
+
+def test_a_budget_is_that_of_the_trajectory_also_after_going_back():
+    problem = problems.load("kepler")
+    stepper = HBVM(max_steps=50).compile(problem.system).start(problem.y0, problem.par)
+    start = stepper.checkpoint()
+    for _ in range(4):
+        assert stepper.advance([20.0]).status is Status.FINISHED  # 38 steps
+        stepper.restore(start)
+    assert stepper.stats.steps > 150
 
 
 @pytest.mark.parametrize("scale", [1e-160, 1e-100, 1e100, 1e160])

@@ -38,6 +38,20 @@ def stays(ctx, d, last):
 
 
 @compiled
+def stay(ctx, room):
+    """Note for each block the largest last coefficient that is as large as at a kink; 0: none."""
+    found, block = get_int(ctx, at.ESTIMATES), get_int(ctx, at.BLOCK)
+    doubt = get_float(ctx, at.DOUBT)
+    for d in range(get_int(ctx, at.ROWS)):
+        i = 8 * d
+        low = max(max(get_float(found, i + 1), get_float(found, i + 2)), get_float(found, i + 3))
+        high = max(get_float(found, i + 6), get_float(found, i + 7))
+        if high > doubt * low and stays(ctx, d, get_float(found, i + 7)):
+            b = at.BLOCK_ROOM * get_int(block, d)
+            put_float(room, b + 4, max(get_float(room, b + 4), high))
+
+
+@compiled
 def momentum(ctx, d):
     """Return the component of the state whose slope is row d of the field."""
     i = 8 * (d // 4) + d % 4 if get_int(ctx, at.SECOND) else d
@@ -52,10 +66,10 @@ def block_size(ctx, room, b):
 
 
 @compiled
-def squared(h, missing, slope, size):
-    """Return h missing^2 / (slope size)."""
+def squared(h, missing, slope, size, part):
+    """Return h missing^2 / (slope size); ``part`` is h / slope / size."""
     if missing < SQUARABLE and missing * SQUARABLE > 1.0:
-        return h / slope / size * missing**2
+        return part * missing**2
     return h * (missing / size) * (missing / slope)
 
 
@@ -92,27 +106,24 @@ def estimate(ctx):
     for i in range(at.BLOCK_ROOM * blocks):
         put_float(room, i, 0.0)
     steepest = room + 8 * at.BLOCK_ROOM * blocks
-    doubt = get_float(ctx, at.DOUBT)
+    doubt, doubtful = get_float(ctx, at.DOUBT), False
     for g in range(get_int(ctx, at.GROUP_COUNT)):
         put_float(largest, g, 0.0)
         put_float(steepest, g, 0.0)
     for d in range(rows):
         b = at.BLOCK_ROOM * get_int(block, d)
         i = 8 * d
-        slope = max(
-            max(get_float(found, i), get_float(found, i + 1)),
-            max(get_float(found, i + 2), get_float(found, i + 3)),
-        )
+        low = max(max(get_float(found, i + 1), get_float(found, i + 2)), get_float(found, i + 3))
+        slope = max(get_float(found, i), low)
         missing = max(get_float(found, i + 5), error_decay * get_float(found, i + 4))
         unseen = max(get_float(found, i + 7), defect_decay * get_float(found, i + 6))
-        low = max(max(get_float(found, i + 1), get_float(found, i + 2)), get_float(found, i + 3))
-        high = max(get_float(found, i + 6), get_float(found, i + 7))
-        if high > doubt * low and stays(ctx, d, get_float(found, i + 7)):
-            put_float(room, b + 4, max(get_float(room, b + 4), high))
+        doubtful |= max(get_float(found, i + 6), get_float(found, i + 7)) > doubt * low
         put_float(room, b, max(get_float(room, b), abs(momentum(ctx, d)) + h * slope))
         put_float(room, b + 1, max(get_float(room, b + 1), slope))
         put_float(room, b + 2, max(get_float(room, b + 2), missing))
         put_float(room, b + 3, max(get_float(room, b + 3), unseen))
+    if doubtful:
+        stay(ctx, room)
     for b in range(blocks):
         g = get_int(group, b)
         put_float(largest, g, max(get_float(largest, g), get_float(room, at.BLOCK_ROOM * b)))
@@ -129,15 +140,17 @@ def estimate(ctx):
         slope = max(get_float(room, i + 1), least * get_float(steepest, get_int(group, b)))
         if slope > 0.0:
             size = block_size(ctx, room, b)
-            missing, unseen, high = get_float(room, i + 2), get_float(room, i + 3), get_float(room, i + 4)
+            missing, unseen = get_float(room, i + 2), get_float(room, i + 3)
             most, most_unseen = INFINITY, INFINITY
-            if high > 0.0:
+            if doubtful and get_float(room, i + 4) > 0.0:
+                high = get_float(room, i + 4)
                 if kinks and h * max(high, max(missing, unseen)) <= negligible * size:
                     most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * size and not narrow:
                     put_int(ctx, at.KINKED, 1)
-            error = max(error, min(most, squared(h, missing, slope, size)))
-            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size)))
+            part = h / slope / size
+            error = max(error, min(most, squared(h, missing, slope, size, part)))
+            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size, part)))
     return error, defect
 
 

@@ -26,9 +26,10 @@ def kink(ctx, ends):
         found += 1
         put_int(ctx, at.KINKS, found)
         put_float(ctx, at.KINK_END, t + h)
-    place = get_int(ctx, at.KINK_PLACES) + 16 * ((found - 1) % at.KINKS_KEPT)
-    put_float(place, 0, t)
-    put_float(place, 1, h)
+    if found <= at.KINKS_KEPT:
+        place = get_int(ctx, at.KINK_PLACES) + 16 * (found - 1)
+        put_float(place, 0, t)
+        put_float(place, 1, h)
     return True
 
 
@@ -39,14 +40,16 @@ def differs_at_an_end(ctx):
     if h <= NARROWEST * abs(t):
         return False
     rows, lanes, second = get_int(ctx, at.ROWS), get_int(ctx, at.LANES), get_int(ctx, at.SECOND)
-    # Two stages at the ends, in memory that the solved step does not need any more.
+    # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     q, times, values = get_int(ctx, at.Q), get_int(ctx, at.TIMES), get_int(ctx, at.SUM)
     put_float(times, 0, t)
-    put_float(times, 1, t + get_float(ctx, at.H))
+    for lane in range(1, lanes):
+        put_float(times, lane, t + get_float(ctx, at.H))
     for d in range(rows):
         after = 8 * (d // 4) + 4 + d % 4 if second else d
         put_float(q, lanes * d, get_float(get_int(ctx, at.ROW_STATE), d))
-        put_float(q, lanes * d + 1, get_float(get_int(ctx, at.NEXT_STATE), after))
+        for lane in range(1, lanes):
+            put_float(q, lanes * d + lane, get_float(get_int(ctx, at.NEXT_STATE), after))
     call_field(get_int(ctx, at.FIELD), times, q, get_int(ctx, at.PAR), values)
     put_int(ctx, at.EVALUATIONS, get_int(ctx, at.EVALUATIONS) + 2)
     found = get_int(ctx, at.ESTIMATES)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from integrators.caveats import sees_kinks
 from integrators.kernel import layout, native, tables
 from integrators.kernel.adaptive import engine
 from integrators.kernel.adaptive.stepper import AdaptiveStepper
@@ -104,7 +105,7 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
         self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
-        self._doubt, self._slowest = _decays(k, m, tol, middle)
+        self._doubt, self._slowest = _decays(k, m, tol, middle, sees_kinks(k, system))
         self.compile_seconds += native.clock() - started
 
     @property
@@ -149,15 +150,15 @@ class AdaptiveProgram(HBVMProgram):
         return context
 
 
-def _decays(k: int, m: int, tol: float, middle: int) -> tuple[float, float]:
+def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float, float]:
     """Return DOUBT and SLOWEST_DECAY, which tell a smooth field from one with a kink.
 
     Where the error is the tolerance, coefficients of a smooth field fall off by
     ``tol^(1/2m)`` from one degree to the next. Those of a kink fall off like 1/j^2, from the
-    middle ones, of degrees ``middle`` and the next, to the last one. Infinite where k is too small
-    to tell.
+    middle ones, of degrees ``middle`` and the next, to the last one. Infinite where
+    nobody ``looks``.
     """
-    if k < 4:
+    if not looks:
         return math.inf, math.inf
     smooth, last = tol ** (0.5 / m), k - 1
     at_a_kink = ((middle + 0.5) / last) ** 2

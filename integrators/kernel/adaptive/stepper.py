@@ -13,13 +13,14 @@ from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper
 from integrators.one_thread import one_thread
+from integrators.options import SHORTEST
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_times
 from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.adaptive.program import AdaptiveProgram
 
-CLOSE = 2.0**-50  # as in `integrators.kernel.control`, which imports numba
+RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 
@@ -36,6 +37,8 @@ class AdaptiveCheckpoint(Checkpoint):
     """All that the continuation of an `AdaptiveStepper` depends on."""
 
     ahead: tuple[Array, Array]
+    places: Array  # of kinks
+    taken: int  # steps since the trajectory's start
 
 
 class AdaptiveStepper(HBVMStepper):
@@ -53,6 +56,7 @@ class AdaptiveStepper(HBVMStepper):
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
         reals = self._context.reals
+        self._uncounted = int(self._context.words[layout.STEPS])  # steps that are not of this trajectory
         reals[layout.T0] = reals[layout.DOUBT_END] = t0
         reals[layout.NEXT_LENGTH] = self._program.first or 0.0
         engine.call(engine.RESET, self._context.address, out=y.ctypes.data)
@@ -67,13 +71,13 @@ class AdaptiveStepper(HBVMStepper):
         """Counters of the work done, as `HBVMStepper.stats`; ``extra`` has the method's k and s too.
 
         And, where the field jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a
-        step had to be cut for and the length at which it was found, of the last 64 places.
+        step had to be cut for and the length at which it was found, of the first 64 places.
         """
         stats, c, context = super().stats, self._program.constants, self._context
         extra = {**stats.extra, "k": c.k, "s": c.s}
         if found := int(context.words[layout.KINKS]):
             kept = context["KINK_PLACES"].reshape(-1, 2)[: min(found, layout.KINKS_KEPT)]
-            extra["kinks"] = sorted((float(t), float(h)) for t, h in kept)
+            extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return replace(stats, rejections=int(context.words[layout.REJECTIONS]), extra=extra)
 
     @one_thread
@@ -107,16 +111,26 @@ class AdaptiveStepper(HBVMStepper):
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
         reals, points = self._context.reals, self._program.breakpoints
         ahead = reals[layout.NEXT_LENGTH] > 0.0
+        points = points[[not self._is_at(point) for point in points.tolist()]] if points.size else points
         found = points[points > self.t] if ahead else points[points < self.t][::-1]
         stop = float(found[0]) if found.size else math.inf if ahead else -math.inf
         reals[layout.STOP] = stop
         return stop
+
+    def _is_at(self, t: float) -> bool:
+        """Whether a breakpoint is reached; as `integrators.kernel.adaptive.steps.remaining`."""
+        reals = self._context.reals
+        rest = (t - self.t) - float(reals[layout.TIME_LOW])
+        return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(float(reals[layout.LENGTH_BEHIND])))
 
     def _restart(self, t: float) -> None:
         """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
         words, reals = self._context.words, self._context.reals
         reals[layout.T0], reals[layout.TIME_LOW] = t, 0.0
         reals[layout.LENGTH] = reals[layout.LENGTH_BEHIND] = 0.0
+        # The step that ended here may have been too short to be followed by one of its length.
+        length = float(reals[layout.NEXT_LENGTH])
+        reals[layout.NEXT_LENGTH] = math.copysign(max(abs(length), RESTART * abs(t)), length)
         words[layout.SOLVED] = words[layout.AGE] = 0
 
     @one_thread
@@ -126,7 +140,9 @@ class AdaptiveStepper(HBVMStepper):
         base = vars(super().checkpoint())
         base["words"] = context.words[[*WORDS, *MORE_WORDS]]
         ahead = tuple(context.array(slot).copy() for slot in (layout.NEXT_STATE, layout.NEXT_ERROR))
-        return AdaptiveCheckpoint(**base, ahead=(ahead[0], ahead[1]))
+        return AdaptiveCheckpoint(
+            **base, ahead=(ahead[0], ahead[1]), places=context["KINK_PLACES"].copy(), taken=self._taken
+        )
 
     @one_thread
     def restore(self, checkpoint: Checkpoint) -> None:
@@ -139,6 +155,13 @@ class AdaptiveStepper(HBVMStepper):
         context.words[list(MORE_WORDS)] = checkpoint.words[own:]
         for slot, kept in zip((layout.NEXT_STATE, layout.NEXT_ERROR), checkpoint.ahead, strict=True):
             context.array(slot)[:] = kept
+        context["KINK_PLACES"][:] = checkpoint.places
+        self._uncounted = int(context.words[layout.STEPS]) - checkpoint.taken
+
+    @property
+    def _taken(self) -> int:
+        """Steps from the trajectory's start to the present; the counters keep counting after a `restore`."""
+        return int(self._context.words[layout.STEPS]) - self._uncounted
 
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)
@@ -160,7 +183,11 @@ class AdaptiveStepper(HBVMStepper):
 
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
-        watch, out = Crawl(self.t, float(times[-1])), np.empty((times.size, self._dim))
+        watch = Crawl(self.t, float(times[-1]))
+        if not self._program.breakpoints.size:
+            states, outcome, why = self._piece(np.ascontiguousarray(times), between, watch)
+            return self._samples(times[: len(states)], states, outcome, why)
+        out = np.empty((times.size, self._dim))
         made, outcome, why = 0, layout.DONE, None
         while made < times.size and outcome == layout.DONE and why is None:
             stop = self._stop()
@@ -193,15 +220,16 @@ class AdaptiveStepper(HBVMStepper):
         return out[:made], outcome, why
 
     def _budget(self, most: int) -> int:
-        """Return how many steps the kernel may take at a time: ``most``, or what is left of them all."""
+        """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
+        most = min(most, self._pace.steps)
         if self._program.max_steps is None:
             return most
-        return max(0, min(most, self._program.max_steps - int(self._context.words[layout.STEPS])))
+        return max(0, min(most, self._program.max_steps - self._taken))
 
     def _ended(self, watch: Crawl, steps: int) -> "Ended | None":
         """Return why the run is over after ``steps`` steps that the kernel took, if it is."""
         words, most = self._context.words, self._program.max_steps
-        if most is not None and words[layout.STEPS] >= most and not words[layout.WANTED]:
+        if most is not None and self._taken >= most and not words[layout.WANTED]:
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
             )
@@ -242,12 +270,12 @@ class AdaptiveStepper(HBVMStepper):
             made = int(self._context.words[layout.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
-            if passes and outcome == layout.DONE:
-                outcome = layout.BUDGET if stop != end else layout.DONE
+            if math.isfinite(stop) and self._is_at(stop):
+                if outcome == layout.DONE and stop != end:
+                    outcome = layout.BUDGET
+                times[made - 1 : made] = stop
                 self._restart(stop)
-            elif math.isfinite(stop) and abs(self.t - stop) <= CLOSE * abs(stop):
-                self._restart(stop)
-            elif outcome == layout.BUDGET and (limit is None or n == 0):
+            elif outcome == layout.BUDGET and (n == 0 or (limit is None and self._budget(1))):
                 why = self._ended(watch, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return self._samples(t, y, layout.DONE if outcome == layout.BUDGET else outcome, why)
@@ -257,7 +285,8 @@ class AdaptiveStepper(HBVMStepper):
         if self._context.words[layout.WANTED]:
             self._take_implicit()
         try:
-            outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
+            with self._pace:
+                outcome = engine.call(what, self._context.address, side=self._side.address, **arguments)
         except UserError as raised:
             outcome, self.error = layout.NOT_FINITE, raised.error
         self._heed_stop()
@@ -277,6 +306,11 @@ class AdaptiveStepper(HBVMStepper):
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""
+        longest = self._program.max_step
+        if outcome == layout.UNDERFLOW and longest is not None and longest <= SHORTEST * abs(self.t):
+            return Status.STEP_UNDERFLOW, (
+                f"a step of max_step={longest!r} from t = {self.t!r} cannot be told from none; give more."
+            )
         if outcome == layout.UNDERFLOW:
             return Status.STEP_UNDERFLOW, (
                 f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "

@@ -173,9 +173,16 @@ def learn(ctx):
 
 @compiled
 def remaining(ctx, t):
-    """Return how far the time t is ahead; 0 where it is the present but for rounding."""
-    rest = (t - get_float(ctx, at.T0)) - get_float(ctx, at.TIME_LOW)
-    return 0.0 if abs(rest) <= CLOSE * abs(t) else rest
+    """Return how far the time t is ahead; 0 where it is the present but for rounding, or behind.
+
+    Rounding is that of the times and of the step behind, which may be all there is at t = 0. A
+    breakpoint counts as reached when it is so near that no step there could be told from none.
+    """
+    t0 = get_float(ctx, at.T0)
+    rest = (t - t0) - get_float(ctx, at.TIME_LOW)
+    size = max(max(abs(t), abs(t0)), abs(get_float(ctx, at.LENGTH_BEHIND)))
+    close = SHORTEST if t == get_float(ctx, at.STOP) else CLOSE
+    return 0.0 if abs(rest) <= close * size or rest * get_float(ctx, at.NEXT_LENGTH) < 0.0 else rest
 
 
 @compiled
@@ -312,10 +319,14 @@ def vary(ctx, side, between, count, times, first, out, budget):
 
 @compiled
 def walk(ctx, times, out, end, budget):
-    """Take ``budget`` steps at most, none beyond the time ``end``, and note their times and states."""
+    """Take ``budget`` steps at most, none beyond the time ``end``, and note their times and states.
+
+    With a budget of 0, only look whether a step remains to be taken.
+    """
     dim = dimension(ctx)
-    for i in range(budget):
-        put_int(ctx, at.MADE, i)
+    made = 0
+    while True:
+        put_int(ctx, at.MADE, made)
         rest = remaining(ctx, end)
         if rest == 0.0:
             return at.DONE
@@ -324,8 +335,12 @@ def walk(ctx, times, out, end, budget):
             return outcome
         if abs(rest) < abs(get_float(ctx, at.H)) - CLOSE * abs(end):
             return at.DONE
+        if budget == 0:
+            return at.BUDGET
         take(ctx)
-        put_float(times, i, get_float(ctx, at.T0))
-        write(ctx, get_int(ctx, at.STATE), out + 8 * dim * i)
-    put_int(ctx, at.MADE, budget)
-    return at.BUDGET
+        put_float(times, made, get_float(ctx, at.T0))
+        write(ctx, get_int(ctx, at.STATE), out + 8 * dim * made)
+        made += 1
+        if made == budget:
+            put_int(ctx, at.MADE, made)
+            return at.BUDGET

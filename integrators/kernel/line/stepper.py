@@ -13,13 +13,14 @@ from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
 from integrators.one_thread import one_thread
+from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.line.program import LineProgram
 
-CHUNK = 1 << 12  # steps between two looks at Ctrl-C
+CHUNK = 1 << 12  # steps between two looks at Ctrl-C, at most
 
 STATE = ("y", "e", "previous", "reference", "active", "real")
 NUMBERS = (at.N, at.ACCEPTED)
@@ -71,6 +72,7 @@ class LineStepper:
             self._real[at.NEXT] = program.h or 0.0
             self._real[at.LIMIT] = np.inf
         self._status, self._reason = Status.RUNNING, ""
+        self._pace = Pace(CHUNK, y.size)
         self._call(at.RESET)
 
     @property
@@ -225,7 +227,8 @@ class LineStepper:
         watch = Crawl(self.t, float(times[-1]))
         while outcome == at.BUDGET and not crawl:
             before = int(self._count[at.STEPS])
-            outcome = self._call(what, between, times, targets, parts, made, out, CHUNK)
+            with self._pace:
+                outcome = self._call(what, between, times, targets, parts, made, out, self._pace.steps)
             made = int(self._count[at.MADE])
             if outcome == at.BUDGET and self._varying:
                 crawl = watch.sees(self.t, int(self._count[at.STEPS]) - before)
@@ -250,12 +253,13 @@ class LineStepper:
         outcome, steps, crawl = at.BUDGET, 0, ""
         watch = Crawl(self.t, end)
         while outcome == at.BUDGET and (limit is None or steps < limit) and not crawl:
-            n = limit or CHUNK
+            n = self._pace.steps if limit is None else min(limit - steps, self._pace.steps)
             if longest < np.inf:
                 n = 1
                 self._real[at.NEXT] = np.clip(self._real[at.NEXT], -longest, longest)
             times, out = np.empty(n), np.empty((n, self._m["y"].size))
-            outcome = self._call(at.WALK, at.SIDE, times, None, None, 0, out, n, end)
+            with self._pace:
+                outcome = self._call(at.WALK, at.SIDE, times, None, None, 0, out, n, end)
             made = int(self._count[at.MADE])
             steps += made
             pieces.append((times[:made], out[:made]))
