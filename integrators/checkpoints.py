@@ -9,7 +9,7 @@ from problems.problem import System
 
 @dataclass(frozen=True)
 class Identity:
-    """What a trajectory is one of; a checkpoint goes on in a stepper of the same only.
+    """The method, system and parameters of a trajectory; a checkpoint is restored only where they are equal.
 
     Attributes
     ----------

@@ -35,6 +35,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from problems import limits
 from problems.calls import Called
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
@@ -315,6 +316,47 @@ def check_start(t0: Any) -> float:
     if time.ndim or not np.isfinite(time):
         raise InputError(f"t0={shown(t0)} must be one finite number.")
     return float(time)
+
+
+def check_parameters(par: ArrayLike | None, system: System) -> Array:
+    """Return a parameter vector as a fresh array, the system's own by default, or refuse it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is not made of numbers, or not of the system's length.
+    """
+    own = system.pack()
+    if par is None:
+        return own
+    values = as_numbers("par", par)
+    if values.shape != own.shape:
+        raise InputError(f"par must have shape {own.shape}, not {values.shape}; see system.pack.")
+    return values.copy()
+
+
+def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: System) -> tuple[Array, Array]:
+    """Return a batch's starts (n, dim) and parameters (n, n_par) as fresh arrays, or refuse them.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If they are of other shapes or not finite, or if n trajectories at so many times take too much memory.
+    """
+    rows = np.atleast_2d(as_numbers("Y0", Y0))
+    if rows.ndim != 2 or rows.shape[0] == 0:
+        raise InputError(f"Y0 must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
+    n = rows.shape[0]
+    limits.check(f"a batch of {n} trajectories", "GIB", 8 * times.size * rows.size / 2**30)
+    starts = np.array([check_state(row, system.dim) for row in rows])
+    given = None if par is None else as_numbers("par", par)
+    if given is None or given.ndim == 1:
+        return starts, np.tile(check_parameters(given, system), (n, 1))
+    if given.shape != (n, system.n_par):
+        raise InputError(
+            f"par must have shape ({system.n_par},) or ({n}, {system.n_par}), not {given.shape}."
+        )
+    return starts, np.array(given, order="C")
 
 
 def check_state(y0: ArrayLike, dim: int) -> Array:

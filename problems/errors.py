@@ -2,6 +2,7 @@
 
 import math
 import re
+import reprlib
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -23,10 +24,19 @@ def shown(value: object, longest: int = 80) -> str:
     if isinstance(value, int) and abs(value) >= 10**20:
         return f"{'-' if value < 0 else ''}{large(abs(value))}"
     try:
-        text = re.sub(r" at 0x[0-9a-fA-F]+", "", " ".join(repr(value).split()))
+        text = re.sub(r" at 0x[0-9a-fA-F]+", "", " ".join(_brief(longest).repr(value).split()))
     except Exception:  # a value's own repr may fail
         text = f"something of type {type(value).__name__}"
     return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def _brief(longest: int) -> reprlib.Repr:
+    """Return what makes a text that begins as ``repr`` does and is not much longer than ``longest``."""
+    made = reprlib.Repr()
+    made.maxlist = made.maxtuple = made.maxdict = made.maxset = made.maxfrozenset = longest
+    made.maxdeque = made.maxarray = longest
+    made.maxstring = made.maxlong = made.maxother = 10 * longest
+    return made
 
 
 def large(number: int) -> str:

@@ -14,11 +14,11 @@ from problems.errors import InputError, large
 PREFIX = "HBVM_BENCH_MAX_"
 
 LIMITS = {
-    "COMPONENTS": (200_000, "components of the state"),  # 10 s to trace and compile as a loop
-    "TERMS": (2_000_000, "terms in one m.sum"),  # 5 s to read them
+    "COMPONENTS": (200_000, "components of the state"),  # 3 s to build and 1 s to compile as a loop
+    "TERMS": (2_000_000, "terms in one m.sum"),  # 1 s to read them
     "OPERATIONS": (10_000, "operations written out"),  # about a minute to compile
     "DEPTH": (1_000, "operations that wait for one another"),  # the same: all their values are kept
-    "STAGES": (256, "stages"),  # 3 s for the coefficients, ten for twice as many
+    "STAGES": (256, "stages"),  # 7 s for the coefficients, 20 s for twice as many
     "SAMPLES": (10_000_000, "samples"),
     "TRAJECTORIES": (10_000_000, "trajectories"),
     "CASES": (100_000, "cases"),

@@ -221,8 +221,5 @@ def declare(graph: Graph, term: Callable[..., Any], index: Iterable[Any]) -> Nod
     finally:
         graph.in_term = False
     if body.loop is None:  # the term does not depend on the index
-        total = body
-        for _ in range(len(rows) - 1):
-            total = total + body
-        return total
+        return graph.const(float(len(rows))) * body
     return graph.sum(body, loop)

@@ -55,7 +55,7 @@ class Event(Called):
         if _whole(self.direction) not in (-1, 0, 1):
             raise InputError(f"direction={shown(self.direction)} of an event must be 1, -1 or 0 (both).")
         object.__setattr__(self, "direction", _whole(self.direction))
-        last = _whole(self.terminal)
+        last = None if isinstance(self.terminal, float) else _whole(self.terminal)
         if last is None or not 0 <= last < 2**63:
             raise InputError(
                 f"terminal={shown(self.terminal)} of an event must be True, False, or a count >= 1."

@@ -21,10 +21,9 @@ from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import whole
 from integrators.pace import Pace
-from integrators.protocol import Array, Status, UserError, as_numbers, check_state, check_times
+from integrators.protocol import Array, Status, UserError, check_batch, check_times
 from integrators.trajectories import Trajectories
-from problems import limits
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 
 if TYPE_CHECKING:
     from integrators.kernel.program import HBVMProgram
@@ -71,9 +70,7 @@ def prepare_batch(
         raise unknown("sampling of a batch", sample, SAMPLINGS)
     threads = whole("a batch", "threads", threads)
     grid = check_times(times, t0)
-    rows = np.atleast_2d(as_numbers("Y0", Y0))
-    limits.check(f"a batch of {len(rows)} trajectories", "GIB", 8 * grid.size * rows.size / 2**30)
-    starts, parameters = _starts(program, rows, par)
+    starts, parameters = check_batch(Y0, par, grid, program.system)
     h = -program.h if grid[-1] < t0 else program.h
     bases = np.full(grid.size, t0)
     if sample == "land":
@@ -207,19 +204,3 @@ class _Work:
             result.y[i, words[layout.MADE] :] = np.nan
             result.t_stop[i] = t
             result.status[i], result.reason[i] = failure(int(words[layout.OUTCOME]), t, reals)
-
-
-def _starts(program: "HBVMProgram", rows: Array, par: ArrayLike | None) -> tuple[Array, Array]:
-    """Check starts and parameters; return them as arrays (n, dim) and (n, parameters)."""
-    if rows.ndim != 2 or rows.shape[0] == 0:
-        raise InputError(f"Y0 must have shape (n, {program.system.dim}) with n >= 1, not {rows.shape}.")
-    starts = np.array([check_state(row, program.system.dim) for row in rows])
-    given = None if par is None else as_numbers("par", par)
-    if given is None or given.ndim == 1:
-        return starts, np.tile(program.parameters(given), (starts.shape[0], 1))
-    if given.shape != (starts.shape[0], program.system.n_par):
-        raise InputError(
-            f"par must have shape ({program.system.n_par},) or ({starts.shape[0]}, {program.system.n_par}), "
-            f"not {given.shape}."
-        )
-    return starts, np.ascontiguousarray(given)

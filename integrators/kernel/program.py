@@ -14,7 +14,7 @@ from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Worksp
 from integrators.kernel.implicit.workspace import solver as implicit_solver
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.workspace import Context, Shape
-from integrators.protocol import Array, as_numbers, check_start, check_state
+from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
@@ -108,7 +108,8 @@ class HBVMProgram:
         problems.errors.InputError
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
-        return HBVMStepper(self, check_state(y0, self.system.dim), self.parameters(par), check_start(t0))
+        values = check_parameters(par, self.system)
+        return HBVMStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def batch(
         self,
@@ -159,22 +160,6 @@ class HBVMProgram:
             self._linearization = linearization(self.system, second=self.second)
             self.from_cache = self.from_cache and made.from_cache
         return Workspace(self.shape, self.solver.kind, self._linearization)
-
-    def parameters(self, par: ArrayLike | None) -> Array:
-        """Return a parameter vector as a fresh array; the system's own by default.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If it is not of the system's length.
-        """
-        values = self.system.pack()
-        if par is not None:
-            given = as_numbers("par", par)
-            if given.shape != values.shape:
-                raise InputError(f"par must have shape {values.shape}, not {given.shape}; see system.pack.")
-            values[:] = given
-        return values
 
     def scaled(self, h: float) -> dict[str, Array]:
         """Return the tables for steps of h, which may be negative."""

@@ -37,7 +37,7 @@ def _digest(name: str, content: bytes) -> bytes:
 
 
 def making(name: str) -> AbstractContextManager[None]:
-    """Return what only one process at a time passes for a key; see `problems.emit.cache.locked`."""
+    """Return a context that one process at a time enters for a key; see `problems.emit.cache.locked`."""
     return locked(directory() / "locks" / name)
 
 

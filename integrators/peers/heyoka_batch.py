@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from integrators.crawl import CRAWL_STEPS, Crawl
 from integrators.peers.options import load
-from integrators.protocol import Array, Status, as_numbers, check_state, check_times
+from integrators.protocol import Array, Status, check_batch, check_times
 from integrators.trajectories import Counts, Trajectories
-from problems import emit, limits
-from problems.errors import InputError
+from problems import emit
 from problems.system import System
 
 
@@ -48,11 +47,9 @@ class Lanes:
 
         See `integrators.peers.heyoka.TaylorProgram.prepare_batch`.
         """
-        given, parameters = self._given(starts, par)
         grid = check_times(times, t0)
+        given, parameters = check_batch(starts, par, grid, self.system)
         n = len(given)
-        gib = 8 * given.size * grid.size / 2**30
-        limits.check(f"a batch of {n} trajectories", "GIB", gib)
         result = Trajectories(
             t=grid,
             y=np.full((n, grid.size, self.system.dim), np.nan),
@@ -164,19 +161,3 @@ class Lanes:
         for values in (high, low, ta.state.T, ta.pars.T):
             values[idle] = values[twin]
         ta.set_dtime(high, low)
-
-    def _given(self, starts: ArrayLike, par: ArrayLike | None) -> tuple[Array, Array]:
-        rows = np.atleast_2d(as_numbers("Y0", starts))
-        if rows.ndim != 2 or rows.shape[0] == 0:
-            raise InputError(f"Y0 must have shape (n, {self.system.dim}) with n >= 1, not {rows.shape}.")
-        checked = np.array([check_state(row, self.system.dim) for row in rows])
-        default = self.system.pack({})
-        values = default if par is None else as_numbers("par", par)
-        if values.shape == default.shape:
-            return checked, np.tile(values, (len(checked), 1))
-        if values.shape != (len(checked), default.size):
-            raise InputError(
-                f"par must have shape {default.shape} or ({len(checked)}, {default.size}), "
-                f"not {values.shape}."
-            )
-        return checked, values

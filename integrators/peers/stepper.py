@@ -17,11 +17,12 @@ from integrators.protocol import (
     Samples,
     Stats,
     Status,
+    check_parameters,
     check_start,
     check_state,
     check_times,
 )
-from problems.errors import InputError, unknown
+from problems.errors import unknown
 from problems.problem import System
 
 Stepped = TypeVar("Stepped", bound="PeerStepper")
@@ -49,12 +50,7 @@ class PeerProgram:
         problems.errors.InputError
             For a state or time that is not finite, or a wrong shape.
         """
-        default = self.system.pack({})
-        values = default if par is None else np.array(par, dtype=np.float64)
-        if values.shape != default.shape:
-            raise InputError(f"par must have shape {default.shape}, not {values.shape}.")
-        if not np.isfinite(t0):
-            raise InputError(f"t0 must be a finite number, not {t0!r}.")
+        values = check_parameters(par, self.system)
         return check_state(y0, self.system.dim), values, check_start(t0)
 
 
@@ -136,7 +132,7 @@ class PeerStepper:
             raise unknown(f"sampling of {type(self).__name__.removesuffix('Stepper')}", how, self.samplings)
         if how == "land" and self._is_ahead(times):
             return self._land_on(times)
-        grid = check_times(np.asarray(times, dtype=np.float64), self._t)
+        grid = check_times(times, self._t)
         dim = self._y.size
         if self._status.failed:
             return Samples(grid[:0], np.empty((0, dim)), self._status, self._reason)

@@ -50,8 +50,8 @@ FIELDS = (
     ("Iterations so far.", UINT64, "iterations", layout.ITERATIONS, None),
     ("Force evaluations so far.", UINT64, "evaluations", layout.EVALUATIONS, None),
     (
-        "Estimated local error of a step, relative to a body's velocity, beyond which the integration ends "
-        "with an error. Default is 1e-3; inf: never.",
+        "Estimated local error of a step, relative to the largest velocity that the first body sees, beyond "
+        "which the integration ends with an error. Default is 1e-3 (30 times that for s = 1); inf: never.",
         DOUBLE,
         "largest_error",
         layout.LARGEST_ERROR,
@@ -63,8 +63,8 @@ MESSAGES = {
     layout.UNKNOWN_METHOD: "HBVM needs whole numbers k >= s >= 1: set sim.integrator.k and sim.integrator.s.",
     layout.ROUGH: "HBVM solves to round-off, for smooth forces; a tree's are not: set sim.gravity = 'basic'.",
     layout.DIVERGED: "The iteration for a step of HBVM did not converge; take a smaller sim.dt.",
-    layout.UNRESOLVED: "A step of HBVM is too long for an encounter: its estimated error exceeds "
-    "sim.integrator.largest_error times a body's velocity; take a smaller sim.dt, or ias15.",
+    layout.UNRESOLVED: "A step of HBVM is too long: its estimated error exceeds "
+    "sim.integrator.largest_error times the bodies' velocity; take a smaller sim.dt, or ias15.",
 }
 
 # REBOUND keeps addresses of what is in here.

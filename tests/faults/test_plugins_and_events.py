@@ -34,7 +34,7 @@ FAULTS = (
     Fault(
         "REBOUND, a pericentre that the steps do not resolve",
         lambda: encounter(0.01),
-        r"too long for an encounter.* smaller sim\.dt.* t = 3\.1\d+, dt = 0\.01\.",
+        r"A step of HBVM is too long.* smaller sim\.dt.* t = 3\.1\d+, dt = 0\.01\.",
         RuntimeError,
     ),
     Fault(

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from problems import Hamiltonian, InputError, Problem, VectorField, load
+from problems import Hamiltonian, InputError, Problem, VectorField, emit, load
+from problems.errors import shown
 
 kept: list[Any] = []
 
@@ -336,3 +337,24 @@ def test_bad_input_is_refused_in_one_sentence(make: Callable[[], Any], said: str
     with pytest.raises(InputError, match=said) as raised:
         make()
     assert "\n" not in str(raised.value)
+
+
+def test_a_message_does_not_write_out_a_million_numbers_to_show_eighty_characters():
+    class Counted(float):
+        def __repr__(self):
+            written.append(self)
+            return "1.0"
+
+    written = []
+    assert shown([Counted(1.0)] * 1_000_000).startswith("[1.0, 1.0, ")
+    assert len(written) <= 100  # measured 80
+    assert shown({"b": (1, "x"), "a": None}) == "{'a': None, 'b': (1, 'x')}"
+    assert len(shown("x" * 1000)) == 80
+
+
+def test_a_term_without_the_index_is_its_multiple():
+    """Not one addition for each of them, which would be more operations than are compiled."""
+    system = Hamiltonian(
+        lambda q, p, m: p[0] ** 2 / 2 + m.sum(lambda i: q[0] ** 2, range(20_000)), dof=1, name="many"
+    )
+    assert emit.numpy(system, "field")(0.0, np.array([1.0, 0.0]), np.empty(0)).tolist() == [0.0, -40_000.0]

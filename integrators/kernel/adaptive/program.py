@@ -14,7 +14,7 @@ from integrators.kernel.program import HBVMProgram
 from integrators.kernel.tables import aligned
 from integrators.kernel.workspace import Context
 from integrators.legendre import legendre
-from integrators.protocol import check_start, check_state
+from integrators.protocol import check_parameters, check_start, check_state
 from problems.problem import System
 
 FIRST_RATE = 0.01
@@ -120,7 +120,8 @@ class AdaptiveProgram(HBVMProgram):
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
         """Return a stepper at ``t0``; as `HBVMProgram.start`."""
-        return AdaptiveStepper(self, check_state(y0, self.system.dim), self.parameters(par), check_start(t0))
+        values = check_parameters(par, self.system)
+        return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def context(self, *, side: bool = False) -> Context:
         """Return fresh memory for a trajectory, or for its partial steps."""

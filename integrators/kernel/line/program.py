@@ -15,7 +15,7 @@ from integrators.kernel.line.dependence import independent
 from integrators.kernel.line.stepper import LineStepper
 from integrators.kernel.program import blocks
 from integrators.legendre import tables
-from integrators.protocol import Array, check_start, check_state
+from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
@@ -93,11 +93,7 @@ class LineProgram:
         problems.errors.InputError
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
-        values = self.system.pack()
-        if par is not None:
-            if np.shape(par) != values.shape:
-                raise InputError(f"par must have shape {values.shape}, not {np.shape(par)}; see system.pack.")
-            values[:] = par
+        values = check_parameters(par, self.system)
         return LineStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def memory(self, y: Array, par: Array, t0: float) -> tuple[list[int], dict[str, Any]]:

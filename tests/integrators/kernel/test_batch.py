@@ -119,7 +119,7 @@ def test_a_batch_whose_members_have_all_failed_is_at_its_end():
     program = HBVMProgram(problems.load("kepler").system, k=8, s=4, h=0.1)
     started = perf_counter()
     batch = program.batch([[1.0, 0.0, 0.0, 0.0]] * 2, times=[0.5, 1e10])
-    assert perf_counter() - started < 10.0  # measured 0.01 s; a day before, 1e11 steps that nobody takes
+    assert perf_counter() - started < 10.0  # measured 0.06 s; 22 minutes if every step is counted
     assert [status.failed for status in batch.status] == [True, True]
     assert np.isfinite(batch.y[:, 0]).all()
 
