@@ -36,7 +36,7 @@ FIRST_STEP = 0.01
 because the choice by the field asks for an `ODETerm` and is given a wrapped one."""
 
 MOST_STEPS = 1 << 24
-"""Of a plain solve, some ten seconds: then it is taken for a failure, and run again under a watch."""
+"""Of a plain adaptive solve, some ten seconds: then it has failed, and runs again under a watch."""
 
 SHORTENED = 1e-6
 """A step shorter than wanted by this part was shortened, and not only rounded."""
@@ -266,7 +266,7 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
         return whole(jax.tree.map(lambda x: x[-1], solution.ys)), solution.solver_state
 
     def plain(tau: Any, end: Any, h: Any, y: Any, par: Any) -> Any:
-        return _plainly(terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize(), whole)
+        return _plainly(terms, solver, tau, end, h, parts(y), par, dx.ConstantStepSize(), whole, None)
 
     tau, y, par, n = np.float64(0.0), np.zeros(dim), np.zeros(n_par), np.int64(0)
     one = np.float64(1.0)
@@ -276,11 +276,12 @@ def _fixed(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
 
 
 def _plainly(
-    terms: Any, solver: Any, tau: Any, end: Any, dt: Any, y: Any, par: Any, controller: Any, whole: Any
-) -> Any:
+    terms: Any, solver: Any, tau: Any, end: Any, dt: Any, y: Any, par: Any, controller: Any, whole: Any,
+    most: int | None,
+) -> Any:  # fmt: skip
     solution = dx.diffeqsolve(
         terms, solver, tau, end, dt, y, args=par, stepsize_controller=controller,
-        max_steps=MOST_STEPS, adjoint=dx.ForwardMode(), throw=False,
+        max_steps=most, adjoint=dx.ForwardMode(), throw=False,
     )  # fmt: skip
     stats = solution.stats
     return (
@@ -341,7 +342,7 @@ def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Sol
 
     def plain(tau: Any, end: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
         control = dx.PIDController(rtol=rtol, atol=atol)
-        return _plainly(terms, solver, tau, end, FIRST_STEP, y, par, control, lambda y: y)
+        return _plainly(terms, solver, tau, end, FIRST_STEP, y, par, control, lambda y: y, MOST_STEPS)
 
     one, y, par = np.float64(1.0), np.zeros(dim), np.zeros(n_par)
     first = _compile(begin, one, y, par, one, one)

@@ -68,7 +68,7 @@ EDITED = {
 
 
 def ids():
-    identity._digest.cache_clear()
+    identity.digest_of.cache_clear()
     return [resolve(Case(problem="kepler", method=method)).id for method in (OURS, PEER)]
 
 
@@ -87,7 +87,7 @@ def stale(monkeypatch):
         return found
 
     yield edited
-    identity._digest.cache_clear()
+    identity.digest_of.cache_clear()
 
 
 def test_a_peers_case_outlives_a_change_of_the_kernel_and_ours_a_change_of_a_peer(stale):
