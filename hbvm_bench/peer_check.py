@@ -41,7 +41,7 @@ OVERHEAD = 2e-5
 """Seconds a call may take longer whatever its ratio, which is then that of a very short run."""
 
 DIFFERENCE = 1e-6
-"""Largest difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
+"""Most difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
 times where our adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
 over 1,500,000 steps; 0 where steps vary."""
 
