@@ -11,7 +11,7 @@ from hbvm_bench.laws import Law
 from hbvm_bench.measure import Measured, largest_distance, positions
 from hbvm_bench.starts import scaled
 from integrators.protocol import MethodBase, Program, Status
-from problems import measure
+from problems.analysis import invariants
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _errors(problem: Problem, start: Array, t: Array, y: Array) -> dict[str, Arr
     times = np.concatenate([[problem.t0], t])
     with np.errstate(all="ignore"):
         for name in problem.system.invariant_names:
-            values = measure.evaluate(
+            values = invariants.evaluate(
                 problem.system.function(f"invariant:{name}"), times, states, problem.par
             )
             gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])

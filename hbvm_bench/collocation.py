@@ -21,7 +21,7 @@ from hbvm_bench.extended import number, plus, row, times
 from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem
-from problems.system import System
+from problems.systems.base import System
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from hbvm_bench.reference import Reference
 from hbvm_bench.starts import cloud
 from hbvm_bench.timing import sampled
 from integrators.protocol import MethodBase, Program, Samples, Status
+from problems.analysis.invariants import evaluate
 from problems.errors import InputError
-from problems.measure import evaluate
 from problems.problem import Problem
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Double-double numbers inside numba: emitted source runs on them unchanged, with 32 digits.
 
-The same formulas as `problems.dd`, for compiled scalar code. A `Number` is an
+The same formulas as `problems.analysis.double_double`, for compiled scalar code. A `Number` is an
 unevaluated sum hi + lo; a `Row` views an array of shape (n, 2) as n of them, so
 that ``y[3]*y[3]`` in an emitted function means what it says. Only for references:
 no fused multiply-add, no fast math.
@@ -23,7 +23,7 @@ from numba.extending import (
     type_callable,
 )
 
-from problems import dd
+from problems.analysis import double_double
 
 _SPLITTER = 134217729.0  # 2**27 + 1
 
@@ -175,14 +175,14 @@ def sqrt(a):
 
 
 def _cut(fractions: list[Any]) -> tuple[tuple[float, float], ...]:
-    return tuple((float(p[0]), float(p[1])) for p in (dd._parts(f, 2) for f in fractions))
+    return tuple((float(p[0]), float(p[1])) for p in (double_double._parts(f, 2) for f in fractions))
 
 
-_EXP = _cut(dd._inverse_factorials(1, 1, 10, False))
-_SIN = _cut(dd._inverse_factorials(1, 2, 15, True))
-_COS = _cut(dd._inverse_factorials(0, 2, 16, True))
-_LN2 = dd._parts(dd._LN2, 4)
-_HALF_PI = dd._parts(dd._PI / 2, 4)
+_EXP = _cut(double_double._inverse_factorials(1, 1, 10, False))
+_SIN = _cut(double_double._inverse_factorials(1, 2, 15, True))
+_COS = _cut(double_double._inverse_factorials(0, 2, 16, True))
+_LN2 = double_double._parts(double_double._LN2, 4)
+_HALF_PI = double_double._parts(double_double._PI / 2, 4)
 
 
 @njit

@@ -7,11 +7,12 @@ import problems
 from hbvm_bench import engines
 from hbvm_bench.identity import make_problem
 from hbvm_bench.spec import parse_spec
-from problems import expression, inspection
+from problems.analysis import structure
+from problems.analysis.latex import latex
+from problems.catalogue import expression
 from problems.errors import InputError
-from problems.latex import latex
 from problems.problem import Problem
-from problems.system import System
+from problems.systems.base import System
 
 DEGREES = (1, 2, 3, 4, 5)  # of the methods for which k is given
 
@@ -100,13 +101,13 @@ def _problem(text: str) -> Problem | None:
 
 def _describe(name: str, system: System, problem: Problem) -> Findings:
     energy = "hamiltonian" in system.offered()
-    degree = inspection.degree(system, problem.par) if energy else None
+    degree = structure.degree(system, problem.par) if energy else None
     try:
         formula = latex(system) if energy else ""
     except InputError:
         formula = ""
     dof = system.dof
-    cyclic = inspection.cyclic(system) if dof is not None else []
+    cyclic = structure.cyclic(system) if dof is not None else []
     values: dict[str, Any] = {}
     offset = 0
     for key, default in system.parameters.items():
@@ -121,9 +122,9 @@ def _describe(name: str, system: System, problem: Problem) -> Findings:
         dimension=system.dim,
         separable=system.separable,
         degree=degree,
-        exact=() if degree is None else tuple((s, inspection.exact_k(degree, s)) for s in DEGREES),
+        exact=() if degree is None else tuple((s, structure.exact_k(degree, s)) for s in DEGREES),
         cyclic=tuple("q" if dof == 1 else f"q{place + 1}" for place in cyclic),
-        depends_on_time=inspection.depends_on_time(system),
+        depends_on_time=structure.depends_on_time(system),
         invariants=system.invariant_names,
         guards=system.guard_names,
         parameters=values,

@@ -20,8 +20,8 @@ import problems
 from hbvm_bench.identity import make_method
 from integrators.protocol import Status, Stepper
 from problems.errors import InputError, unknown
-from problems.hamiltonian import Hamiltonian, VectorField
 from problems.problem import Problem
+from problems.systems.hamiltonian import Hamiltonian, VectorField
 
 Array = NDArray[np.float64]
 

@@ -31,8 +31,8 @@ from hbvm_bench.table import seconds as in_words
 from hbvm_bench.timing import WARM_UP, Run
 from integrators.protocol import Array, Status
 from problems.errors import InputError
-from problems.hamiltonian import Hamiltonian
 from problems.problem import Problem
+from problems.systems.hamiltonian import Hamiltonian
 
 ALLOWED = 1.05
 """Largest median of the ratio harness over library."""
@@ -184,8 +184,8 @@ class PeerCheck(msgspec.Struct, frozen=True, kw_only=True):
 def digest() -> str:
     """Return the sha256 of the sources that a result depends on: this check's, and the adapters'."""
     adapters = {type(make_method(pair.method)).__module__ for pair in PAIRS}
-    lazily = {"integrators.peers.diffrax_steps", "integrators.peers.diffrax_solve"}
-    return digest_of(("hbvm_bench.peer_check", "problems.kepler", *sorted(adapters | lazily)))
+    lazily = {"integrators.peers.diffrax.steps", "integrators.peers.diffrax.solve"}
+    return digest_of(("hbvm_bench.peer_check", "problems.catalogue.kepler", *sorted(adapters | lazily)))
 
 
 def geodesic(t_end: float) -> Problem:

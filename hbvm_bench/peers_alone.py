@@ -14,7 +14,7 @@ import numpy as np
 from integrators.peers.options import load
 from integrators.protocol import Array, MethodBase
 from problems import emit
-from problems.jacobian import jacobian
+from problems.calculus.jacobian import jacobian
 from problems.problem import Problem
 
 
@@ -84,7 +84,7 @@ def heyoka_batch(problem: Problem, method: MethodBase, starts: Array) -> Script:
 def rebound(problem: Problem, method: Any) -> Script:
     """``sim.integrate(t_end)``: bodies under REBOUND's own gravity, or a particle under a compiled force."""
     library = load("rebound")
-    from integrators.peers.rebound_whfast512 import same_arithmetic
+    from integrators.peers.rebound.whfast512 import same_arithmetic
 
     bodies, dof = problem.system.bodies, problem.system.dim // 2
     force: Any = None if bodies else _force(problem)
@@ -149,7 +149,7 @@ def _force(problem: Problem) -> Any:
     import numba
     from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 
-    from integrators.peers.rebound_hooks import _pointer
+    from integrators.peers.rebound.hooks import _pointer
 
     kernel, par, dof = emit.numba(problem.system, "force"), problem.par, problem.system.dim // 2
     particles = load("rebound").Simulation._particles.offset // 8

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import integrators
 import problems
 from hbvm_bench.measure import position_error
+from problems.catalogue.pendulum import exact_state
 from problems.errors import unknown
-from problems.pendulum import exact_state
 from problems.problem import Problem
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from problems import emit
 from problems.errors import InputError, MissingLibraryError
 from problems.problem import Problem
-from problems.system import System
+from problems.systems.base import System
 
 Array = NDArray[np.float64]
 

@@ -33,7 +33,7 @@ from hbvm_bench.store import NAME, atomic, encode_series
 from integrators.integrate import Solution
 from integrators.protocol import Program, Status
 from problems.errors import InputError
-from problems.system import System
+from problems.systems.base import System
 
 COMPILED = "compiled"  # the file that says that compiling has ended
 NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case

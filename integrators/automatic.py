@@ -2,8 +2,8 @@
 
 import math
 
-from problems.inspection import degree, exact_k
-from problems.system import System
+from problems.analysis.structure import degree, exact_k
+from problems.systems.base import System
 
 FEW, MANY = 8, 16
 """Stages that the field takes at a time: fewer cost as much."""

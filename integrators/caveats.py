@@ -1,6 +1,6 @@
 """What a method cannot see, as sentences for `Solution.warnings`: the same for every method."""
 
-from problems.inspection import has_kinks
+from problems.analysis.structure import has_kinks
 from problems.problem import Problem, System
 
 FEWEST = 4  # nodes whose coefficients can show a kink

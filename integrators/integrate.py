@@ -21,8 +21,8 @@ from integrators.protocol import (
 )
 from problems import limits
 from problems.errors import InputError, shown
-from problems.foreign import Foreign
 from problems.problem import Problem
+from problems.systems.untraced import Foreign
 
 if TYPE_CHECKING:
     from integrators.events import Event, Occurrences

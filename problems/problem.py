@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import measure
+from problems.analysis import invariants
 from problems.calls import checked
 from problems.errors import InputError, shown
-from problems.hamiltonian import System, Value
-from problems.system import check_names
+from problems.systems.base import check_names
+from problems.systems.hamiltonian import System, Value
 
 Array = NDArray[np.float64]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -167,7 +167,7 @@ class Problem:
         dict of str to ndarray
             Shape (n,), or (n, k) for a vector; the energy first.
         """
-        return measure.invariants(self, y, t)
+        return invariants.invariants(self, y, t)
 
     def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return how far each invariant is from its value at the start, relative to its size there.
@@ -185,15 +185,15 @@ class Problem:
         -------
         dict of str to ndarray, shape (n,)
         """
-        return measure.errors(self, y, t)
+        return invariants.errors(self, y, t)
 
     def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
-        return measure.guards(self, y, t)
+        return invariants.guards(self, y, t)
 
     def velocity(self, y: ArrayLike) -> Array | None:
         """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
-        return measure.velocity(self, y)
+        return invariants.velocity(self, y)
 
 
 def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:
@@ -210,7 +210,7 @@ def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) ->
     if "p0" in names:
         return np.concatenate([q, _numbers("p0", given["p0"], system.dof)])
     v = _numbers("v0", given["v0"], system.dof)
-    return np.concatenate([q, measure.momentum(system, par, v)])
+    return np.concatenate([q, invariants.momentum(system, par, v)])
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -22,7 +22,7 @@ from hbvm_bench.race.accuracy import GOLDEN
 from hbvm_bench.records import decoded
 from hbvm_bench.store import atomic
 from integrators.protocol import Program, Status
-from problems import measure
+from problems.analysis import invariants
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -173,7 +173,7 @@ def signed_errors(problem: Problem, y0: Array, y: Array) -> Array:
     The difference is formed in double-double, before rounding.
     """
     states = np.vstack([y0[None], y]).T
-    (energy,) = measure.evaluate(problem.system.function("hamiltonian"), problem.t0, states, problem.par)
+    (energy,) = invariants.evaluate(problem.system.function("hamiltonian"), problem.t0, states, problem.par)
     difference = (energy.hi[1:] - energy.hi[0]) + (energy.lo[1:] - energy.lo[0])
     return difference / abs(float(energy.hi[0]))
 

@@ -10,8 +10,9 @@ import problems
 from hbvm_bench import engines, reference
 from hbvm_bench.gallery import pictures
 from hbvm_bench.store import write_all
-from problems import inspection, registry
-from problems.latex import latex
+from problems import registry
+from problems.analysis import structure
+from problems.analysis.latex import latex
 from problems.problem import Problem
 
 HEAD = """<!-- made by: hbvm-bench gallery docs -->
@@ -138,7 +139,7 @@ def _overview(loaded: dict[str, Problem]) -> str:
     ]
     for name, problem in loaded.items():
         system = problem.system
-        degree = inspection.degree(system, problem.par)
+        degree = structure.degree(system, problem.par)
         lines.append(
             f"| [{name}](#{name}) | {system.dim} | {'yes' if system.separable else 'no'} | "
             f"{'no' if degree is None else f'degree {degree}'} | "

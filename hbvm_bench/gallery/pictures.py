@@ -112,7 +112,7 @@ def _phase(ax: Any, problem: Problem, t: Array, y: Array) -> None:
 
 
 def _triangle(ax: Any, problem: Problem, t: Array, y: Array) -> None:
-    from problems.henon_heiles import SADDLES
+    from problems.catalogue.henon_heiles import SADDLES
 
     corners = np.array([*SADDLES, SADDLES[0]])
     ax.plot(corners[:, 0], corners[:, 1], color=MUTED, lw=0.8)

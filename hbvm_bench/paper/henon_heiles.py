@@ -12,7 +12,7 @@ from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
-from problems.henon_heiles import henon_heiles, inside_triangle
+from problems.catalogue.henon_heiles import henon_heiles, inside_triangle
 
 H, T_END = 1.0, 5e4
 GAUSS = Gauss(s=2, h=H)

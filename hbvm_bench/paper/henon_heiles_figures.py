@@ -13,7 +13,7 @@ from hbvm_bench.report.canvas import Picture, drawing, log_axis, power_label
 from hbvm_bench.report.figures import envelope
 from hbvm_bench.report.style import INK, MUTED, PAPER
 from integrators.protocol import Array
-from problems.henon_heiles import ESCAPE, SADDLES
+from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
 LEVELS = (0.02, 0.05, 0.08, 0.11, 0.14, ESCAPE)
 LABELLED = (math.radians(162), math.radians(34))  # directions from the origin, alternating

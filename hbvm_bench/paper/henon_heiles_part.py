@@ -12,7 +12,7 @@ from hbvm_bench.paper.document import Claim, Part, Table, number
 from hbvm_bench.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
 from hbvm_bench.paper.tasks import Results, Task
 from integrators.protocol import Array
-from problems.henon_heiles import ESCAPE, SADDLES
+from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
 PRINTED = 7000.0  # the paper's escape time, "t ≃ 7000"
 CHUNKS = 4

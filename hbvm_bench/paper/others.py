@@ -10,8 +10,8 @@ from hbvm_bench.paper import henon_heiles, period_annulus, sitnikov
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
 from problems import Problem, load
+from problems.catalogue.henon_heiles import beyond_triangle
 from problems.errors import InputError
-from problems.henon_heiles import beyond_triangle
 
 # Every family has the same number of settings here: one, chosen by us for accuracy; and
 # the paper's two methods, at the paper's steps. heyoka's compact mode compiles in less

@@ -11,7 +11,7 @@ from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
 from problems import emit
-from problems.period_annulus import C_STAR, H_STAR, P1, period_annulus
+from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, period_annulus
 
 TOLERANCE = 2.0**-52
 SPAN, SHORT_SPAN = 2500.0, 100.0

@@ -9,7 +9,7 @@ from hbvm_bench.paper.period_annulus import SPAN, energy
 from hbvm_bench.report.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.style import INK, MUTED, TRUTH
 from integrators.protocol import Array
-from problems.period_annulus import H_STAR, P1
+from problems.catalogue.period_annulus import H_STAR, P1
 
 LEVELS = (0.005, 0.02, 0.04, 0.06, 0.08, H_STAR, 0.1, 0.12, 0.15)
 Path = tuple[Array, Array]

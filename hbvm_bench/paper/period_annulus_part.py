@@ -14,7 +14,7 @@ from hbvm_bench.paper.tasks import Results, Task
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from problems import emit
-from problems.period_annulus import C_STAR, H_STAR, P1, P2
+from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 C_STAR_DIGITS = "0.37570559292634522367"
 FATE_METHODS = (Gauss(s=2, h=1.0), Gauss(s=2, h=0.5), Gauss(s=4, h=0.5), HBVM(k=5, s=2, h=1.0))

@@ -13,8 +13,8 @@ from integrators.legendre import legendre
 from integrators.protocol import Array, MethodBase
 from integrators.tableau import tableau
 from problems import Problem, emit
-from problems.henon_heiles import henon_heiles
-from problems.period_annulus import period_annulus
+from problems.catalogue.henon_heiles import henon_heiles
+from problems.catalogue.period_annulus import period_annulus
 
 DEGREES = (1, 2, 3, 4, 5)
 BIG = 24  # more nodes than any degree here needs

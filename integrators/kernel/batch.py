@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.grid import Counts, plan
 from integrators.kernel import engine, layout
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import whole
 from integrators.pace import Pace
 from integrators.protocol import Array, Status, UserError, check_batch, check_times
+from integrators.times import Counts, plan
 from integrators.trajectories import Trajectories
 from problems.errors import unknown
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from integrators.kernel import native, store
 from problems import emit
-from problems.system import System
+from problems.systems.base import System
 
 ON_LANES, ONE_BY_ONE = "L", "S"
 Arguments = list[tuple[Any, str]]

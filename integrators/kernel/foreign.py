@@ -16,8 +16,8 @@ import numpy as np
 from integrators.kernel import native
 from integrators.kernel.field import ONE_BY_ONE, compile_field
 from integrators.protocol import UserError
-from problems.foreign import Foreign
-from problems.system import System
+from problems.systems.base import System
+from problems.systems.untraced import Foreign
 
 
 class _Raised(threading.local):

@@ -5,7 +5,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.grid import Counts
 from integrators.kernel import engine, layout, native, tables
 from integrators.kernel import field as fields
 from integrators.kernel.batch import Batch, prepare_batch
@@ -15,6 +14,7 @@ from integrators.kernel.implicit.workspace import solver as implicit_solver
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.workspace import Context, Shape
 from integrators.protocol import Array, check_parameters, check_start, check_state
+from integrators.times import Counts
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System

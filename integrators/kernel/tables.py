@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from integrators.kernel import layout as at
 from integrators.kernel import native, store
-from problems.dd import DD
+from problems.analysis.double_double import DD
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,9 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     route = route_for(k, s, lanes)
     shapes = _shapes(k, s, route)
     name = store.key(
-        "tables", f"{k} {s} {second} {route}", native.sources("tables", "../legendre", "../../problems/dd")
+        "tables",
+        f"{k} {s} {second} {route}",
+        native.sources("tables", "../legendre", "../../problems/analysis/double_double"),
     )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):

@@ -11,10 +11,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.crawl import Crawl
 from integrators.peers.options import load, number
-from integrators.peers.stepper import PeerProgram, PeerStepper
 from integrators.protocol import Array, MethodBase, Status, UserError
+from integrators.stepping import PeerProgram, PeerStepper
+from integrators.watchdog import Crawl
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -128,7 +128,7 @@ class Radau(_SciPyMethod):
 
     Notes
     -----
-    The Jacobian is the traced system's own (`problems.jacobian`), as our implicit methods have
+    The Jacobian is the traced system's own (`problems.calculus.jacobian`), as our implicit methods have
     it; SciPy's finite differences where there is none. It is L-stable, so it damps oscillations:
     no method for conserving energy.
     """
@@ -150,7 +150,7 @@ class SciPyProgram(PeerProgram):
         super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
         from problems import emit
-        from problems.jacobian import jacobian
+        from problems.calculus.jacobian import jacobian
 
         started = perf_counter()
         self.method, self.solver = method, getattr(integrate, method.solver)

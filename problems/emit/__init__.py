@@ -11,16 +11,16 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from problems import limits
-from problems.differentiate import reachable
+from problems.calculus.functions import Function
+from problems.calculus.gradient import reachable
 from problems.emit import cache
 from problems.emit.array import jax_text, numpy_text
 from problems.emit.plan import SMALL, make_plan
 from problems.emit.scalar import numba_text
 from problems.emit.symbolic import heyoka_text
 from problems.errors import MissingLibraryError, unknown
-from problems.foreign import Foreign
-from problems.functions import Function
-from problems.hamiltonian import System
+from problems.systems.hamiltonian import System
+from problems.systems.untraced import Foreign
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)

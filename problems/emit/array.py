@@ -4,8 +4,8 @@ import numpy as np
 
 from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
 from problems.emit.text import Printer
-from problems.sums import Affine, Loop
-from problems.tracing import FUNCTIONS, Node
+from problems.trace.graph import FUNCTIONS, Node
+from problems.trace.sums import Affine, Loop
 
 _PREFIX = {"y": "y", "par": "c", "out": "a"}
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.differentiate import LoopTerm, Term, reachable
+from problems.calculus.functions import Function
+from problems.calculus.gradient import LoopTerm, Term, reachable
 from problems.emit.rewrite import Rewriter, body_of
-from problems.functions import Function
-from problems.sums import Loop
-from problems.tracing import Graph, Node
+from problems.trace.graph import Graph, Node
+from problems.trace.sums import Loop
 
 # Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
 SMALL = 700

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from problems.differentiate import reachable
-from problems.sums import Affine, Loop
-from problems.tracing import Graph, Node
+from problems.calculus.gradient import reachable
+from problems.trace.graph import Graph, Node
+from problems.trace.sums import Affine, Loop
 
 
 def body_of(roots: Sequence[Node], loop: Loop) -> list[Node]:

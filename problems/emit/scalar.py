@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.differentiate import LoopTerm
+from problems.calculus.gradient import LoopTerm
 from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
 from problems.emit.text import Printer
-from problems.sums import Affine, Loop
-from problems.tracing import Node
+from problems.trace.graph import Node
+from problems.trace.sums import Affine, Loop
 
 FUNCTIONS = {
     "sqrt": "sqrt",

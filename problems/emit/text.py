@@ -1,6 +1,6 @@
 """Expressions as Python text, shared by all emitters."""
 
-from problems.tracing import Node
+from problems.trace.graph import Node
 
 _SUM, _PRODUCT, _LEAF = 1, 2, 3
 _OPERATORS = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}

@@ -5,7 +5,7 @@ import pytest
 
 from hbvm_bench.paper import henon_heiles as experiment
 from hbvm_bench.paper.henon_heiles_part import kept
-from problems.henon_heiles import ESCAPE, SADDLES
+from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
 
 @pytest.fixture(scope="module")

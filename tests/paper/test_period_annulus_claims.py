@@ -7,7 +7,7 @@ from hbvm_bench.paper import period_annulus as experiment
 from hbvm_bench.paper.period_annulus import DEGREES, PRINTED, STEPS
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
-from problems.period_annulus import C_STAR, H_STAR, P1, P2
+from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 
 @pytest.fixture(scope="module")

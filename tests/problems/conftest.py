@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import problems
-from problems import Hamiltonian, System, VectorField, sitnikov
+from problems import Hamiltonian, System, VectorField
+from problems.catalogue import sitnikov
 
 
 @pytest.fixture(scope="session", autouse=True)

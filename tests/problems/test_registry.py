@@ -32,9 +32,9 @@ def offered(monkeypatch):
 
 def test_a_name_that_two_offer_is_refused_with_both(offered):
     offered += [
-        entry("kepler", "problems.kepler:kepler", "hbvm-bench"),
+        entry("kepler", "problems.catalogue.kepler:kepler", "hbvm-bench"),
         entry("kepler", "guest.orbits:kepler", "hbvm-guest"),
-        entry("pendulum", "problems.pendulum:pendulum", "hbvm-bench"),
+        entry("pendulum", "problems.catalogue.pendulum:pendulum", "hbvm-bench"),
     ]
     with pytest.raises(InputError, match=r"offered by hbvm-bench \(.*\) and hbvm-guest \(.*\); un"):
         registry.load("kepler")
@@ -43,5 +43,5 @@ def test_a_name_that_two_offer_is_refused_with_both(offered):
 
 
 def test_the_same_problem_found_twice_is_one(offered):
-    offered += [entry("pendulum", "problems.pendulum:pendulum", "hbvm-bench")] * 2
+    offered += [entry("pendulum", "problems.catalogue.pendulum:pendulum", "hbvm-bench")] * 2
     assert registry.load("pendulum").system.name == "pendulum"

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.crawl import Crawl
 from integrators.kernel import layout
 from integrators.kernel.adaptive import engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper
 from integrators.one_thread import one_thread
 from integrators.options import SHORTEST
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_times
+from integrators.watchdog import Crawl
 from problems.errors import unknown
 
 if TYPE_CHECKING:

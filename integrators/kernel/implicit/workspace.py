@@ -15,9 +15,9 @@ from integrators.kernel.implicit.factors import Factors
 from integrators.kernel.tables import aligned, packed
 from integrators.kernel.workspace import Shape
 from problems import emit
+from problems.calculus.jacobian import Jacobian, jacobian
 from problems.errors import InputError
-from problems.jacobian import Jacobian, jacobian
-from problems.system import System
+from problems.systems.base import System
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

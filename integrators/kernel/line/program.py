@@ -19,7 +19,7 @@ from integrators.protocol import Array, check_parameters, check_start, check_sta
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
-from problems.tracing import T
+from problems.trace.graph import T
 
 
 class LineProgram:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
-from integrators.crawl import Crawl
-from integrators.grid import Counts, plan
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
 from integrators.one_thread import one_thread
 from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
+from integrators.times import Counts, plan
+from integrators.watchdog import Crawl
 from problems.errors import unknown
 
 if TYPE_CHECKING:

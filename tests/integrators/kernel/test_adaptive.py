@@ -27,7 +27,7 @@ def kepler(revolutions, e=0.6):
 
 
 def position_error(problem, solution):
-    exact = problems.kepler.solution(problem, solution.t[-1:])[0]
+    exact = problems.catalogue.kepler.solution(problem, solution.t[-1:])[0]
     return np.abs(solution.y[-1] - exact).max()
 
 
@@ -92,7 +92,7 @@ def test_steps_add_up_to_the_times_they_are_at():
     program = HBVM(tol=1e-10).compile(problem.system)
     stepper = program.start(problem.y0, problem.par, 0.0)
     steps = stepper.advance([0.0, problem.t_end], sample="steps")
-    exact = problems.kepler.solution(problem, steps.t)
+    exact = problems.catalogue.kepler.solution(problem, steps.t)
     assert np.abs(steps.y - exact).max() < 1e-7  # measured 1.6e-10
     assert steps.t[-1] <= problem.t_end
     assert steps.t.size == stepper.stats.steps + 1

@@ -2,8 +2,8 @@ import pytest
 import rebound
 
 import integrators.testing as testing
-from integrators.peers.diffrax import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
-from integrators.peers.heyoka import Taylor
+from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
 from integrators.peers.scipy import DOP853, Radau
 

@@ -6,9 +6,9 @@ import pytest
 
 import integrators.testing as testing
 from integrators import Status, integrate
-from integrators.peers import diffrax_solve
-from integrators.peers.diffrax import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
-from integrators.peers.heyoka import Taylor
+from integrators.peers.diffrax import solve
+from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.heyoka.taylor import Taylor
 from problems import Hamiltonian, Problem, emit
 
 FIXED = [SemiImplicitEuler, LeapfrogMidpoint, ReversibleHeun, Dopri8]
@@ -107,7 +107,7 @@ def test_evaluations_are_what_is_evaluated(solver):
     split = solver is SemiImplicitEuler
     oscillator = counted(lambda t, y, par: jnp.stack([y[1], -y[0]]))
     halves = dx.ODETerm(lambda t, p, par: p), counted(lambda t, q, par: -q)
-    made = diffrax_solve._fixed(halves if split else oscillator, getattr(dx, solver.__name__)(), 2, 0, split)
+    made = solve._fixed(halves if split else oscillator, getattr(dx, solver.__name__)(), 2, 0, split)
     y, par, tau = np.array([1.0, 0.0]), np.zeros(0), np.float64(0.0)
     state = made.begin.call(tau, y, par)
     counts = []
@@ -182,7 +182,7 @@ def test_an_end_is_met_by_diffeqsolve_alone(method):
 
 
 def test_a_plain_solve_that_does_not_arrive_is_run_again_under_a_watch(monkeypatch):
-    monkeypatch.setattr(diffrax_solve, "MOST_STEPS", 5)
+    monkeypatch.setattr(solve, "MOST_STEPS", 5)
     system = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 - 1.5 * m.cos(q[0]), dof=1, name="watched")
     problem = Problem(system, q0=[1.0], p0=[0.0], t_end=9.0)
     program, end = Dopri8(rtol=1e-9, atol=1e-9).compile(system), np.array([9.0])

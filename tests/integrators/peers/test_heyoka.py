@@ -6,7 +6,7 @@ import pytest
 import integrators.testing as testing
 import problems
 from integrators import Status, integrate
-from integrators.peers.heyoka import COLD, EPS, Taylor
+from integrators.peers.heyoka.taylor import COLD, EPS, Taylor
 from problems import Problem, VectorField
 from problems.errors import InputError
 

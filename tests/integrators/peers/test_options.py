@@ -8,8 +8,8 @@ import pytest
 
 import integrators.testing as testing
 from integrators import registry
-from integrators.peers.diffrax import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
-from integrators.peers.heyoka import Taylor
+from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
 from problems import Bodies, Hamiltonian, Problem, VectorField
@@ -174,8 +174,8 @@ def test_a_missing_library_is_named_with_its_remedy(method, module, monkeypatch)
 
 def test_importing_the_peers_imports_no_peer():
     code = (
-        "import sys, integrators.peers.heyoka, integrators.peers.rebound, integrators.peers.diffrax, "
-        "integrators.peers.scipy\n"
+        "import sys, integrators.peers.heyoka.taylor, integrators.peers.rebound\n"
+        "import integrators.peers.diffrax.methods, integrators.peers.scipy\n"
         "heavy = 'heyoka', 'rebound', 'jax', 'diffrax', 'numba', 'scipy.integrate'\n"
         "print([m for m in heavy if m in sys.modules])"
     )

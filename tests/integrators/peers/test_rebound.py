@@ -8,11 +8,11 @@ import rebound
 import integrators.testing as testing
 import problems
 from integrators import Status, integrate
-from integrators.peers.heyoka import Taylor
+from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
-from integrators.peers.rebound_fixed import COORDINATES, CORRECTORS, EVALUATIONS, KERNELS
-from integrators.peers.rebound_ias15 import MODES
-from integrators.peers.rebound_program import Layout
+from integrators.peers.rebound.fixed import COORDINATES, CORRECTORS, EVALUATIONS, KERNELS
+from integrators.peers.rebound.ias15 import MODES
+from integrators.peers.rebound.program import Layout
 from problems import Bodies, Hamiltonian, Problem
 
 

@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 import integrators.testing as testing
 import problems
 from integrators import Status, integrate
-from integrators.peers.heyoka import Taylor
+from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
 from problems import emit
-from problems.jacobian import jacobian
+from problems.calculus.jacobian import jacobian
 from problems.problem import Problem
 
 METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]

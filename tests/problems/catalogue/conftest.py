@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from problems import Problem
-from problems.differentiate import reachable
+from problems.calculus.gradient import reachable
 
 # Every problem of the catalogue, the large families small enough to be compiled by every engine.
 SMALL = {

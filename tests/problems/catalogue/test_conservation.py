@@ -5,7 +5,8 @@ import pytest
 
 import integrators
 import problems
-from problems import inspection, registry
+from problems import registry
+from problems.analysis import structure
 
 # A step at which HBVM(16, 8) resolves the problem, and the largest energy error measured in 400 steps.
 STEPS = {
@@ -66,7 +67,7 @@ def test_energy_stays_at_rounding(name):
 )
 def test_polynomial_energies_need_k_of_half_the_degree_times_s(name, h):
     problem = problems.load(name)
-    k = inspection.exact_k(inspection.degree(problem.system, problem.par), 2)
+    k = structure.exact_k(structure.degree(problem.system, problem.par), 2)
     times = np.arange(0, 101) * h
     exact = integrators.integrate(problem, integrators.HBVM(k=k, s=2, h=h), times=times)
     less = integrators.integrate(problem, integrators.HBVM(k=k - 1, s=2, h=h), times=times)

@@ -9,9 +9,11 @@ import pytest
 
 import integrators
 import problems
-from problems import emit, given, kepler, molecules, pendulum, period_annulus, solar_system, three_bodies
+from problems import emit
+from problems.catalogue import _given as given
+from problems.catalogue import kepler, molecules, pendulum, period_annulus, solar_system, three_bodies
+from problems.catalogue.henon_heiles import SADDLES, beyond_triangle, inside_triangle
 from problems.errors import InputError
-from problems.henon_heiles import SADDLES, beyond_triangle, inside_triangle
 
 
 def _satisfies(problem, exact, slope):

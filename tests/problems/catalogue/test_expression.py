@@ -12,7 +12,10 @@ import integrators
 import problems
 from hbvm_bench import campaign, runner
 from hbvm_bench.identity import make_problem
-from problems import emit, expression, formula, inspection
+from problems import emit
+from problems.analysis import structure
+from problems.catalogue import _formula as formula
+from problems.catalogue import expression
 from problems.errors import InputError
 
 _watched: list[str] | None = None
@@ -214,7 +217,7 @@ def test_powers_bind_as_in_mathematics():
 
 def test_time_and_parameters_and_invariants_can_be_given_as_text():
     driven = expression.hamiltonian("p^2/2 - cos(q) + a*q*sin(t)", parameters={"a": 0.1})
-    assert inspection.depends_on_time(driven)
+    assert structure.depends_on_time(driven)
     assert driven.invariant_names == ()
     central = expression.hamiltonian(
         "(p1^2 + p2^2)/2 - 1/sqrt(q1^2 + q2^2)", invariants={"turn": "q1*p2 - q2*p1"}

@@ -5,7 +5,7 @@ import numpy as np
 import sympy
 
 from problems import emit
-from problems.differentiate import reachable
+from problems.calculus.gradient import reachable
 
 STATES = 3
 

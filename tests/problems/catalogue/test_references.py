@@ -9,8 +9,8 @@ import pytest
 import problems
 from hbvm_bench import collocation, reference, trusted
 from hbvm_bench.identity import make_problem
-from problems import kepler, molecules, pendulum
-from problems.differentiate import reachable
+from problems.calculus.gradient import reachable
+from problems.catalogue import kepler, molecules, pendulum
 from problems.errors import InputError
 
 STORED = sorted(path.stem for path in reference.folder().glob("*.json"))

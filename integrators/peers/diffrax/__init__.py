@@ -1,0 +1,1 @@
+"""diffrax's solvers behind the stepper protocol."""

@@ -1,0 +1,232 @@
+"""diffrax's symplectic and reversible solvers, and Dopri8, on the CPU in double precision."""
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from integrators.peers.options import UNTRACED, number
+from integrators.protocol import MethodBase
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+if TYPE_CHECKING:
+    from integrators.peers.diffrax.steps import DiffraxProgram
+
+NO_FMA = ("xla_cpu_max_isa=AVX ", "xla_cpu_max_isa=SSE4_2 ")
+"""Settings of XLA_FLAGS, followed by a space, with which XLA has no instruction that fuses."""
+
+KIDGER = """\
+@phdthesis{Kidger2021,
+  author = {Kidger, Patrick},
+  title = {On Neural Differential Equations},
+  school = {University of Oxford},
+  year = {2021}
+}
+"""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DiffraxMethod(MethodBase):
+    """What diffrax's methods share.
+
+    ``stats.extra["compile_seconds"]`` counts what had to be compiled after
+    `compile`: integrating backwards in time needs code of its own. The plain solve of ``"end"`` is compiled
+    when it is first asked for; whoever times it runs it once before.
+    """
+
+    evaluations: ClassVar[int]
+    library = "diffrax"
+    to_end = "end"
+    citation = KIDGER
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Return None, or why not."""
+        return self.refuses(problem.system) if problem.system.traced else UNTRACED
+
+    def refuses(self, system: System) -> str | None:
+        """Return why the method cannot integrate ``system``, or None."""
+        return None
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Say that XLA's contractions break a symmetry that rounding would keep."""
+        if not problem.system.guard_names or any(
+            isa in f"{os.environ.get('XLA_FLAGS', '')} " for isa in NO_FMA
+        ):
+            return None
+        return (
+            "JAX's compiler fuses multiplications with additions, which rounds mirror images differently and "
+            "breaks the problem's symmetry; XLA_FLAGS=--xla_cpu_max_isa=AVX in the environment prevents it."
+        )
+
+    def compile(self, system: System) -> "DiffraxProgram":
+        """Have JAX compile the solve for ``system``."""
+        from integrators.peers.diffrax.steps import DiffraxProgram
+
+        return DiffraxProgram(system, self)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SemiImplicitEuler(DiffraxMethod):
+    """diffrax's semi-implicit Euler method, its only symplectic one: q from p, then p from the new q.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0.
+    """
+
+    h: float
+
+    evaluations = 1
+    family = "splitting"
+
+    def __post_init__(self) -> None:
+        number(self, "h")
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 1
+
+    def refuses(self, system: System) -> str | None:
+        """Return None for H = sum of c p^2/2 + V(q, t), else the reason."""
+        if system.separable:
+            return None
+        return (
+            "it needs a separable Hamiltonian, H = sum of c p^2/2 + V(q, t), to take q' from p and p' from q."
+        )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LeapfrogMidpoint(DiffraxMethod):
+    """diffrax's leapfrog/midpoint method, y_{n+1} = y_{n-1} + 2 h f(y_n): order 2, not symplectic.
+
+    A sample between steps uses the same formula with a shorter last step.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0.
+    """
+
+    h: float
+
+    evaluations = 1
+    family = "multistep"
+    citation = (
+        KIDGER
+        + """\
+@article{Shampine2009,
+  author = {Shampine, L. F.},
+  title = {Stability of the leapfrog/midpoint method},
+  journal = {Applied Mathematics and Computation},
+  volume = {208},
+  number = {1},
+  pages = {293--298},
+  year = {2009}
+}
+"""
+    )
+
+    def __post_init__(self) -> None:
+        number(self, "h")
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 2
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ReversibleHeun(DiffraxMethod):
+    """diffrax's reversible Heun method: order 2, algebraically reversible in its pair of states.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0.
+    """
+
+    h: float
+
+    evaluations = 1
+    family = "reversible"
+    citation = (
+        KIDGER
+        + """\
+@inproceedings{KidgerFosterLiLyons2021,
+  author = {Kidger, Patrick and Foster, James and Li, Xuechen and Lyons, Terry},
+  title = {Efficient and Accurate Gradients for Neural {SDE}s},
+  booktitle = {Advances in Neural Information Processing Systems},
+  year = {2021}
+}
+"""
+    )
+
+    def __post_init__(self) -> None:
+        number(self, "h")
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 2
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Dopri8(DiffraxMethod):
+    """diffrax's Runge-Kutta method of order 8(7) of Prince and Dormand, at a fixed step or adaptive.
+
+    Give either ``h`` or both tolerances.
+
+    Parameters
+    ----------
+    h : float, optional
+        Length of a step, > 0.
+    rtol, atol : float, optional
+        Tolerances of diffrax's default (integral) controller.
+
+    Notes
+    -----
+    Adaptive: the last step before each sample is shortened onto it and the next is of
+    the length the controller wanted before (``"land"``); ``"steps"`` gives the
+    steps that are taken without samples.
+    """
+
+    h: float | None = None
+    rtol: float | None = None
+    atol: float | None = None
+
+    evaluations = 13
+    family = "runge-kutta"
+    citation = (
+        KIDGER
+        + """\
+@article{PrinceDormand1981,
+  author = {Prince, P. J. and Dormand, J. R.},
+  title = {High order embedded {Runge--Kutta} formulae},
+  journal = {Journal of Computational and Applied Mathematics},
+  volume = {7},
+  number = {1},
+  pages = {67--75},
+  year = {1981}
+}
+"""
+    )
+
+    def __post_init__(self) -> None:
+        tolerances = self.rtol is not None or self.atol is not None
+        if (self.h is None) != tolerances or (tolerances and (self.rtol is None or self.atol is None)):
+            raise InputError(
+                "Dopri8 needs either h, as in Dopri8(h=0.1), or both tolerances, as in "
+                f"Dopri8(rtol=1e-9, atol=1e-12), not h={self.h!r}, rtol={self.rtol!r}, atol={self.atol!r}."
+            )
+        if self.h is not None:
+            number(self, "h")
+        else:
+            number(self, "rtol", below=1.0)
+            number(self, "atol", strict=False)
+
+    @property
+    def order(self) -> int:
+        """Order of convergence."""
+        return 8

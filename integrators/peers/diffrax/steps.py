@@ -1,0 +1,262 @@
+"""Programs and trajectories of diffrax's solvers."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.peers.diffrax.methods import DiffraxMethod, Dopri8
+from integrators.peers.options import load
+from integrators.protocol import Array, Status, Stepper
+from integrators.stepping import FixedStepper, PeerProgram, PeerStepper
+from integrators.watchdog import CRAWL_STEPS, Crawl
+from problems.errors import InputError
+from problems.problem import System
+
+CHUNK = 1 << 18
+"""Fixed steps between two looks at Ctrl-C: so many that the 0.1 ms of a call into JAX is nothing."""
+
+
+class DiffraxProgram(PeerProgram):
+    """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
+
+    Compiled code is kept while the process lives; ``from_cache`` says whether it was there.
+    """
+
+    def __init__(self, system: System, method: DiffraxMethod):
+        super().__init__(system, method)
+        reason = method.refuses(system)
+        if reason is not None:
+            raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
+        load("diffrax", "diffrax", "jax")
+        from integrators.peers.diffrax import solve
+
+        self.method, self.solve = method, solve
+        self.adaptive = isinstance(method, Dopri8) and method.h is None
+        made, self.from_cache = self.made(1)
+        self.compile_seconds = 0.0 if self.from_cache else made.seconds
+
+    def made(self, sign: int) -> tuple[Any, bool]:
+        """Return the compiled solve for a direction of time, and whether it was there already."""
+        return self.solve.made(self.system, type(self.method).__name__, sign, self.adaptive)
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
+        """Return a stepper at ``t0``; see the protocol."""
+        arguments = self.arguments(y0, par, t0)
+        kind = AdaptiveStepper if self.adaptive else DiffraxStepper
+        return self.started(kind(self, *arguments), arguments[1])
+
+
+class _Direction:
+    """The compiled solve for one direction of time; what it cost to compile is noted with the statistics."""
+
+    def __init__(self, stepper: PeerStepper, program: DiffraxProgram, sign: int):
+        self.sign = sign
+        self.solve, known = program.made(sign)
+        if not known:
+            extra = stepper.stats.extra
+            extra["compile_seconds"] = extra.get("compile_seconds", 0.0) + self.solve.seconds
+
+    def plain(self, t: float, end: float, *rest: Any) -> Any:
+        """Solve plainly; see `integrators.peers.diffrax.solve.Solve.plain`."""
+        return self.solve.plain.call(np.float64(self.sign * t), np.float64(self.sign * end), *rest)
+
+
+class DiffraxStepper(FixedStepper):
+    """A trajectory with fixed steps; see `integrators.stepping.FixedStepper` for the sampling.
+
+    ``"end"`` is a plain ``diffeqsolve`` to each time, which begins anew there.
+    """
+
+    samplings = (*FixedStepper.samplings, "end")
+
+    def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
+        h = float(program.method.h)  # pyright: ignore[reportAttributeAccessIssue]
+        super().__init__(y, t, h)
+        self._program, self._par = program, par
+        self._restart(t, y, h)
+        self._stats.evaluations = 0
+
+    def _restart(self, t: float, y: Array, h: float) -> None:
+        self._way = _Direction(self, self._program, 1 if h > 0.0 else -1)
+        self._states, self._inner = y, None
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        if how != "end":
+            return super()._serve(grid, how)
+        self._towards(float(grid[-1]))
+        way, states = self._way, np.empty((grid.size, self._y.size))
+        t, y = self._t, self._y
+        for i, end in enumerate(grid.tolist()):
+            found, accepted, _, arrived = way.plain(t, end, np.float64(abs(self._h)), y, self._par)
+            t, y = end, np.asarray(found) if arrived else np.full(y.size, np.nan)
+            states[i] = y
+            self._stats.steps += int(accepted)
+            work = int(accepted) * self._program.method.evaluations
+            self._stats.evaluations = (self._stats.evaluations or 0) + work
+            self._t0, self._n, self._states, self._inner = t, 0, y, None
+            if not math.isfinite(y.sum()):
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
+
+    def _solve(self, base: float, h: float, n0: int, n1: int) -> tuple[Array, Any]:
+        sign = self._way.sign
+        if self._inner is None:
+            self._inner = self._way.solve.begin.call(np.float64(sign * base), self._states, self._par)
+        y, inner = self._way.solve.run.call(
+            np.float64(sign * base),
+            np.float64(sign * h),
+            np.int64(n0),
+            np.int64(n1),
+            self._states,
+            self._inner,
+            self._par,
+        )
+        return np.asarray(y), inner
+
+    def _march(self, count: int) -> None:
+        end = self._n + count
+        for n in range(self._n, end, CHUNK):
+            self._states, self._inner = self._solve(self._t0, self._h, n, min(n + CHUNK, end))
+        self._stats.evaluations = (self._stats.evaluations or 0) + count * self._program.method.evaluations
+
+    def _state(self) -> Array:
+        return self._states.copy()
+
+    def _aside(self, part: float) -> Array:
+        return self._solve(self._time(), part, 0, 1)[0]
+
+    def _shorten(self, part: float) -> None:
+        self._states, self._inner = self._solve(self._time(), part, 0, 1)
+        self._stats.evaluations = (self._stats.evaluations or 0) + self._program.method.evaluations
+
+    def _save_steps(self) -> Any:
+        # JAX's arrays are immutable.
+        return self._way, self._states, self._inner
+
+    def _load_steps(self, steps: Any) -> None:
+        self._way, self._states, self._inner = steps
+
+
+class AdaptiveStepper(PeerStepper):
+    """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
+
+    ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain
+    ``diffeqsolve`` to each time, which begins anew there.
+    """
+
+    samplings = ("land", "steps", "end")
+
+    def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
+        super().__init__(y, t)
+        self._program, self._par = program, par
+        self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)  # pyright: ignore[reportAttributeAccessIssue]
+        self._stats.rejections = self._stats.evaluations = 0
+        self._begin(1)
+
+    def _begin(self, sign: int) -> None:
+        self._way, self._inner = _Direction(self, self._program, sign), None
+
+    def _towards(self, end: float) -> None:
+        sign = 1 if end > self._t else -1
+        if sign != self._way.sign:
+            self._begin(sign)
+
+    def _advance(self, t: float, y: Array, end: float, limit: int) -> tuple[float, Array, int]:
+        """Solve from ``t`` to ``end`` in at most ``limit`` steps; return where it came and how it ended."""
+        sign = self._way.sign
+        if self._inner is None:
+            self._inner = self._way.solve.begin.call(np.float64(sign * t), y, self._par, *self._tolerances)
+        state, control, dt = self._inner
+        y, reached, state, control, dt, accepted, rejected, code = self._way.solve.run.call(
+            np.float64(sign * t),
+            np.float64(sign * end),
+            dt,
+            y,
+            state,
+            control,
+            np.int64(limit),
+            self._par,
+            *self._tolerances,
+        )
+        self._inner = state, control, dt
+        self._count(int(accepted), int(rejected))
+        reached, code, solve = sign * float(reached), int(code), self._program.solve
+        if code == solve.DT_MIN:
+            self._fail(
+                Status.STEP_UNDERFLOW,
+                reached,
+                f"diffrax's step fell below {solve.ULPS:g} ulp at t = {reached!r}.",
+            )
+        elif code == solve.OTHER:
+            self._fail(Status.NOT_FINITE, reached, f"diffrax ended without success at t = {reached!r}.")
+        return reached, np.asarray(y), code
+
+    def _count(self, accepted: int, rejected: int) -> None:
+        stats = self._stats
+        stats.steps += accepted
+        stats.rejections = (stats.rejections or 0) + rejected
+        work = (accepted + rejected) * self._program.method.evaluations
+        stats.evaluations = (stats.evaluations or 0) + work
+
+    def _ends(self, grid: Array) -> tuple[Array, Array]:
+        states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
+        for i, end in enumerate(grid.tolist()):
+            self._inner = None
+            found, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
+            if not arrived:  # why not is found out under a watch
+                _, y = self._watched(t, y, end, Crawl(t, end))
+                if self._status.failed:
+                    return grid[:i], states[:i]
+                found, accepted, rejected, self._inner = y, 0, 0, None
+            self._count(int(accepted), int(rejected))
+            t, y = end, np.asarray(found)
+            states[i] = y
+        return grid, states
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        self._towards(float(grid[-1]))
+        if how == "end":
+            return self._ends(grid)
+        states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
+        watch = Crawl(t, float(grid[-1]))
+        for i, end in enumerate(grid.tolist()):
+            t, y = self._watched(t, y, end, watch)
+            if self._status.failed:
+                return grid[:i], states[:i]
+            states[i] = y
+        return grid, states
+
+    def _watched(self, t: float, y: Array, end: float, watch: Crawl) -> tuple[float, Array]:
+        """Solve from ``t`` to ``end``, a limited number of steps at a time; note a failure."""
+        code = self._program.solve.LIMIT
+        while code == self._program.solve.LIMIT and t != end:
+            t, y, code = self._advance(t, y, end, CRAWL_STEPS)
+            if code == self._program.solve.LIMIT and (stalled := watch.sees(t, CRAWL_STEPS)):
+                self._fail(Status.STALLED, t, stalled)
+            if self._status.failed:
+                return t, y
+        return end, y
+
+    def _own_steps(self, end: float) -> tuple[Array, Array]:
+        self._towards(end)
+        times, states = [self._t], [self._y]
+        while times[-1] != end:
+            t, y, _ = self._advance(times[-1], states[-1], end, 1)
+            if self._status.failed:
+                break
+            times.append(t)
+            states.append(y)
+        return np.array(times[1:]), np.array(states).reshape(-1, self._y.size)[1:]
+
+    def _one(self) -> tuple[float, Array] | None:
+        t, y, _ = self._advance(self._t, self._y, math.copysign(math.inf, self._way.sign), 1)
+        return None if self._status.failed else (t, y)
+
+    def _save(self) -> Any:
+        # JAX's arrays are immutable.
+        return self._way, self._inner
+
+    def _load(self, inner: Any) -> None:
+        self._way, self._inner = inner

@@ -1,0 +1,313 @@
+"""heyoka's adaptive Taylor integrator."""
+
+import copy
+import os
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.caveats import unseen
+from integrators.peers.heyoka.batch import Lanes
+from integrators.peers.options import UNTRACED, flag, load, number
+from integrators.protocol import Array, MethodBase, Status
+from integrators.stepping import PeerProgram, PeerStepper
+from integrators.trajectories import Trajectories
+from integrators.watchdog import CRAWL_STEPS, Crawl
+from problems.problem import Problem, System
+
+EPS = float(np.finfo(np.float64).eps)
+
+COLD = "HBVM_BENCH_COLD_COMPILE"
+"""Environment variable: set to 1, heyoka compiles anew, using neither of its caches."""
+
+NEAR = 8
+"""Times its last step that a sample must be away for the compiled loop to be called."""
+
+CITATION = """\
+@article{BiscaniIzzo2021,
+  author = {Biscani, Francesco and Izzo, Dario},
+  title = {Revisiting high-order {Taylor} methods for astrodynamics and celestial mechanics},
+  journal = {Monthly Notices of the Royal Astronomical Society},
+  volume = {504},
+  number = {2},
+  pages = {2614--2628},
+  year = {2021},
+  doi = {10.1093/mnras/stab1032}
+}
+"""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Taylor(MethodBase):
+    """heyoka's Taylor integrator: adaptive step, order from the tolerance, compiled for the problem.
+
+    Parameters
+    ----------
+    tol : float
+        Tolerance, 0 < tol < 1; the order is ceil(1 - ln(tol)/2), so 20 by default.
+        heyoka's own default is the double's epsilon, 2.2e-16.
+    high_accuracy : bool
+        Compensated summation in evaluating the Taylor polynomials.
+    compact_mode : bool
+        Loops in place of unrolled code. heyoka's default is off, and so it is here.
+        Compile times without it grow fast: 0.5, 3 and 22 s for 3, 6 and 10 bodies,
+        against 0.2 s; from six bodies on, switch it on.
+    fast_math : bool
+        Let the compiler reorder and contract operations.
+
+    Notes
+    -----
+    The right-hand sides are the traced operations in the user's order. heyoka gives
+    the step's Taylor polynomial itself, so that a state between steps (``"side"``) is
+    what a partial step would give, bit for bit and at no loss of order, and the
+    sequence of steps does not depend on the samples. The step to a sample that is far ahead
+    is taken twice, for heyoka's compiled loop shortens its last one; these are counted apart,
+    in ``stats.extra["side_steps"]``. ``"land"`` shortens steps onto the samples, as
+    heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
+    """
+
+    tol: float = EPS
+    high_accuracy: bool = False
+    compact_mode: bool = False
+    fast_math: bool = False
+
+    library = "heyoka"
+    citation = CITATION
+    family = "taylor"
+    to_end = "land"
+
+    def __post_init__(self) -> None:
+        number(self, "tol", below=1.0)
+        flag(self, "high_accuracy", "compact_mode", "fast_math")
+
+    @property
+    def order(self) -> None:
+        """The order varies with the tolerance."""
+        return None
+
+    def accepts(self, problem: Problem) -> str | None:
+        """Accept every system that is traced."""
+        return None if problem.system.traced else UNTRACED
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Name a field that is not smooth: heyoka differentiates ``abs`` as if no step went over its kink."""
+        return unseen(problem, "a Taylor series from one side of a kink knows nothing of the other")
+
+    def compile(self, system: System) -> "TaylorProgram":
+        """Have heyoka compile the integrator for ``system``."""
+        return TaylorProgram(system, self)
+
+
+class TaylorProgram(PeerProgram):
+    """A heyoka integrator, compiled for one system; each start has a copy, or one that another is done with.
+
+    heyoka keeps compiled code in memory and on disk (``~/.cache/heyoka``).
+    ``from_cache`` is True where the code was found in memory, or the disk cache did
+    not grow; another process that compiles at the same moment can make it wrong.
+    """
+
+    def __init__(self, system: System, method: Taylor):
+        super().__init__(system, method)
+        hy = load("heyoka")
+        from problems import emit
+
+        started = perf_counter()
+        with _caches(hy) as use:
+            before = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
+            self.template = hy.taylor_adaptive(
+                emit.heyoka(system),
+                [0.0] * system.dim,
+                pars=system.pack({}).tolist(),
+                tol=method.tol,
+                high_accuracy=method.high_accuracy,
+                compact_mode=method.compact_mode,
+                fast_math=method.fast_math,
+            )
+            after = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
+        self.from_cache = use and (after[0] == before[0] or after[1] == before[1])
+        self.compile_seconds = perf_counter() - started
+        self._options = method.options(defaults=True)
+        self._lanes: Lanes | None = None
+        # Copying takes a millisecond, and a copy's code is not in the processor's caches yet: the first
+        # tenth of a millisecond would be slower than the library is.
+        self._spare: list[Any] = []
+
+    def batch(
+        self,
+        Y0: ArrayLike,
+        par: ArrayLike | None = None,
+        *,
+        times: ArrayLike,
+        t0: float = 0.0,
+    ) -> Trajectories:
+        """Integrate many starts to the same times by heyoka's batch integrator.
+
+        It is compiled when this is first called. Every lane has steps of its own; the
+        last one to each time is shortened onto it. A trajectory that fails or stalls has its
+        status, time and reason, and leaves the others alone.
+
+        Parameters
+        ----------
+        Y0 : array_like, shape (n, dim)
+            Starts.
+        par : array_like, shape (n_par,) or (n, n_par), optional
+            Parameters, for all or for each; the system's own by default.
+        times : array_like, shape (m,)
+            Times asked for, strictly monotone from ``t0``.
+        t0 : float
+            Time of the starts.
+        """
+        return self.prepare_batch(Y0, par, times=times, t0=t0)()
+
+    def prepare_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Callable[[], Trajectories]:
+        """Compile, check and allocate all that `batch` needs; return what then does it, once."""
+        if self._lanes is None:
+            self._lanes = Lanes(self.system, self._options)
+            self.compile_seconds += self._lanes.compile_seconds
+        return self._lanes.prepare(Y0, par, times, t0)
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "TaylorStepper":
+        """Return a stepper at ``t0``; see the protocol."""
+        arguments = self.arguments(y0, par, t0)
+        integrator = self._spare.pop() if self._spare else copy.copy(self.template)
+        stepper = TaylorStepper(integrator, *arguments)
+        weakref.finalize(stepper, self._spare.append, integrator).atexit = False
+        return self.started(stepper, arguments[1])
+
+
+@contextmanager
+def _caches(hy: Any) -> Iterator[bool]:
+    """Say whether heyoka may use its caches of compiled code, and see to it."""
+    if os.environ.get(COLD, "") in ("", "0"):
+        yield True
+        return
+    enabled = hy.llvm_state.get_diskcache_enabled()
+    hy.llvm_state.set_diskcache_enabled(False)
+    hy.llvm_state.clear_memcache()
+    try:
+        yield False
+    finally:
+        hy.llvm_state.set_diskcache_enabled(enabled)
+
+
+class TaylorStepper(PeerStepper):
+    """A trajectory of heyoka's; ``"side"`` (default), ``"steps"`` or ``"land"``, see `Taylor`."""
+
+    samplings = ("side", "steps", "land")
+
+    def __init__(self, integrator: Any, y: Array, par: Array, t: float):
+        super().__init__(y, t)
+        self._stats.extra["side_steps"] = 0
+        self._ta, self._sign, self._stepped = integrator, 1.0, False
+        self._outcome = load("heyoka").taylor_outcome
+        if par.size:
+            integrator.pars[:] = par
+        self._place(t, y)
+
+    def _place(self, t: float, y: Array) -> None:
+        self._ta.time = t
+        self._ta.state[:] = y
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        sign = self._towards(float(grid[-1]))
+        states = np.empty((grid.size, self._y.size))
+        for i, t in enumerate(grid.tolist()):
+            if not (self._land(t) if how == "land" else self._pass(t, sign)):
+                return grid[:i], states[:i]
+            states[i] = self._ta.state if self._ta.time == t else self._ta.update_d_output(t)
+        return grid, states
+
+    def _own_steps(self, end: float) -> tuple[Array, Array]:
+        sign = self._towards(end)
+        times, states = [self._t], [self._y]
+        while self._ta.time != times[-1] or self._step() is not None:
+            if sign * (self._ta.time - end) > 0.0:
+                break
+            times.append(self._ta.time)
+            states.append(self._ta.state.copy())
+        return np.array(times[1:]), np.array(states)[1:]
+
+    def _one(self) -> tuple[float, Array] | None:
+        if self._ta.time == self._t and self._step() is None:
+            return None
+        return self._ta.time, self._ta.state
+
+    def _towards(self, end: float) -> float:
+        """Return the sign of the direction to ``end``; a library that is ahead the other way comes back."""
+        sign = 1.0 if end > self._t else -1.0
+        if sign * (self._ta.time - self._t) < 0.0:
+            self._place(self._t, self._y)
+        self._sign = sign
+        return sign
+
+    def _step(self) -> float | None:
+        """Take one step and return its length, or note the failure and return ``None``."""
+        t = self._ta.time
+        outcome, h = (self._ta.step if self._sign > 0.0 else self._ta.step_backward)(write_tc=True)
+        if outcome == self._outcome.success:
+            self._stats.steps, self._stepped = self._stats.steps + 1, True
+            return abs(h)
+        self._broken(t)
+        return None
+
+    def _land(self, t: float, *, write_tc: bool = False) -> bool:
+        """Go to ``t`` by a shortened last step; return whether that succeeded."""
+        watch = Crawl(self._ta.time, t)
+        while True:
+            before = self._ta.time
+            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS, write_tc=write_tc)
+            self._stats.steps, self._stepped = self._stats.steps + steps, self._stepped or steps > 0
+            if outcome == self._outcome.time_limit:
+                return True
+            if outcome == self._outcome.err_nf_state:
+                self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
+            elif stalled := watch.sees(self._ta.time, steps):
+                self._fail(Status.STALLED, self._ta.time, stalled)
+            if self._status.failed:
+                return False
+
+    def _pass(self, t: float, sign: float) -> bool:
+        """Take own steps until one passes ``t``; return whether that succeeded.
+
+        heyoka's compiled loop shortens its last step to end at the time it is given, which would make
+        the steps depend on the samples. That one step is taken back and taken at its own length.
+        (`propagate_grid` will not do: it forgets the low part of heyoka's clock.)
+        """
+        ta = self._ta
+        while sign * (ta.time - t) < 0.0:
+            if not self._stepped or abs(t - ta.time) > NEAR * abs(ta.last_h):  # else last_h is another's
+                if not self._land(t, write_tc=True):
+                    return False
+                self._take_back()
+            if self._step() is None:
+                return False
+        return True
+
+    def _take_back(self) -> None:
+        """Go back to the start of the last step, whose state is the first of its Taylor coefficients."""
+        ta = self._ta
+        (high, low), h = ta.dtime, ta.last_h
+        start = high - h
+        back = start - high
+        lost = (high - (start - back)) - (h + back) + low  # what high - h was rounded by, and the low part
+        ta.state[:] = ta.tc[:, 0]
+        ta.dtime = start + lost, lost - ((start + lost) - start)
+        self._stats.steps -= 1
+        self._stats.extra["side_steps"] += 1
+
+    def _broken(self, t: float) -> None:
+        self._fail(Status.NOT_FINITE, t, f"heyoka met a state that is not finite in the step from t = {t!r}.")
+
+    def _save(self) -> Any:
+        return copy.copy(self._ta), self._sign, self._stepped
+
+    def _load(self, inner: Any) -> None:
+        self._ta, self._sign, self._stepped = copy.copy(inner[0]), *inner[1:]

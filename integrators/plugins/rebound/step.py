@@ -1,0 +1,324 @@
+"""A step of HBVM(k, s) as REBOUND calls it, compiled; imported only where it has to be compiled.
+
+The forces are REBOUND's own, ``reb_simulation_update_acceleration``: gravity of any
+kind but a tree's, softening, test particles, variational particles, additional forces.
+The equations are those of the second-order form,
+
+    Q_l = q + h c_l v + h^2 sum_m A2_lm a(t + c_l h, Q_m),    A2 = (I X_s) P' Omega,
+
+and velocities ``V_l = v + h sum_m A_lm a_m`` where forces depend on them. Nodes and
+weights come as hi + lo pairs, displacements are formed before the position is
+added, and positions and velocities carry along what their last addition rounded off.
+"""
+
+import numpy as np
+from numba import types
+
+from integrators.kernel import native
+from integrators.plugins.rebound import layout as at
+from integrators.plugins.rebound.memory import (
+    added,
+    compiled,
+    fma,
+    free,
+    gather,
+    matrix,
+    ready,
+    reals,
+    removed,
+    scatter,
+    small,
+    words,
+)  # fmt: skip
+
+FARTHEST = 2.0  # no extrapolation farther than this many previous steps
+MAX_ITERATIONS = 200
+CONVERGED = 1e-16
+STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
+ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
+PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION
+FLOOR = 1e-3  # of the largest size of all bodies: where rounding of the forces may hide a small one
+SECOND_ORDER = 30.0  # times the error allowed: of 20 steps a circle, each has one of 3e-3 of the velocity
+HALF_UNIT = 2.3e-16  # what an addition rounds off is no more than half of this, relative
+
+# Functions of REBOUND, and one of ours, that compiled code calls.
+_update = types.ExternalFunction("hbvm_rebound_update_acceleration", types.void(types.int64))
+_growth = types.ExternalFunction("hbvm_rebound_megno_rate", types.float64(types.int64))
+_add_growth = types.ExternalFunction(
+    "hbvm_rebound_megno_update", types.void(types.int64, types.float64, types.float64)
+)
+_fail = types.ExternalFunction("hbvm_rebound_fail", types.void(types.int64, types.int64))
+
+
+@compiled
+def copy(values, out):
+    """Set out = values; numba's own copy of arrays, which asks whether they overlap, takes memory."""
+    for i in range(values.shape[0]):
+        for d in range(values.shape[1]):
+            out[i, d] = values[i, d]
+
+
+@compiled
+def combine(table, row, forces, out):
+    """Set out = sum_m table[row, m] forces[m]."""
+    k, n = forces.shape
+    for i in range(n):
+        out[i] = table[row, 0] * forces[0, i]
+    for m in range(1, k):
+        weight = table[row, m]
+        for i in range(n):
+            out[i] = fma(weight, forces[m, i], out[i])
+
+
+@compiled
+def stages(table, h, q, base, forces, out, moved):
+    """Set out[l] = q + (base[l] + h (h sum_m table[l, m] forces[m]))."""
+    for i in range(forces.shape[0]):
+        combine(table, i, forces, moved)
+        for d in range(q.size):
+            out[i, d] = q[d] + (base[i, d] + h * (h * moved[d]))
+
+
+@compiled
+def velocities(table, h, v, rest, forces, out):
+    """Set out[l] = v + (rest + h sum_m table[l, m] forces[m])."""
+    for i in range(forces.shape[0]):
+        combine(table, i, forces, out[i])
+        for d in range(v.size):
+            out[i, d] = v[d] + (rest[d] + h * out[i, d])
+
+
+@compiled
+def extrapolate(ratio, nodes, into_modes, forces, out, weights):
+    """Set out[l] = the previous step's polynomial through ``forces`` at 1 + ratio c_l."""
+    k = forces.shape[0]
+    modes = into_modes.shape[0]
+    for i in range(k):
+        x = 1.0 + 2.0 * ratio * nodes[i]  # 2c - 1 at c = 1 + ratio * c_i
+        weights[:] = 0.0
+        before, legendre = 0.0, 1.0
+        for j in range(modes):
+            for m in range(k):
+                weights[0, m] += np.sqrt(2.0 * j + 1.0) * legendre * into_modes[j, m]
+            before, legendre = legendre, ((2 * j + 1) * x * legendre - j * before) / (j + 1)
+        combine(weights, 0, forces, out[i])
+
+
+@compiled
+def change(old, new, count):
+    """Largest change of a body over the stages, relative to its size, and to its floored size.
+
+    The first ``count`` bodies are real. Variational ones may overflow, as with
+    REBOUND's own integrators, and do not hold the others up then.
+    """
+    k, n = new.shape
+    strict, floored = 0.0, 0.0
+    for first, last in ((0, count), (count, n // 3)):
+        largest = 0.0
+        for i in range(k):
+            for d in range(3 * first, 3 * last):
+                largest = max(largest, abs(new[i, d]))
+        for b in range(first, last):
+            size, moved = 0.0, 0.0
+            for i in range(k):
+                for d in range(3 * b, 3 * b + 3):
+                    size = max(size, abs(new[i, d]))
+                    difference = abs(new[i, d] - old[i, d])
+                    if difference < np.inf:
+                        moved = max(moved, difference)
+                    elif b < count:
+                        return np.inf, np.inf
+            if moved > 0.0:
+                strict = max(strict, moved / size)
+                floored = max(floored, moved / max(size, FLOOR * largest))
+    return strict, floored
+
+
+@compiled
+def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
+    """Iterate until the stages are solved, work[k:2k] being first values; return whether they are."""
+    k = forces.shape[0]
+    number, clock = words(state, at.WORDS), reals(simulation, at.SIMULATION)
+    base, new, old, fast = work[:k], work[k : 2 * k], work[2 * k : 3 * k], work[3 * k : 4 * k]
+    flags = small(simulation, 2 * at.SIMULATION)
+    megno = flags[at.CALCULATE_MEGNO] != 0
+    depends = megno or flags[at.VELOCITY_DEPENDENT] != 0
+    bodies = words(simulation, at.SIMULATION)[at.COUNT]
+    best, stalled = np.inf, 0
+    for _ in range(MAX_ITERATIONS):
+        if depends:
+            velocities(table[6 + k : 6 + 2 * k], h, v, rest[1], forces, fast)
+        growth = 0.0
+        for i in range(k):
+            clock[at.TIME] = t + table[0, i] * h
+            scatter(simulation, 0, new[i])
+            if depends:
+                scatter(simulation, 3, fast[i])
+            _update(simulation)
+            gather(simulation, 6, forces[i])
+            if megno:
+                growth += 2.0 * table[2, i] * (clock[at.TIME] - clock[at.MEGNO_START]) * _growth(simulation)
+        reals(state, at.WORDS)[at.MEGNO] = h * growth
+        number[at.ITERATIONS] += 1
+        number[at.EVALUATIONS] += k
+        copy(new, old)
+        stages(table[6 : 6 + k], h, q, base, forces, new, work[4 * k])
+        strict, floored = change(old, new, bodies)
+        if not strict < np.inf:
+            return False
+        if strict <= CONVERGED:
+            return True
+        if strict < best:
+            best, stalled = strict, 0
+        else:
+            stalled += 1
+            if floored < (ROUNDING if stalled < PATIENCE else STAGNATION):
+                return True
+    return False
+
+
+@compiled
+def solve(simulation, state, table, t, h, q, v, rest, forces, work, weights):
+    """Solve the stage equations: from the previous step's polynomial, and if that fails without it."""
+    k = forces.shape[0]
+    base, new, old = work[:k], work[k : 2 * k], work[2 * k : 3 * k]
+    for i in range(k):
+        for d in range(q.size):
+            drift = h * v[d]
+            low = fma(h, v[d], -drift) + h * rest[1, d]
+            base[i, d] = fma(table[0, i], drift, fma(table[0, i], low, fma(table[1, i], drift, rest[0, d])))
+    length = reals(state, at.WORDS)[at.LENGTH]
+    if length != 0.0 and 0.0 < h / length <= FARTHEST:
+        copy(forces, old)
+        extrapolate(h / length, table[0], table[6 + 2 * k :], old, forces, weights)
+        stages(table[6 : 6 + k], h, q, base, forces, new, work[4 * k])
+        if iterate(simulation, state, table, t, h, q, v, rest, forces, work):
+            return True
+    forces[:] = 0.0
+    for i in range(k):
+        for d in range(q.size):
+            new[i, d] = q[d] + base[i, d]
+    return iterate(simulation, state, table, t, h, q, v, rest, forces, work)
+
+
+@compiled
+def local_error(h, v, s, into_modes, forces, work, count):
+    """Return the largest estimate of a real body's error in velocity by this step, relative to velocities.
+
+    For a body, ``h |gamma_s|^2 / max(|gamma_0|, |gamma_s|)``, which is of the order of the local error.
+    The k nodes do not show gamma_s where k = s (and the tables not beyond `at.MODES`): the
+    last coefficient that they show, gamma_j, then goes on falling as it fell on average from the first
+    one. One node shows nothing. It is measured by the largest velocity of a body relative to the first one.
+    """
+    known = min(s, into_modes.shape[0] - 1)
+    if known == 0:
+        return 0.0
+    combine(into_modes, 0, forces, work[0])
+    combine(into_modes, known, forces, work[1])
+    worst, size, fall = 0.0, 0.0, 1.0
+    for b in range(count):
+        mean, square, before, after = 0.0, 0.0, 0.0, 0.0
+        for d in range(3):
+            i = 3 * b + d
+            mean += work[0, i] * work[0, i]
+            square += work[1, i] * work[1, i]
+            apart, pulled = v[i] - v[d], work[0, i] - work[0, d]  # gamma_0 is the mean acceleration
+            before += apart * apart
+            after += (apart + h * pulled) * (apart + h * pulled)
+        size = max(size, before, after, h * h * mean)
+        if square > 0.0 and square * (square / max(mean, square)) > worst:
+            worst = square * (square / max(mean, square))
+            fall = np.sqrt(square / max(mean, square))
+    if worst == 0.0:
+        return 0.0
+    beyond = 1.0 if known == s else fall ** (2.0 * (s - known) / known)
+    return abs(h) * np.sqrt(worst / size) * beyond
+
+
+@compiled
+def update(table, h, q, v, rest, forces):
+    """Add the step to positions, velocities and what they lack."""
+    for d in range(q.size):
+        kick, shift = 0.0, 0.0
+        for m in range(forces.shape[0]):
+            a = forces[m, d]
+            kick += fma(table[2, m], a, table[3, m] * a)
+            shift += fma(table[4, m], a, table[5, m] * a)
+        drift = h * v[d]
+        low = fma(h, v[d], -drift) + h * rest[1, d]
+        # q + drift exactly, then all that is smaller.
+        near = q[d] + drift
+        part = near - q[d]
+        lost = (q[d] - (near - part)) + (drift - part)
+        rest_of_it = h * (h * shift) + (low + rest[0, d]) + lost
+        q[d] = near + rest_of_it
+        part = q[d] - near
+        rest[0, d] = (near - (q[d] - part)) + (rest_of_it - part)
+        gain = h * kick + rest[1, d]
+        total = v[d] + gain
+        part = total - v[d]
+        rest[1, d] = (v[d] - (total - part)) + (gain - part)
+        v[d] = total
+
+
+@compiled
+def step(simulation, state):
+    """Take one step of length dt."""
+    number, clock = words(state, at.WORDS), reals(simulation, at.SIMULATION)
+    k = number[at.K]
+    n = 3 * (words(simulation, at.SIMULATION)[at.COUNT] + words(simulation, at.SIMULATION)[at.VARIATIONS])
+    flags = small(simulation, 2 * at.SIMULATION)
+    if flags[at.GRAVITY] == at.TREE:
+        _fail(simulation, at.ROUGH)
+        return
+    if ready(state, n) == 0:
+        _fail(simulation, at.UNKNOWN_METHOD)
+        return
+    flags[at.IGNORED_TERMS] = 0
+    table = matrix(number[at.TABLES], 6 + 2 * k + min(k, at.MODES), k)
+    rest, forces = matrix(number[at.REST], 2, n), matrix(number[at.FORCES], k, n)
+    work = matrix(number[at.WORK], 4 * k + 4, n)
+    weights = matrix(number[at.WORK] + 8 * (4 * k + 4) * n, 1, k)
+    q, v = work[4 * k + 1], work[4 * k + 2]
+    gather(simulation, 0, q)
+    gather(simulation, 3, v)
+    for d in range(n):
+        # Somebody may have moved or rescaled the particle since.
+        if abs(rest[0, d]) > HALF_UNIT * abs(q[d]):
+            rest[0, d] = 0.0
+        if abs(rest[1, d]) > HALF_UNIT * abs(v[d]):
+            rest[1, d] = 0.0
+    t, h = clock[at.TIME], clock[at.DT]
+    problem = at.DIVERGED
+    solved = solve(simulation, state, table, t, h, q, v, rest, forces, work, weights)
+    if solved:
+        bodies, most = words(simulation, at.SIMULATION)[at.COUNT], reals(state, at.WORDS)[at.LARGEST_ERROR]
+        if number[at.S] == 1:
+            most *= SECOND_ORDER
+        if most < np.inf:
+            solved = local_error(h, v, number[at.S], table[6 + 2 * k :], forces, work, bodies) <= most
+            problem = at.UNRESOLVED
+    if solved:
+        update(table, h, q, v, rest, forces)
+    scatter(simulation, 0, q)
+    scatter(simulation, 3, v)
+    if solved:
+        clock[at.TIME], clock[at.DONE] = t + h, h
+        reals(state, at.WORDS)[at.LENGTH] = h
+        if flags[at.CALCULATE_MEGNO] != 0:
+            _add_growth(simulation, reals(state, at.WORDS)[at.MEGNO], h)
+    else:
+        clock[at.TIME] = t
+        reals(state, at.WORDS)[at.LENGTH] = 0.0
+        _fail(simulation, problem)
+
+
+def build(callback: str) -> bytes:
+    """Compile one of the functions that REBOUND calls: step, free, added, removed."""
+    function, arguments = {
+        "step": (step, 2),
+        "free": (free, 1),
+        "added": (added, 1),
+        "removed": (removed, 2),
+    }[callback]
+    return native.build(function, [(types.int64, "i64")] * arguments)

@@ -1,0 +1,237 @@
+"""HBVM(k, s) and Gauss(s) as methods of ``scipy.integrate.solve_ivp``.
+
+    from scipy.integrate import solve_ivp
+    from integrators.plugins.scipy import HBVM
+
+    solution = solve_ivp(fun, (0.0, 100.0), y0, method=HBVM, k=12, s=6, rtol=1e-8, atol=1e-8)
+
+SciPy's tolerances choose the steps; the energy of a Hamiltonian system is kept to
+round-off whatever the steps are. Where ``fun`` is compiled, a numba function or the `field`
+of a problem, the steps are the kernel's.
+"""
+
+import warnings
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DenseOutput, OdeSolver
+from scipy.integrate._ivp import common
+
+from integrators.options import length, whole
+from integrators.plugins.scipy.field import Field, field, recognised
+from integrators.plugins.scipy.native import NativeSteps
+from integrators.plugins.scipy.python import PythonSteps
+from problems.errors import InputError
+
+__all__ = ["HBVM", "Field", "Gauss", "field"]
+
+Array = NDArray[Any]
+
+
+class _Steps(Protocol):
+    """What takes the steps: compiled code, or Python."""
+
+    k: int
+
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def jacobians(self) -> int: ...
+    @property
+    def factorizations(self) -> int: ...
+    def take(self, t: float, y: Array) -> tuple[float, Array] | str: ...
+    def dense_output(self) -> DenseOutput: ...
+
+
+class _LineIntegral(OdeSolver):
+    """What HBVM and Gauss share: options, counters, and the choice of what takes the steps."""
+
+    def __init__(
+        self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: Any, rtol: Any, atol: Any, jac: Any,
+        jac_sparsity: Any, vectorized: bool, first_step: float | None, k: int | None, s: int,
+        h: float | None, every: int, interpolant: str,
+    ) -> None:  # fmt: skip
+        self._steps: _Steps | None = None
+        self._calls = 0
+        real = not np.iscomplexobj(y0)
+        compiled = recognised(fun, np.size(y0), vectorized=vectorized) if real else None
+        super().__init__(compiled or fun, t0, y0, t_bound, vectorized, support_complex=True)
+        name = type(self).__name__
+        self.s, every = whole(name, "s", s), whole(name, "every", every)
+        k = None if k is None else whole(name, "k", k)
+        if k is not None and k < self.s:
+            raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
+        if interpolant not in ("step", "polynomial"):
+            raise InputError(f"interpolant must be 'step' or 'polynomial', not {interpolant!r}.")
+        self.max_step = common.validate_max_step(max_step)
+        self.rtol, self.atol = common.validate_tol(rtol, atol, self.n)
+        if first_step is not None:
+            first_step = common.validate_first_step(first_step, t0, t_bound)
+        if h is not None:
+            h = length(name, h)
+            if k is None:
+                raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
+            if first_step is not None or self.max_step < np.inf:
+                raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
+        one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
+        if compiled is not None and t0 != t_bound and not one_stage:
+            if interpolant != "step":
+                raise InputError(
+                    "interpolant='polynomial' is for functions in Python; with a compiled field states "
+                    "between the steps come from the kernel's own steps: leave it out."
+                )
+            self._steps = self._native(fun, compiled, k, h, first_step, every)
+        if self._steps is None:
+            if every != 1:
+                raise InputError(
+                    f"every={every} is for compiled fields, whose steps cost less than SciPy's loop over "
+                    "them; leave it out, or compile the function with numba."
+                )
+            self._steps = PythonSteps(
+                self, compiled or fun, k=k, s=self.s, h=h, first_step=first_step, jac=jac,
+                jac_sparsity=jac_sparsity, interpolant=interpolant,
+            )  # fmt: skip
+
+    def _native(
+        self, fun: Any, compiled: Field, k: int | None, h: float | None, first_step: float | None, every: int
+    ) -> NativeSteps | None:
+        """Return steps in compiled code; ``None``, with a warning, if numba cannot compile the function."""
+        from numba.core.errors import NumbaError
+
+        try:
+            return NativeSteps(
+                compiled, self.t, self.y, self.t_bound, k=k, s=self.s, h=h, tol=float(np.min(self.rtol)),
+                first_step=first_step, max_step=self.max_step, every=every,
+            )  # fmt: skip
+        except NumbaError as error:
+            reason = str(error).strip().splitlines()[0]
+            message = f"{fun!r} cannot be compiled for an array of {self.n} numbers: {reason}"
+            if compiled is fun or getattr(compiled.system, "in_place", False):
+                raise InputError(message) from error
+            warnings.warn(f"{message} Its steps are taken in Python.", stacklevel=4)
+            return None
+
+    @property
+    def k(self) -> int:
+        """Nodes of the quadrature in use."""
+        assert self._steps is not None
+        return self._steps.k
+
+    @property
+    def nfev(self) -> int:
+        """States at which the function was evaluated."""
+        return self._calls + (0 if self._steps is None else self._steps.evaluations)
+
+    @nfev.setter
+    def nfev(self, count: int) -> None:
+        self._calls += count - self.nfev
+
+    @property
+    def njev(self) -> int:
+        """Evaluations of the Jacobian."""
+        return 0 if self._steps is None else self._steps.jacobians
+
+    @njev.setter
+    def njev(self, count: int) -> None:
+        """Leave it to the steps to count."""
+
+    @property
+    def nlu(self) -> int:
+        """Factorisations."""
+        return 0 if self._steps is None else self._steps.factorizations
+
+    @nlu.setter
+    def nlu(self, count: int) -> None:
+        """Leave it to the steps to count."""
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        assert self._steps is not None
+        made = self._steps.take(self.t, self.y)
+        if isinstance(made, str):
+            return False, made
+        self.t, self.y = made
+        return True, None
+
+    def _dense_output_impl(self) -> DenseOutput:
+        assert self._steps is not None
+        return self._steps.dense_output()
+
+
+class HBVM(_LineIntegral):
+    """HBVM(k, s), which conserves the energy: ``solve_ivp(fun, t_span, y0, method=HBVM)``.
+
+    Equations and properties: see `integrators.HBVM`.
+
+    Parameters
+    ----------
+    fun : callable
+        ``fun(t, y)``. Where it is compiled, the kernel of `integrators.HBVM` takes the steps: a
+        numba function ``fun(t, y)`` or ``fun(t, y, dy)``, which puts the derivative into
+        ``dy``; or the `field` of a problem or system.
+    t0, y0, t_bound, first_step, max_step, rtol, atol, jac, jac_sparsity
+        As for `scipy.integrate.Radau`. The local error of a step is kept below
+        ``atol + rtol * abs(y)``; by the kernel below ``rtol`` times the size of each block of the
+        state (the momenta of one body, else each component). The stage equations are solved
+        to round-off whatever the tolerances: by fixed-point iteration, or by simplified
+        Newton where that does not contract; only then ``jac`` is needed. The kernel makes
+        Jacobians of its own.
+    vectorized : bool
+        Whether ``fun`` takes y of shape (n, m). All stages are then evaluated in
+        one call, provided that ``fun`` also takes the m times as an array, which
+        is tried out once.
+    k : int, optional
+        Nodes of the quadrature, k >= s. By default as many as it takes to see the energy to
+        round-off: 2s to begin with, or, for compiled fields, 16 or more and steps short enough.
+    s : int
+        Degree of the polynomial; the order is 2s.
+    h : float, optional
+        Length of all steps but the last, > 0, whatever the tolerances; k is then to be given.
+    every : int
+        Of a compiled field's steps every which is one for SciPy. A step of the kernel costs less
+        than SciPy's loop over them; states between them are still to be had by ``t_eval`` and
+        ``dense_output``, but an event that happens and is undone again within one is missed.
+    interpolant : {"step", "polynomial"}
+        How states between the steps (``t_eval``, ``dense_output``, ``events``) are made: by
+        a throw-away step from the step's start, which keeps order 2s and energy, or
+        by the step's polynomial, which is free but of order s + 1 (functions in Python only).
+
+    Attributes
+    ----------
+    nfev : int
+        States at which ``fun`` was evaluated, also where one call evaluates several.
+    """
+
+    def __init__(
+        self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: float = np.inf, rtol: Any = 1e-3,
+        atol: Any = 1e-6, jac: Any = None, jac_sparsity: Any = None, vectorized: bool = False,
+        first_step: float | None = None, k: int | None = None, s: int = 6, h: float | None = None,
+        every: int = 1, interpolant: str = "step", **extraneous: Any,
+    ) -> None:  # fmt: skip
+        common.warn_extraneous(extraneous)
+        super().__init__(
+            fun, t0, y0, t_bound, max_step, rtol, atol, jac, jac_sparsity, vectorized, first_step,
+            k, s, h, every, interpolant,
+        )  # fmt: skip
+
+
+class Gauss(_LineIntegral):
+    """Gauss(s), collocation at the Gauss nodes, which is HBVM(s, s): ``solve_ivp(..., method=Gauss)``.
+
+    Symplectic with constant steps, ``h=...``; with adaptive ones it keeps the energy no
+    better than other methods of its order. Its s nodes do not show gamma_s, by which HBVM's steps are
+    judged: gamma_{s-1} takes its place, so that steps are shorter than HBVM's, by far where s < 4, for a
+    Python function as in the kernel. Parameters as for `HBVM`, without k.
+    """
+
+    def __init__(
+        self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: float = np.inf, rtol: Any = 1e-3,
+        atol: Any = 1e-6, jac: Any = None, jac_sparsity: Any = None, vectorized: bool = False,
+        first_step: float | None = None, s: int = 6, h: float | None = None, every: int = 1,
+        interpolant: str = "step", **extraneous: Any,
+    ) -> None:  # fmt: skip
+        common.warn_extraneous(extraneous)
+        super().__init__(
+            fun, t0, y0, t_bound, max_step, rtol, atol, jac, jac_sparsity, vectorized, first_step,
+            s, s, h, every, interpolant,
+        )  # fmt: skip

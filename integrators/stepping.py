@@ -1,0 +1,341 @@
+"""What all peers' programs and steppers share: the book-keeping around a library's own stepping."""
+
+import math
+import threading
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeGuard, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.checkpoints import Identity
+from integrators.one_thread import one_thread
+from integrators.protocol import (
+    Array,
+    MethodBase,
+    Samples,
+    Stats,
+    Status,
+    check_parameters,
+    check_start,
+    check_state,
+    check_times,
+)
+from integrators.times import plan
+from problems.errors import unknown
+from problems.problem import System
+
+Stepped = TypeVar("Stepped", bound="PeerStepper")
+
+
+class PeerProgram:
+    """A peer compiled for one system; satisfies `integrators.protocol.Program`."""
+
+    compile_seconds: float = 0.0
+    from_cache: bool | None = None
+
+    def __init__(self, system: System, method: MethodBase):
+        self.system, self.method = system, method
+
+    def started(self, stepper: Stepped, par: Array) -> Stepped:
+        """Return a new stepper, which now knows what its checkpoints belong to."""
+        stepper.identity = Identity.of(repr(self.method), self.system, par)
+        return stepper
+
+    def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
+        """Return copies of a start's arguments, checked.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a state or time that is not finite, or a wrong shape.
+        """
+        values = check_parameters(par, self.system)
+        return check_state(y0, self.system.dim), values, check_start(t0)
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """All that the continuation of a peer's stepper depends on."""
+
+    t: float
+    y: Array
+    status: Status
+    reason: str
+    inner: Any
+    identity: Identity
+
+
+class PeerStepper:
+    """A peer's trajectory; satisfies `integrators.protocol.Stepper`.
+
+    A subclass states its ``samplings`` (the default first) and implements
+    `_serve`, `_own_steps`, `_one`, `_save` and `_load`.
+
+    The *present* time ``t`` and state ``y`` are those last returned. The library
+    itself may be ahead of them (an adaptive method, whose own steps are not
+    shortened for a sample) or behind (a fixed step, where the sample came from a
+    throw-away step).
+    """
+
+    samplings: ClassVar[tuple[str, ...]] = ()
+    identity: Identity
+    error: Exception | None = None
+    """What a function of the user raised, where the status is ``USER_ERROR``."""
+
+    def __init__(self, y: Array, t: float):
+        self._at_work = threading.RLock()
+        self._t, self._y = t, y
+        self._status, self._reason = Status.RUNNING, ""
+        self._stats = Stats()
+
+    @property
+    def t(self) -> float:
+        """The present time; after a failure, its time."""
+        return self._t
+
+    @property
+    @one_thread
+    def y(self) -> Array:
+        """A copy of the present state."""
+        return self._y.copy()
+
+    @property
+    def status(self) -> Status:
+        """How the integration stands."""
+        return self._status
+
+    @property
+    def reason(self) -> str:
+        """One sentence on a failure; empty otherwise."""
+        return self._reason
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of the work done."""
+        return self._stats
+
+    @one_thread
+    def step(self) -> Status:
+        """Take one step of the method's own length; after a failure, do nothing."""
+        if not self._status.failed:
+            reached = self._one()
+            if reached is not None and self._finite(*reached):
+                self._arrive(*reached)
+        return self._status
+
+    @one_thread
+    def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
+        """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
+        how = self.samplings[0] if sample is None else sample
+        if how not in self.samplings:
+            raise unknown(f"sampling of {type(self).__name__.removesuffix('Stepper')}", how, self.samplings)
+        if how == "land" and self._is_ahead(times):
+            return self._land_on(times)
+        grid = check_times(times, self._t)
+        dim = self._y.size
+        if self._status.failed:
+            return Samples(grid[:0], np.empty((0, dim)), self._status, self._reason)
+        here = int(grid[0] == self._t)
+        t, y = grid[:here], np.tile(self._y, (here, 1))
+        ahead = grid[here:]
+        if ahead.size:
+            more = self._own_steps(float(ahead[-1])) if how == "steps" else self._serve(ahead, how)
+            t, y = np.concatenate([t, more[0]]), np.concatenate([y, more[1]])
+            if t.size and not self._finite(float(t[-1]), y[-1]):
+                t, y = t[:-1], y[:-1]
+            if t.size and not self._status.failed:
+                self._arrive(float(t[-1]), y[-1])
+        status = self._status if self._status.failed else Status.FINISHED
+        return Samples(t, y, status, self._reason)
+
+    def _is_ahead(self, times: ArrayLike) -> TypeGuard[Array]:
+        """Whether ``times`` are one time, and nothing else has to be looked at before going there."""
+        if not (isinstance(times, np.ndarray) and times.shape == (1,) and times.dtype == np.float64):
+            return False
+        return math.isfinite(t := times.item()) and t != self._t and not self._status.failed
+
+    def _land_on(self, time: Array) -> Samples:
+        """Go to one time, as `advance` does, with as little as can be around the library's own call.
+
+        Short runs are timed this way, and each of NumPy's calls left out here weighs in them.
+        """
+        grid, states = self._serve(time.copy(), "land")
+        if grid.size and not all(map(math.isfinite, states[-1].tolist())):
+            self._finite(float(grid[-1]), states[-1])
+            grid, states = grid[:-1], states[:-1]
+        if grid.size and not self._status.failed:
+            self._t, self._y = time.item(), states[-1].copy()
+        status = self._status if self._status.failed else Status.FINISHED
+        return Samples(grid, states, status, self._reason)
+
+    @one_thread
+    def checkpoint(self) -> Checkpoint:
+        """Return a copy of all that the continuation depends on."""
+        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
+
+    @one_thread
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go back to a checkpoint of the same program; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
+        """
+        self.identity.check(checkpoint, Checkpoint)
+        self._t, self._y = checkpoint.t, checkpoint.y.copy()
+        self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
+        self._load(checkpoint.inner)
+
+    def _arrive(self, t: float, y: Array) -> None:
+        self._t, self._y = t, np.array(y, dtype=np.float64)
+
+    def _finite(self, t: float, y: Array) -> bool:
+        if np.isfinite(y).all():
+            return True
+        self._fail(Status.NOT_FINITE, t, f"the state is not finite at t = {t!r}.")
+        return False
+
+    def _fail(self, status: Status, t: float, reason: str) -> None:
+        self._t, self._status, self._reason = t, status, reason
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        """Return a leading part of ``grid`` (all of it ahead of the present) and the states there.
+
+        The last of these states may be the first that is not finite.
+        """
+        raise NotImplementedError
+
+    def _own_steps(self, end: float) -> tuple[Array, Array]:
+        """Return the own steps from the present (excluded) to ``end`` (included), as `_serve` does."""
+        raise NotImplementedError
+
+    def _one(self) -> tuple[float, Array] | None:
+        """Take one own step and return where it arrived; ``None`` after a failure."""
+        raise NotImplementedError
+
+    def _save(self) -> Any:
+        """Return a copy of the library's own state."""
+        raise NotImplementedError
+
+    def _load(self, inner: Any) -> None:
+        """Take back what `_save` returned, without keeping a reference to it."""
+        raise NotImplementedError
+
+
+class FixedStepper(PeerStepper):
+    """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
+
+    ``"side"`` (default)
+        Times that are a multiple of h are own steps; for others a throw-away copy
+        takes one step of the missing length.
+    ``"steps"``
+        The own steps up to the last time.
+    ``"land"``
+        The last step before each time is shortened onto it; steps count from there then.
+
+    A subclass implements `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
+    ``"land"``), `_restart`, `_save_steps` and `_load_steps`.
+    """
+
+    samplings = ("side", "steps", "land")
+
+    def __init__(self, y: Array, t: float, h: float):
+        super().__init__(y, t)
+        self._t0, self._n, self._h = t, 0, h
+
+    def _time(self) -> float:
+        return self._t0 + self._n * self._h
+
+    def _towards(self, end: float) -> None:
+        """Turn round where ``end`` lies on the other side of the present: steps count from here then."""
+        if (end - self._t) * self._h < 0.0:
+            self._t0, self._n, self._h = self._t, 0, -self._h
+            self._restart(self._t, self._y, self._h)
+
+    def _go(self, n: int) -> None:
+        """March to the step with number ``n``."""
+        if n > self._n:
+            self._march(n - self._n)
+            self._stats.steps += n - self._n
+            self._n = n
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        self._towards(float(grid[-1]))
+        if how == "land":
+            return self._land(grid)
+        counts, parts = plan(grid, np.full(grid.size, self._t0), self._h)
+        states = np.empty((grid.size, self._y.size))
+        for i, (n, part) in enumerate(zip(counts.tolist(), parts.tolist(), strict=True)):
+            self._go(n)
+            states[i] = self._aside(part) if part else self._state()
+            if not np.isfinite(states[i]).all():
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
+
+    def _land(self, grid: Array) -> tuple[Array, Array]:
+        states = np.empty((grid.size, self._y.size))
+        for i, t in enumerate(grid.tolist()):
+            count, part = plan(grid[i : i + 1], np.array([self._t0]), self._h)
+            self._go(int(count[0]))
+            if part[0]:
+                self._shorten(float(part[0]))
+                self._stats.steps += 1
+                self._t0, self._n = t, 0
+            states[i] = self._state()
+            if not np.isfinite(states[i]).all():
+                return grid[: i + 1], states[: i + 1]
+        return grid, states
+
+    def _own_steps(self, end: float) -> tuple[Array, Array]:
+        self._towards(end)
+        last = int(plan(np.array([end]), np.array([self._t0]), self._h)[0][0])
+        times: Array = self._t0 + self._h * np.arange(self._n + 1, last + 1, dtype=np.float64)
+        states = np.empty((times.size, self._y.size))
+        for i in range(times.size):
+            self._go(self._n + 1)
+            states[i] = self._state()
+            if not np.isfinite(states[i]).all():
+                return times[: i + 1], states[: i + 1]
+        return times, states
+
+    def _one(self) -> tuple[float, Array]:
+        self._go(self._n + 1)
+        return self._time(), self._state()
+
+    def _save(self) -> Any:
+        return self._t0, self._n, self._h, self._save_steps()
+
+    def _load(self, inner: Any) -> None:
+        self._t0, self._n, self._h, steps = inner
+        self._load_steps(steps)
+
+    def _march(self, count: int) -> None:
+        """Take ``count`` own steps."""
+        raise NotImplementedError
+
+    def _state(self) -> Array:
+        """Return a copy of the state at the last own step."""
+        raise NotImplementedError
+
+    def _aside(self, part: float) -> Array:
+        """Return the state a throw-away step of length ``part`` after the last own step."""
+        raise NotImplementedError
+
+    def _shorten(self, part: float) -> None:
+        """Take one step of length ``part`` after the last own step."""
+        raise NotImplementedError
+
+    def _restart(self, t: float, y: Array, h: float) -> None:
+        """Begin anew at ``t`` with steps of ``h``."""
+        raise NotImplementedError
+
+    def _save_steps(self) -> Any:
+        """Return a copy of the library's own state."""
+        raise NotImplementedError
+
+    def _load_steps(self, steps: Any) -> None:
+        """Take back what `_save_steps` returned."""
+        raise NotImplementedError

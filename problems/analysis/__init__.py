@@ -1,0 +1,1 @@
+"""What can be said of a system and of its states: invariants, structure, formulas."""

@@ -1,0 +1,228 @@
+"""Quantities along a solution, evaluated in double-double from the double states.
+
+The traced graph is interpreted over arrays of states: constants, parameters and
+states are the doubles that the integrators see, every operation carries 32
+digits, and the result is rounded once. What is left is the integrator's error.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from problems.analysis import double_double
+from problems.analysis.double_double import DD
+from problems.calculus.functions import Function
+from problems.calculus.gradient import reachable
+from problems.errors import InputError, shown
+from problems.systems.hamiltonian import System
+from problems.trace.graph import Node, T
+from problems.trace.sums import Loop
+
+if TYPE_CHECKING:
+    from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+# Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
+_BLOCK = 2_000_000
+
+
+def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]:
+    """Evaluate a function in double-double.
+
+    Parameters
+    ----------
+    function : Function
+        From `System.function`.
+    t : array_like
+        One time, or one per state.
+    y : ndarray, shape (dim, n)
+        States, one per column.
+    par : ndarray, shape (n_par,)
+        Parameters.
+
+    Returns
+    -------
+    list of DD
+        One array of shape (n,) per output.
+    """
+    roots = [term.node for terms in function.outputs for term in terms]
+    lengths = [len(node.data) for node in reachable(roots) if node.op == "sum"]
+    largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
+    columns = max(1, _BLOCK // largest)
+    n = y.shape[1]
+    times = np.broadcast_to(np.asarray(t, dtype=np.float64), (n,))
+    parts = [
+        _Interpreter(times[low : low + columns], y[:, low : low + columns], par).outputs(function)
+        for low in range(0, max(n, 1), columns)
+    ]
+    return [
+        DD(np.concatenate([p[i].hi for p in parts]), np.concatenate([p[i].lo for p in parts]))
+        for i in range(len(function.outputs))
+    ]
+
+
+class _Interpreter:
+    def __init__(self, t: Array, y: Array, par: Array) -> None:
+        self.inputs = {"t": t[np.newaxis, :], "y": y, "par": par[:, np.newaxis]}
+        self.n = y.shape[1]
+        self.known: dict[int, DD] = {}
+
+    def outputs(self, function: Function) -> list[DD]:
+        roots = [term.node for terms in function.outputs for term in terms]
+        roots += [entry.node for _, entries in function.loops for entry in entries]
+        # Overflow and 0/0 at a state that is not finite give nan there, which is the answer.
+        with np.errstate(all="ignore"):
+            for node in reachable(roots):
+                if node.loop is None:
+                    self.known[node.id] = self._value(node, self.known)
+            summands: list[list[DD]] = [[] for _ in function.outputs]
+            for loop, entries in function.loops:
+                body = self._inside([entry.node for entry in entries], loop)
+                for entry in entries:
+                    terms = body[entry.node.id] if entry.node.loop is loop else self.known[entry.node.id]
+                    rows = self._rows(terms, len(loop))
+                    for row, place in enumerate(entry.index.values(loop)):
+                        summands[place].append(rows[row])
+            for terms, parts in zip(function.outputs, summands, strict=True):
+                parts.extend(self.known[term.node.id] for term in terms)
+            return [self._total(parts) for parts in summands]
+
+    def _total(self, parts: list[DD]) -> DD:
+        total = sum(parts, start=DD(0.0))
+        return DD(np.broadcast_to(total.hi, (self.n,)), np.broadcast_to(total.lo, (self.n,)))
+
+    def _rows(self, terms: DD, n: int) -> DD:
+        return DD(np.broadcast_to(terms.hi, (n, self.n)), np.broadcast_to(terms.lo, (n, self.n)))
+
+    def _inside(self, roots: list[Node], loop: Loop) -> dict[int, DD]:
+        body: dict[int, DD] = {}
+        for node in reachable(roots):
+            if node.loop is loop:
+                body[node.id] = self._value(node, body)
+        return body
+
+    def _value(self, node: Node, known: dict[int, DD]) -> DD:
+        if node.op == "const":
+            return DD(node.data)
+        if node.op == "symbol":
+            space, place = node.data
+            rows = self.inputs[space]
+            return DD(rows[place if isinstance(place, int) else place.values(node.loop)])
+        if node.op == "index":
+            return DD(node.data.values(node.loop).astype(np.float64)[:, np.newaxis])
+        if node.op == "sum":
+            return self._sum(node, node.data)
+        args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
+        match node.op:
+            case "add":
+                return args[0] + args[1]
+            case "sub":
+                return args[0] - args[1]
+            case "mul":
+                return args[0] * args[1]
+            case "div":
+                return args[0] / args[1]
+            case "neg":
+                return -args[0]
+            case "pow":
+                return args[0] ** node.data
+            case _:
+                return double_double.FUNCTIONS[node.op](args[0])
+
+    def _sum(self, node: Node, loop: Loop) -> DD:
+        terms = self._rows(self._inside([node.args[0]], loop)[node.args[0].id], len(loop))
+        # In halves: with 32 digits the order does not matter, and this is fast.
+        hi, lo = terms.hi, terms.lo
+        while len(hi) > 1:
+            half = len(hi) // 2
+            paired = DD(hi[:half], lo[:half]) + DD(hi[half : 2 * half], lo[half : 2 * half])
+            hi = np.concatenate([paired.hi, hi[2 * half :]])
+            lo = np.concatenate([paired.lo, lo[2 * half :]])
+        return DD(hi[0], lo[0])
+
+
+def _states(problem: "Problem", y: ArrayLike) -> Array:
+    try:
+        states = np.asarray(y, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"states must be an array of numbers, not {shown(y)}.") from error
+    if states.ndim not in (1, 2) or states.shape[-1] != problem.system.dim:
+        raise InputError(f"states must have the shape (n, {problem.system.dim}), not {states.shape}.")
+    return np.atleast_2d(states)
+
+
+def _evaluate(problem: "Problem", what: str, states: Array, t: ArrayLike | None) -> list[DD]:
+    function = problem.system.function(what)
+    if t is None:
+        if any(term.node.flags & T for terms in function.outputs for term in terms):
+            raise InputError(f"{what.split(':')[-1]} depends on time; give the times of the states as t=.")
+        t = problem.t0
+    try:
+        times = np.asarray(t, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"t must be {len(states)} times, not {shown(t)}.") from error
+    if times.ndim > 1 or (times.ndim == 1 and times.size != len(states)):
+        raise InputError(f"t must be {len(states)} times, one per state, not of shape {times.shape}.")
+    return evaluate(function, times, np.ascontiguousarray(states.T), problem.par)
+
+
+def invariants(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
+    """See `problems.problem.Problem.invariants`."""
+    states = _states(problem, y)
+    found: dict[str, Array] = {}
+    for name in problem.system.invariant_names:
+        values = [value.rounded() for value in _evaluate(problem, f"invariant:{name}", states, t)]
+        vector = problem.system.is_vector(f"invariant:{name}")
+        found[name] = np.stack(values, axis=1) if vector else values[0]
+    return found
+
+
+def errors(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
+    """See `problems.problem.Problem.errors`."""
+    states = _states(problem, y)
+    found: dict[str, Array] = {}
+    for name in problem.system.invariant_names:
+        what = f"invariant:{name}"
+        start = _evaluate(problem, what, problem.y0[np.newaxis, :], problem.t0)
+        now = _evaluate(problem, what, states, t)
+        gaps = np.stack([(a - b).rounded() for a, b in zip(now, start, strict=True)])
+        size = np.linalg.norm([value.rounded()[0] for value in start])
+        found[name] = np.linalg.norm(gaps, axis=0) / (size if size != 0 else 1.0)
+    return found
+
+
+def guards(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
+    """See `problems.problem.Problem.guards`."""
+    states = _states(problem, y)
+    return {
+        name: np.abs(_evaluate(problem, f"guard:{name}", states, t)[0].rounded())
+        for name in problem.system.guard_names
+    }
+
+
+def _scale(system: System, par: Array) -> list[DD]:
+    return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, 1)), par)
+
+
+def velocity(problem: "Problem", y: ArrayLike) -> Array | None:
+    """See `problems.problem.Problem.velocity`."""
+    system = problem.system
+    states = _states(problem, y)
+    if not system.separable or system.dof is None:
+        return None
+    momenta = states[:, system.dof :]
+    return np.stack(
+        [(c * momenta[:, i]).rounded() for i, c in enumerate(_scale(system, problem.par))], axis=1
+    )
+
+
+def momentum(system: System, par: Array, v: Array) -> Array:
+    """Return the momenta p = v/c of a separable system, each rounded once."""
+    if not system.separable:
+        raise InputError(f"v0= needs constant masses, which {system.name} does not have; give p0=.")
+    scale = _scale(system, par)
+    if any(float(c.hi.ravel()[0]) == 0.0 for c in scale):
+        raise InputError(f"H of {system.name} does not depend on every momentum; give p0= instead of v0=.")
+    return np.array([float((DD(x) / c).rounded().ravel()[0]) for x, c in zip(v, scale, strict=True)])

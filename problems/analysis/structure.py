@@ -1,0 +1,157 @@
+"""What can be read off a traced system: degree, time, coordinates that do not occur."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from problems.calculus.functions import Function
+from problems.calculus.gradient import reachable
+from problems.errors import InputError
+from problems.systems.base import System
+from problems.trace.graph import STATE, T
+from problems.trace.node import Node
+
+
+def degree(system: System, par: ArrayLike | None = None) -> int | None:
+    """Return the degree of the energy as a polynomial in the state.
+
+    The degree is that of the expression as it is written: terms that cancel are
+    not noticed.
+
+    Parameters
+    ----------
+    system : System
+        A `Hamiltonian` or a `Poisson` system.
+    par : array_like, shape (n_par,), optional
+        Values of the parameters; a product with a parameter that is 0 then drops out.
+
+    Returns
+    -------
+    int or None
+        ``None`` if the energy is not a polynomial.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the system has no energy.
+    """
+    values = None if par is None else np.asarray(par, dtype=np.float64).tolist()
+    known: dict[int, float | None] = {}
+    root = _energy(system)
+    for node in reachable([root]):
+        known[node.id] = _degree(node, known, values)
+    found = known[root.id]
+    return None if found is None else int(max(found, 0))
+
+
+_ZERO = float("-inf")  # the degree of the polynomial 0
+
+
+def _degree(node: Node, known: dict[int, float | None], par: list[float] | None) -> float | None:
+    if node.op == "const":
+        return _ZERO if node.data == 0.0 else 0
+    if node.op == "symbol":
+        space, place = node.data
+        if space == "y":
+            return 1
+        absent = space == "par" and par is not None and isinstance(place, int) and par[place] == 0.0
+        return _ZERO if absent else 0
+    if node.op == "index":
+        return 0
+    degrees = [known[arg.id] for arg in node.args]
+    a = degrees[0]
+    if node.op == "mul" and _ZERO in degrees:
+        return _ZERO
+    if any(d is None for d in degrees):
+        return None
+    match node.op:
+        case "add" | "sub":
+            return max(d for d in degrees if d is not None)
+        case "mul":
+            return sum(d for d in degrees if d is not None)
+        case "div":
+            return a if not node.args[1].flags & STATE else None
+        case "neg" | "sum":
+            return a
+        case "pow":
+            return None if a is None else a * node.data
+        case _:
+            return 0 if not node.flags & STATE else None
+
+
+def exact_k(nu: int, s: int) -> int:
+    """Return the least k with which HBVM(k, s) keeps a polynomial energy of degree nu exactly.
+
+    ``k >= nu s/2`` makes the line integral exact (L. Brugnano, F. Iavernaro, T.
+    Susca, "Numerical comparisons between Gauss-Legendre methods and Hamiltonian
+    BVMs defined over Gauss points"); never less than s.
+
+    Parameters
+    ----------
+    nu, s : int
+        Degree of the energy, and of the method's polynomial.
+    """
+    return max(s, -(-nu * s // 2))
+
+
+def depends_on_time(system: System) -> bool:
+    """Whether the energy, or the vector field where there is none, contains the time itself."""
+    what = "hamiltonian" if _has_energy(system) else "field"
+    return any(node.flags & T for node in _roots(system.function(what)))
+
+
+def has_kinks(system: System) -> bool:
+    """Whether the vector field has an absolute value, or its derivative, of the state or of time."""
+    nodes = reachable(list(_roots(system.function("field"))))
+    return any(node.op in ("abs", "sign") and node.flags & (STATE | T) for node in nodes)
+
+
+def absent(system: System) -> list[int]:
+    """Return the places of the state that do not occur in the energy, in order.
+
+    A position that is absent (a cyclic coordinate) keeps its momentum constant.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the system has no energy.
+    """
+    seen: set[int] = set()
+    for node in reachable([_energy(system)]):
+        if node.op == "symbol" and node.data[0] == "y":
+            place = node.data[1]
+            seen.update([place] if isinstance(place, int) else place.values(node.loop).tolist())
+    return [place for place in range(system.dim) if place not in seen]
+
+
+def cyclic(system: System) -> list[int]:
+    """Return the indices of the positions that do not occur in H: their momenta are constant.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the system is not a `Hamiltonian`.
+    """
+    if system.dof is None:
+        raise InputError(
+            f"{system.name} has no positions and momenta; cyclic coordinates need a Hamiltonian."
+        )
+    return [place for place in absent(system) if place < system.dof]
+
+
+def _has_energy(system: System) -> bool:
+    return "hamiltonian" in system.offered()
+
+
+def _energy(system: System) -> Node:
+    if not _has_energy(system):
+        raise InputError(f"{system.name} has no energy; give it as a Hamiltonian or a Poisson system.")
+    return system.function("hamiltonian").outputs[0][0].node
+
+
+def _roots(function: Function) -> Iterator[Node]:
+    for terms in function.outputs:
+        yield from (term.node for term in terms)
+    for _, entries in function.loops:
+        yield from (entry.node for entry in entries)

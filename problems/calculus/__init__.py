@@ -1,0 +1,1 @@
+"""Derivatives of a graph: gradients, products with vectors, Jacobians."""

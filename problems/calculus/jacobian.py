@@ -1,0 +1,274 @@
+"""Sparse Jacobians of traced vector fields.
+
+Every summand of a field is a traced scalar, so `problems.calculus.gradient.gradient`
+gives its row of the Jacobian, and with it which entries are not zero. Where
+summands stand in a loop, the loop's terms are differentiated once: the summand
+of term k at output a(k) has derivatives with respect to y[b(k)], which stand at
+the places (a(k), b(k)) for all k. The Jacobian stays a loop over the same list,
+with the places of its entries as further columns of the list.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.calculus.functions import Function
+from problems.calculus.gradient import LoopTerm, Term, gradient
+from problems.emit.rewrite import body_of
+from problems.errors import unknown
+from problems.systems.base import System
+from problems.trace.graph import STATE, Graph, Node, Q
+from problems.trace.sums import Affine, Loop
+
+Integers = NDArray[np.int64]
+
+NAMES = {"jacobian": "field", "jacobian:force": "force"}
+LARGEST = 2_000_000  # integers in one loop's list; beyond, source text is the wrong place for a list
+_CAPTURED = 1 << 40  # places beyond any state stand for values that a loop's term takes from outside
+
+
+@dataclass(frozen=True, eq=False)
+class Jacobian:
+    """The derivatives of a field with respect to the state, entry by entry.
+
+    Attributes
+    ----------
+    function : Function
+        One output per entry, for the emitters.
+    rows, columns : ndarray of int64, shape (n,)
+        Places of the entries, row by row and sorted in each row; all others are zero.
+    size : int
+        The matrix is size by size.
+    """
+
+    function: Function
+    rows: Integers
+    columns: Integers
+    size: int
+
+    @property
+    def density(self) -> float:
+        """Part of the matrix that is stored."""
+        return self.rows.size / self.size**2
+
+
+_known: WeakKeyDictionary[System, dict[str, Jacobian | None]] = WeakKeyDictionary()
+
+
+def jacobian(system: System, what: str = "jacobian") -> Jacobian | None:
+    """Return a system's Jacobian, or ``None`` where there is none to be written down.
+
+    Its values come from the emitters: ``emit.numpy(system, what)(t, y, par)``, in the
+    order of ``rows`` and ``columns``; ``emit.numba`` likewise.
+
+    Parameters
+    ----------
+    system : System
+        A traced system.
+    what : {"jacobian", "jacobian:force"}
+        Of the field with respect to the state, or (separable systems) of the force
+        with respect to the positions.
+
+    Returns
+    -------
+    Jacobian or None
+        ``None`` for a system that is not traced, and where the list of entries would
+        be larger than `LARGEST`: the derivatives must then be taken by differences.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For another name, or a system that has no such function.
+    """
+    if what not in NAMES:
+        raise unknown("Jacobian", what, NAMES)
+    known = _known.setdefault(system, {})
+    if what not in known:
+        known[what] = None if not system.traced else _differentiated(system.function(NAMES[what]))
+    return known[what]
+
+
+def _differentiated(function: Function) -> Jacobian | None:
+    size = len(function.outputs)
+    entries = _Entries(function.graph)
+    for loop, terms in function.loops:
+        for term in terms:
+            entries.of_loop_term(loop, term.index, term.node)
+    for row, terms in enumerate(function.outputs):
+        for term in terms:
+            entries.of_term(row, term.node)
+    return entries.collected(size)
+
+
+@dataclass
+class _InLoop:
+    """Derivatives in one loop: ``nodes[a, b]`` stands at row a, column b, for each term."""
+
+    loop: Loop
+    nodes: dict[tuple[Affine, Affine], Node]
+
+
+class _Entries:
+    def __init__(self, graph: Graph) -> None:
+        self.graph = graph
+        self.plain: dict[tuple[int, int], list[Node]] = {}
+        self.loops: dict[int, _InLoop] = {}
+        self.too_large = False
+
+    def of_term(self, row: int, node: Node) -> None:
+        """Enter the derivatives of a summand of one output."""
+        found = gradient(node)
+        for column, terms in found.terms.items():
+            self.plain.setdefault((row, column), []).extend(term.node for term in terms)
+        for loop, terms in found.loops:
+            for term in terms:
+                self._enter(loop, _constant(loop, row), term.index, term.node)
+
+    def of_loop_term(self, loop: Loop, row: Affine, node: Node) -> None:
+        """Enter the derivatives of a summand that stands in a loop."""
+        outside: dict[int, Node] = {}
+
+        def stand_in(inner: Node) -> Node:
+            # As a symbol of the loop it keeps a derivative of its own in every term.
+            outside[inner.id] = inner
+            return self.graph.symbol("captured", _constant(loop, _CAPTURED + inner.id), flags=Q, loop=loop)
+
+        def captured(inner: Node) -> Node:
+            return stand_in(inner) if inner.loop is None and inner.flags & STATE else inner
+
+        isolated = _copied(self.graph, node, loop, captured) if node.loop is loop else captured(node)
+        if not isolated.flags & STATE:
+            return
+        for found_loop, terms in gradient(self.graph.sum(isolated, loop)).loops:
+            assert found_loop is loop
+            for term in terms:
+                slope = _copied(self.graph, term.node, loop, lambda inner: _brought_back(inner, outside))
+                if term.index.offset < _CAPTURED:
+                    self._enter(loop, row, term.index, slope)
+                else:
+                    self._chain(loop, row, slope, outside[term.index.offset - _CAPTURED])
+
+    def _chain(self, loop: Loop, row: Affine, slope: Node, inner: Node) -> None:
+        """Enter ``slope`` times the derivatives of ``inner``, which stands outside the loop."""
+        if inner.op == "symbol":
+            self._enter(loop, row, _constant(loop, inner.data[1]), slope)
+            return
+        found = gradient(inner)
+        for column, terms in found.terms.items():
+            for term in terms:
+                self._enter(loop, row, _constant(loop, column), slope * term.node)
+        for other, terms in found.loops:
+            self._product(loop, row, slope, other, terms)
+
+    def _product(self, loop: Loop, row: Affine, slope: Node, other: Loop, terms: Sequence[LoopTerm]) -> None:
+        """Enter products of a term of each of two loops: a loop over all pairs of terms."""
+        n, m = len(loop), len(other)
+        if n * m * (loop.width + other.width) > LARGEST:
+            self.too_large = True
+            return
+        pairs = np.hstack([np.repeat(loop.rows, m, axis=0), np.tile(other.rows, (n, 1))])
+        both = _loop(self.graph, pairs)
+        left = _moved(self.graph, slope, loop, both, 0)
+        for term in terms:
+            right = _moved(self.graph, term.node, other, both, loop.width)
+            column = _widened(term.index, both, loop.width)
+            self._enter(both, _widened(row, both, 0), column, left * right)
+
+    def _enter(self, loop: Loop, row: Affine, column: Affine, node: Node) -> None:
+        nodes = self.loops.setdefault(loop.id, _InLoop(loop, {})).nodes
+        before = nodes.get((row, column))
+        nodes[row, column] = node if before is None else before + node
+
+    def collected(self, size: int) -> Jacobian | None:
+        """Return the Jacobian; its entries in order, the loops' lists with their places."""
+        flat = [np.array([row * size + column for row, column in self.plain], dtype=np.int64)]
+        for part in self.loops.values():
+            flat += [row.values(part.loop) * size + column.values(part.loop) for row, column in part.nodes]
+        places = np.unique(np.concatenate(flat))
+        if places.size == 0:
+            places = np.zeros(1, dtype=np.int64)  # a constant field: one entry, which is 0
+        loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
+        for part in self.loops.values():
+            made = self._with_places(part, places, size)
+            if made is None:
+                return None
+            loops.append(made)
+        if self.too_large:
+            return None
+        outputs: list[tuple[Term, ...]] = [()] * places.size
+        for (row, column), nodes in self.plain.items():
+            place = int(np.searchsorted(places, row * size + column))
+            outputs[place] = tuple(Term(node, node.id) for node in nodes)
+        function = Function(self.graph, tuple(outputs), tuple(loops))
+        return Jacobian(function, places // size, places % size, size)
+
+    def _with_places(
+        self, part: _InLoop, places: Integers, size: int
+    ) -> tuple[Loop, tuple[LoopTerm, ...]] | None:
+        loop = part.loop
+        width = loop.width
+        if len(loop) * (width + len(part.nodes)) > LARGEST:
+            return None
+        columns = [
+            np.searchsorted(places, row.values(loop) * size + column.values(loop))
+            for row, column in part.nodes
+        ]
+        longer = _loop(self.graph, np.hstack([loop.rows, np.stack(columns, axis=1)]))
+        terms: list[LoopTerm] = []
+        for i, node in enumerate(part.nodes.values()):
+            place = tuple(int(j == width + i) for j in range(longer.width))
+            terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
+        return longer, tuple(terms)
+
+
+def _constant(loop: Loop, place: int) -> Affine:
+    return Affine((0,) * loop.width, place)
+
+
+def _widened(affine: Affine, loop: Loop, at: int) -> Affine:
+    """Return an index into the columns of ``loop`` from ``at`` on."""
+    coefficients = [0] * loop.width
+    coefficients[at : at + len(affine.coefficients)] = affine.coefficients
+    return Affine(tuple(coefficients), affine.offset)
+
+
+def _loop(graph: Graph, rows: Integers) -> Loop:
+    rows = np.ascontiguousarray(rows, dtype=np.int64)
+    return graph.loops.setdefault((rows.shape, rows.tobytes()), Loop(rows, len(graph.loops)))
+
+
+def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) -> Node:
+    """Return ``root`` with ``leaf`` applied to the loop's symbols and to what comes from outside."""
+    done: dict[int, Node] = {}
+    for node in body_of([root], loop):
+        if node.op in ("symbol", "index"):
+            done[node.id] = leaf(node)
+        else:
+            args = tuple(done[arg.id] if arg.id in done else leaf(arg) for arg in node.args)
+            done[node.id] = graph.apply(node, args)
+    return done[root.id] if root.id in done else leaf(root)
+
+
+def _brought_back(node: Node, outside: dict[int, Node]) -> Node:
+    return outside[node.data[1].offset - _CAPTURED] if _is_stand_in(node) else node
+
+
+def _is_stand_in(node: Node) -> bool:
+    return node.op == "symbol" and node.data[0] == "captured"
+
+
+def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:
+    """Return a node of ``loop`` in a loop whose list has the columns of ``loop`` from ``at`` on."""
+
+    def leaf(node: Node) -> Node:
+        if node.loop is None:
+            return node
+        if node.op == "index":
+            return graph.index(_widened(node.data, to, at), to)
+        space, place = node.data
+        return graph.symbol(space, _widened(place, to, at), flags=node.flags, loop=to)
+
+    return _copied(graph, root, loop, leaf)

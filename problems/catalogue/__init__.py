@@ -1,0 +1,1 @@
+"""The built-in problems; files that start with an underscore have what several of them share."""

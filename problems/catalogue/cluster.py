@@ -1,0 +1,75 @@
+"""A cluster of N equal bodies with softened gravity, for any N."""
+
+import math
+from random import Random
+
+from problems.catalogue import _given as given
+from problems.catalogue import _gravity as gravity
+from problems.problem import Problem
+from problems.registry import changed
+
+
+def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float = 10.0) -> Problem:
+    """Return a cluster of bodies of mass 1/n that starts in the unit ball; G = 1.
+
+    Tests the cost per pair of bodies. The potential of a pair is
+    -m^2/sqrt(r^2 + softening^2), as in H. C. Plummer, Monthly Notices of the Royal
+    Astronomical Society 71 (1911) 460-470. From some ten bodies on the compiled
+    force is a loop over pairs.
+
+    Parameters
+    ----------
+    n : int
+        Number of bodies, at least 2.
+    softening : float
+        Length below which the force stops growing, positive.
+    seed : int
+        Of Python's Mersenne twister, which places the bodies evenly in the ball
+        (points of the cube are drawn until they lie in it), with velocities drawn
+        likewise and multiplied by 1/2; then the centre of mass is moved to rest at the origin.
+    t_end : float
+        End of the integration; crossing the ball takes about 2.
+
+    Returns
+    -------
+    Problem
+        State: positions body by body, then momenta. Parameters ``m``, ``eps``;
+        invariants: energy, angular momentum (the linear momentum is 0 but for rounding).
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    given.whole("cluster", 2, n=n)
+    given.size("cluster", 6 * n, n * (n - 1) // 2, n=n)
+    given.whole("cluster", 0, seed=seed)
+    given.positive("cluster", softening=softening)
+    given.finite("cluster", t_end=t_end)
+    random = Random(seed)
+    q = _centred([_in_ball(random) for _ in range(n)])
+    v = _centred([_in_ball(random) for _ in range(n)])
+    return Problem(
+        gravity.hamiltonian([1.0 / n] * n, name=f"cluster_{n}", softening=0.1, linear_momentum=False),
+        q0=[x for row in q for x in row],
+        p0=[x * (0.5 / n) for row in v for x in row],
+        parameters={"m": [1.0 / n] * n, "eps": softening},
+        t_end=t_end,
+        name="cluster",
+        title="a softened cluster",
+        arguments={"n": n} | changed(cluster, softening=softening, seed=seed, t_end=t_end),
+        references=("H. C. Plummer, Monthly Notices of the Royal Astronomical Society 71 (1911) 460-470",),
+        notes="All pairs interact: the cost grows with the square of n. Chaotic.",
+    )
+
+
+def _in_ball(random: Random) -> list[float]:
+    while True:
+        point = [2.0 * random.random() - 1.0 for _ in range(3)]
+        if point[0] * point[0] + point[1] * point[1] + point[2] * point[2] <= 1.0:
+            return point
+
+
+def _centred(rows: list[list[float]]) -> list[list[float]]:
+    centre = [math.fsum(row[c] for row in rows) / len(rows) for c in range(3)]
+    return [[x - c for x, c in zip(row, centre, strict=True)] for row in rows]

@@ -1,0 +1,110 @@
+"""The plane circular restricted three-body problem in the rotating frame.
+
+    H(q, p) = (p1^2 + p2^2)/2 + q2 p1 - q1 p2 - (1 - mu)/r1 - mu/r2
+
+with r1 the distance from (-mu, 0), r2 from (1 - mu, 0), and p = q' + (-q2, q1).
+The Jacobi integral is C = -2 H. V. Szebehely, Theory of Orbits (Academic Press
+1967). Periodic orbits around Earth and Moon of R. F. Arenstorf (1963): those of
+4 and 3 loops as in E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
+Differential Equations I, 2nd edition (Springer 1993), section II.0; that of 2
+loops, with another mass of the Moon, as in L. F. Shampine, M. K. Gordon,
+Computer Solution of Ordinary Differential Equations (Freeman 1975).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.errors import InputError, shown
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Hamiltonian
+
+MOON = 0.012277471
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A periodic orbit: it starts at (x, 0) with the velocity (0, speed)."""
+
+    x: float
+    speed: float
+    period: float
+    mu: float
+
+
+# By their number of loops.
+ORBITS = {
+    4: Orbit(0.994, -2.00158510637908252240537862224, 17.0652165601579625588917206249, MOON),
+    3: Orbit(0.994, -2.0317326295573368357302057924, 11.124340337266085134999734047, MOON),
+    2: Orbit(1.2, -1.04935750983031990726, 6.19216933131963970674, 1 / 82.45),
+}
+
+
+def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+    x, y = q[0], q[1]
+    r1 = m.sqrt((x + par.mu) ** 2 + y**2)
+    r2 = m.sqrt((x - (1 - par.mu)) ** 2 + y**2)
+    return (p[0] ** 2 + p[1] ** 2) / 2 + (y * p[0] - x * p[1]) - ((1 - par.mu) / r1 + par.mu / r2)
+
+
+def _jacobi(q: Any, p: Any, par: Any, m: Any) -> Any:
+    return -2 * _energy(q, p, par, m)
+
+
+def cr3bp(*, loops: int = 4, mu: float | None = None, t_end: float | None = None) -> Problem:
+    """Return the restricted three-body problem on one of Arenstorf's orbits.
+
+    Tests steps that must shrink at close passages, in a system that is not
+    separable; the orbits are unstable, so the return to the start is a test of
+    accuracy.
+
+    Parameters
+    ----------
+    loops : {4, 3, 2}
+        Which orbit.
+    mu : float, optional
+        The Moon's share of the mass, 0 < mu < 1; by default the one for which
+        the orbit is periodic: 0.012277471, and 1/82.45 for 2 loops.
+    t_end : float, optional
+        End of the integration; the orbit's period by default.
+
+    Returns
+    -------
+    Problem
+        State ``[q1, q2, p1, p2]``; parameter ``mu``; invariants: energy, Jacobi integral.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    if isinstance(loops, bool) or not isinstance(loops, int) or loops not in ORBITS:
+        raise InputError(f"loops={shown(loops)} of cr3bp must be one of {', '.join(map(str, ORBITS))}.")
+    orbit = ORBITS[loops]
+    share = orbit.mu if mu is None else mu
+    span = orbit.period if t_end is None else t_end
+    given.finite("cr3bp", mu=share, t_end=span)
+    if not 0 < share < 1:
+        raise InputError(f"mu={mu!r} of cr3bp must lie between 0 and 1.")
+    system = Hamiltonian(
+        _energy, dof=2, parameters={"mu": MOON}, invariants={"jacobi": _jacobi}, name="cr3bp"
+    )
+    return Problem(
+        system,
+        q0=[orbit.x, 0.0],
+        p0=[0.0, orbit.speed + orbit.x],
+        parameters={"mu": share},
+        t_end=span,
+        name="cr3bp",
+        title="the restricted three-body problem",
+        arguments={"loops": loops} | changed(cr3bp, mu=mu, t_end=t_end),
+        references=(
+            "V. Szebehely, Theory of Orbits, Academic Press 1967",
+            "E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, "
+            "2nd edition, Springer 1993, section II.0",
+            "L. F. Shampine, M. K. Gordon, Computer Solution of Ordinary Differential Equations, "
+            "Freeman 1975",
+        ),
+        notes="Not separable; close passages; unstable periodic orbits that return to their start.",
+    )

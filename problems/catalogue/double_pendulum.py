@@ -1,0 +1,86 @@
+"""The plane double pendulum: two point masses on two massless rods.
+
+With the angles q1, q2 from the vertical, d = q1 - q2 and M = m1 + m2,
+
+    H = (m2 l2^2 p1^2 + M l1^2 p2^2 - 2 m2 l1 l2 p1 p2 cos d) / (2 m2 l1^2 l2^2 (m1 + m2 sin^2 d))
+        - M g l1 cos q1 - m2 g l2 cos q2
+
+which is p^T K(q)^-1 p/2 + V(q) with the mass matrix
+K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]. L. D. Landau, E. M.
+Lifshitz, Mechanics (Pergamon 1960), section 5, problem 1 has the Lagrangian.
+"""
+
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Hamiltonian
+
+
+def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+    m1, m2, l1, l2, g = par.m1, par.m2, par.l1, par.l2, par.g
+    c, s = m.cos(q[0] - q[1]), m.sin(q[0] - q[1])
+    both = m1 + m2
+    inertia = m2 * l2**2 * p[0] ** 2 + both * l1**2 * p[1] ** 2 - 2 * m2 * l1 * l2 * (p[0] * p[1]) * c
+    kinetic = inertia / (2 * m2 * l1**2 * l2**2 * (m1 + m2 * s**2))
+    return kinetic - both * g * l1 * m.cos(q[0]) - m2 * g * l2 * m.cos(q[1])
+
+
+def double_pendulum(
+    *,
+    q1: float = 1.0,
+    q2: float = 1.5,
+    p1: float = 0.0,
+    p2: float = 0.0,
+    m1: float = 1.0,
+    m2: float = 1.0,
+    l1: float = 1.0,
+    l2: float = 1.0,
+    g: float = 1.0,
+    t_end: float = 100.0,
+) -> Problem:
+    """Return the double pendulum, by default with unit masses, lengths and gravity, from rest.
+
+    Tests a Hamiltonian that is neither separable nor polynomial, with chaotic
+    motion at larger energies.
+
+    Parameters
+    ----------
+    q1, q2 : float
+        Angles from the vertical, in radians, at the start.
+    p1, p2 : float
+        Their momenta at the start.
+    m1, m2, l1, l2 : float
+        Masses and lengths of the rods.
+    g : float
+        Gravity.
+    t_end : float
+        End of the integration.
+
+    Returns
+    -------
+    Problem
+        State ``[q1, q2, p1, p2]``; parameters as named; invariant: energy.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values that are not finite, masses or lengths that are not positive.
+    """
+    given.finite("double_pendulum", q1=q1, q2=q2, p1=p1, p2=p2, g=g, t_end=t_end)
+    given.positive("double_pendulum", m1=m1, m2=m2, l1=l1, l2=l2)
+    names = {"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 1.0}
+    values = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
+    return Problem(
+        Hamiltonian(_energy, dof=2, parameters=names, name="double_pendulum"),
+        q0=[q1, q2],
+        p0=[p1, p2],
+        parameters=values,
+        t_end=t_end,
+        name="double_pendulum",
+        title="the double pendulum",
+        arguments={"q1": q1, "q2": q2} | changed(double_pendulum, p1=p1, p2=p2, **values, t_end=t_end),
+        references=("L. D. Landau, E. M. Lifshitz, Mechanics, Pergamon 1960, section 5, problem 1",),
+        notes="Neither separable nor polynomial; chaotic at larger energies.",
+    )

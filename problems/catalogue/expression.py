@@ -1,0 +1,240 @@
+"""A Hamiltonian given as text, and the problem made of it.
+
+Names in the text are the coordinates ``q`` and ``p`` (one degree of freedom) or
+``q1, p1, q2, ...``, the time ``t``, ``pi``, and parameters; `problems.catalogue._formula` says what
+else there is.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.catalogue._formula import (
+    COORDINATE,
+    FUNCTIONS,
+    NAME,
+    Call,
+    Chain,
+    Expression,
+    Formula,
+    Name,
+    Negative,
+    Number,
+    Power,
+    applied,
+    parse,
+)
+from problems.errors import InputError, unknown
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Hamiltonian
+
+MOST_FREEDOM = 100  # degrees of freedom; larger systems have sums, which text has not
+
+
+def hamiltonian(
+    text: str,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    invariants: Mapping[str, str] | None = None,
+    name: str = "expression",
+) -> Hamiltonian:
+    """Return the system of a Hamiltonian given as text.
+
+    Parameters
+    ----------
+    text : str
+        The energy in ``q, p`` or ``q1, p1, .. qn, pn``; the highest number is the
+        number of degrees of freedom.
+    parameters : mapping of str to float
+        Names and default values of all other names in it.
+    invariants : mapping of str to str
+        Further quantities that are kept, as text too.
+    name : str
+        The system's name.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For text that is not a formula, names without a value, or values of names
+        that do not occur.
+    """
+    given_values = dict(parameters or {})
+    energy = parse(text)
+    others = {key: parse(value) for key, value in (invariants or {}).items()}
+    dof = _freedom(energy.text, energy.coordinates)
+    used: set[str] = set()
+    for formula in (energy, *others.values()):
+        for key in formula.parameters:
+            if key not in given_values:
+                raise _undeclared(formula, key, given_values)
+            used.add(key)
+        for key in formula.coordinates:
+            _check_coordinate(formula, key, dof)
+    for key in given_values:
+        if key not in used:
+            raise unknown("parameter, not in the formula,", key, energy.names)
+    try:
+        system = Hamiltonian(
+            _callable(energy),
+            dof=dof,
+            parameters=given_values,
+            invariants={key: _callable(formula) for key, formula in others.items()},
+            name=name,
+        )
+        system.function("field")  # the derivatives may overflow where H does not
+    except OverflowError:
+        raise InputError(f"the formula {text!r} leads to numbers that a double cannot hold.") from None
+    except InputError as error:  # it names the line below that walks the formula, which is no help
+        reason = str(error).partition("`: ")[2] or str(error)
+        raise InputError(f"the formula {text!r} cannot be used: {reason}") from None
+    return system
+
+
+def expression(
+    *,
+    H: str = "p^2/2 - cos(q)",
+    q0: Sequence[float] = (0.0,),
+    p0: Sequence[float] = (1.9,),
+    parameters: str = "",
+    t_end: float = 100.0,
+) -> Problem:
+    """Return a problem of your own, its Hamiltonian given as text.
+
+    Tests whatever you want to know, such as
+    ``expression(H="(p1^2 + p2^2)/2 + q1^2*q2^2", q0=[0.5, 1.0], p0=[0.0, 0.3])``.
+
+    Parameters
+    ----------
+    H : str
+        The energy; see `problems.catalogue.expression`.
+    q0, p0 : sequence of float
+        The start, as many numbers as there are degrees of freedom.
+    parameters : str
+        Values of the other names in ``H``: ``"k=2, m=0.5"``.
+    t_end : float
+        End of the integration.
+
+    Returns
+    -------
+    Problem
+        State ``[q1 .. qn, p1 .. pn]``; parameters as named in ``H``; invariant:
+        energy, if ``H`` does not contain ``t``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything that cannot be read.
+    """
+    if not isinstance(H, str):
+        raise InputError(f'H={H!r} of expression must be text, such as "p^2/2 - cos(q)".')
+    values = assignments(parameters)
+    system = hamiltonian(H, parameters=values)
+    dof = system.dim // 2
+    return Problem(
+        system,
+        q0=given.numbers("expression", "q0", q0, dof),
+        p0=given.numbers("expression", "p0", p0, dof),
+        parameters=values,
+        t_end=t_end,
+        name="expression",
+        title=H,
+        arguments={"H": H, "q0": tuple(q0), "p0": tuple(p0)}
+        | changed(expression, parameters=parameters, t_end=t_end),
+        references=("given by the user",),
+        notes="A formula of your own.",
+    )
+
+
+def assignments(text: str) -> dict[str, float]:
+    """Return the values in a text such as ``"k=2, m=0.5"``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else.
+    """
+    if not isinstance(text, str):
+        raise InputError(f'parameters={text!r} must be text, such as "k=2, m=0.5".')
+    values: dict[str, float] = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        name, sign, number = (piece.strip() for piece in part.partition("="))
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        if not sign or not NAME.fullmatch(name) or not math.isfinite(value):
+            raise InputError(f'cannot read {part!r}; write parameters as "k=2, m=0.5".')
+        if name in values:
+            raise InputError(f"the parameter {name!r} is given twice.")
+        if name in ("t", "pi", *FUNCTIONS) or COORDINATE.fullmatch(name):
+            raise InputError(f"{name!r} has a meaning of its own and cannot be a parameter.")
+        values[name] = value
+    return values
+
+
+def _freedom(text: str, coordinates: Sequence[str]) -> int:
+    plain = [name for name in coordinates if name in ("q", "p")]
+    numbered = [name for name in coordinates if name not in ("q", "p")]
+    if plain and numbered:
+        raise InputError(
+            f"the formula {text!r} mixes {plain[0]!r} with {numbered[0]!r}; number all coordinates."
+        )
+    if not coordinates:
+        raise InputError(f"the formula {text!r} contains no coordinate; use q and p, or q1, p1, q2, ...")
+    dof = max((int(name[1:]) for name in numbered), default=1)
+    if dof > MOST_FREEDOM:
+        raise InputError(
+            f"the formula {text!r} has more than {MOST_FREEDOM} degrees of freedom; "
+            "write it in Python with m.sum."
+        )
+    return dof
+
+
+def _check_coordinate(formula: Expression, name: str, dof: int) -> None:
+    if name in ("q", "p") and dof != 1:
+        raise InputError(f"{name!r} in {formula.text!r} needs a number, such as {name}1.")
+    if name not in ("q", "p") and int(name[1:]) > dof:
+        raise InputError(f"{name!r} in {formula.text!r} does not exist: H has {dof} degrees of freedom.")
+
+
+def _undeclared(formula: Expression, name: str, values: Mapping[str, float]) -> InputError:
+    near = str(unknown("name", name, [*values, "q", "p", "t", "pi", *FUNCTIONS]))
+    hint = near.partition("; ")[2] if "did you mean" in near else f'give it a value, as in "{name}=1".'
+    return InputError(f"the formula {formula.text!r} contains {name!r}, which has no value; {hint}")
+
+
+def _callable(expression: Expression) -> Callable[..., Any]:
+    """Return the function to be traced; it walks the formula."""
+
+    def H(t: Any, q: Any, p: Any, par: Any, m: Any) -> Any:
+        def named(word: str) -> Any:
+            if word == "t":
+                return t
+            match = COORDINATE.fullmatch(word)
+            if match is None:
+                return getattr(par, word)
+            return (q if match[1] == "q" else p)[int(match[2] or 1) - 1]
+
+        def value(formula: Formula) -> Any:
+            match formula:
+                case Number(value=number):
+                    return number
+                case Name(word=word):
+                    return named(word)
+                case Negative(inner=inner):
+                    return -value(inner)
+                case Chain(first=first, steps=steps):
+                    total = value(first)
+                    for symbol, right in steps:
+                        total = applied(symbol, total, value(right))
+                    return total
+                case Power(base=base, exponent=exponent):
+                    return value(base) ** (int(exponent) if exponent.is_integer() else exponent)
+                case Call(function=function, argument=argument):
+                    return getattr(m, function)(value(argument))
+
+        return value(expression.formula)
+
+    return H

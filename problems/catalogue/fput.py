@@ -1,0 +1,112 @@
+"""The chain of Fermi, Pasta, Ulam and Tsingou: n masses, nonlinear springs, fixed ends.
+
+    H(q, p) = sum_{i=1..n} p_i^2/2 + sum_{i=0..n} V(q_{i+1} - q_i),   q_0 = q_{n+1} = 0
+    V(r) = r^2/2 + alpha r^3/3 + beta r^4/4
+
+E. Fermi, J. Pasta, S. Ulam, "Studies of nonlinear problems", Los Alamos report
+LA-1940 (1955): n = 32, alpha = 1/4, the lowest mode. T. Dauxois, "Fermi, Pasta,
+Ulam, and a mysterious lady", Physics Today 61 (2008) 55-57.
+"""
+
+import math
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Hamiltonian
+
+
+def fput(
+    *,
+    n: int = 32,
+    alpha: float = 0.25,
+    beta: float = 0.0,
+    start: str = "mode",
+    amplitude: float = 1.0,
+    temperature: float = 0.1,
+    seed: int = 1,
+    t_end: float | None = None,
+) -> Problem:
+    """Return the chain, from its lowest mode or from a thermal start.
+
+    Tests a polynomial energy in many degrees of freedom; the lowest mode returns
+    to itself almost (recurrence), a thermal start excites every frequency up to 2.
+
+    Parameters
+    ----------
+    n : int
+        Number of moving masses, at least 2; large chains are compiled as a loop.
+    alpha, beta : float
+        Cubic and quartic strength of the springs.
+    start : {"mode", "thermal"}
+        ``"mode"``: q_i = amplitude sin(pi i/(n + 1)), at rest.
+        ``"thermal"``: q = 0 and independent momenta of variance ``2 temperature`` (so
+        that half of the kinetic energy, about ``n temperature/2``, is left after
+        equipartition), by `problems.catalogue._given.gaussians`.
+    amplitude : float
+        Of the lowest mode.
+    temperature : float
+        Of the thermal start. With beta = 0 a spring breaks at the energy
+        1/(6 alpha^2); stay well below, or give beta >= 2 alpha^2/9.
+    seed : int
+        Of the thermal start.
+    t_end : float, optional
+        End of the integration; by default 960 from the mode, 240 from the thermal start.
+
+    Returns
+    -------
+    Problem
+        State ``[q_1 .. q_n, p_1 .. p_n]``; parameters ``alpha``, ``beta``; invariant: energy.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    given.whole("fput", 2, n=n)
+    given.size("fput", 2 * n, n=n)
+    given.whole("fput", 0, seed=seed)
+    given.choice("fput", "start", start, ("mode", "thermal"))
+    given.finite("fput", alpha=alpha, beta=beta, amplitude=amplitude)
+    given.positive("fput", temperature=temperature)
+    span = t_end if t_end is not None else {"mode": 960.0, "thermal": 240.0}[start]
+    given.finite("fput", t_end=span)
+
+    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+        def spring(r: Any) -> Any:
+            return r * r / 2 + par.alpha * r**3 / 3 + par.beta * r**4 / 4
+
+        kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(n))
+        inner = m.sum(lambda i: spring(q[i + 1] - q[i]), range(n - 1))
+        return kinetic + (spring(q[0]) + inner + spring(-q[n - 1]))
+
+    if start == "mode":
+        q0 = [given.nearest(lambda i=i: _mode(i, n, amplitude)) for i in range(1, n + 1)]
+        p0 = [0.0] * n
+        shown = changed(fput, amplitude=amplitude)
+    else:
+        q0 = [0.0] * n
+        p0 = [math.sqrt(2 * temperature) * draw for draw in given.gaussians(seed, n)]
+        shown = {"start": start} | changed(fput, temperature=temperature, seed=seed)
+    return Problem(
+        Hamiltonian(energy, dof=n, parameters={"alpha": 0.25, "beta": 0.0}, name=f"fput_{n}"),
+        q0=q0,
+        p0=p0,
+        parameters={"alpha": alpha, "beta": beta},
+        t_end=span,
+        name="fput",
+        title="the Fermi-Pasta-Ulam-Tsingou chain",
+        arguments={"n": n, "alpha": alpha, "beta": beta} | shown | changed(fput, t_end=t_end),
+        references=(
+            "E. Fermi, J. Pasta, S. Ulam, Studies of nonlinear problems, Los Alamos report LA-1940 (1955)",
+            "T. Dauxois, Fermi, Pasta, Ulam, and a mysterious lady, Physics Today 61 (2008) 55-57",
+        ),
+        notes="A polynomial energy of degree 3 or 4 in many degrees of freedom.",
+    )
+
+
+def _mode(i: int, n: int, amplitude: float) -> Any:
+    import mpmath
+
+    return mpmath.mpf(amplitude) * mpmath.sin(mpmath.pi * i / (n + 1))

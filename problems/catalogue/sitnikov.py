@@ -1,0 +1,125 @@
+"""Sitnikov's problem: two equal primaries on ellipses, a planetoid on the axis between them.
+
+L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between Gauss-Legendre
+methods and Hamiltonian BVMs defined over Gauss points", section "Sitnikov's
+problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5, t in [0, 1500].
+"""
+
+from decimal import Decimal, localcontext
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.errors import InputError
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Bodies, Hamiltonian
+
+
+def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+    kinetic = sum((p[3 * i] ** 2 + p[3 * i + 1] ** 2 + p[3 * i + 2] ** 2) / (2 * par.m[i]) for i in range(3))
+    potential = 0
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        x, y, z = (q[3 * i + c] - q[3 * j + c] for c in range(3))
+        # The squares in the same order for every pair: the symmetry depends on it.
+        potential -= par.m[i] * par.m[j] / m.sqrt(x * x + y * y + z * z)
+    return kinetic + potential
+
+
+def _linear_momentum(p: Any) -> Any:
+    return [p[c] + p[3 + c] + p[6 + c] for c in range(3)]
+
+
+def _angular_momentum(q: Any, p: Any) -> Any:
+    def total(a: int, b: int) -> Any:
+        return sum(q[3 * i + a] * p[3 * i + b] - q[3 * i + b] * p[3 * i + a] for i in range(3))
+
+    return [total(1, 2), total(2, 0), total(0, 1)]
+
+
+def _off_axis(q: Any, m: Any) -> Any:
+    return m.sqrt(q[6] ** 2 + q[7] ** 2)
+
+
+def _apocentre_momentum(e: float, d: float) -> float:
+    """Return sqrt(2 (1 - e)/d)/2, correctly rounded: for e = 3/4, d = 5 it is sqrt(10)/20."""
+    with localcontext(prec=60):
+        return float((2 * (1 - Decimal(e)) / Decimal(d)).sqrt() / 2)
+
+
+def sitnikov(
+    *,
+    e: float = 0.75,
+    d: float = 5.0,
+    m3: float = 1e-5,
+    v3: float = 0.5,
+    z3: float = 1e-9,
+    t_end: float = 1500.0,
+) -> Problem:
+    """Return Sitnikov's problem as three bodies with G = 1.
+
+    Tests whether rounding keeps a symmetry on which everything depends, and steps
+    that must resolve the primaries' pericentres.
+
+    Parameters
+    ----------
+    e : float
+        Eccentricity of the primaries' orbits, 0 <= e < 1. Above about 0.725 the
+        planetoid's motion is chaotic.
+    d : float
+        Distance of the primaries at the start, when they are farthest apart.
+    m3 : float
+        Mass of the planetoid; the primaries have mass 1.
+    v3 : float
+        Velocity of the planetoid along the axis at the start. (The paper prints
+        1/2 among the momenta; read as a momentum it would mean a velocity of
+        5e4 and escape.)
+    z3 : float
+        Height of the planetoid at the start.
+    t_end : float
+        End of the integration.
+
+    Returns
+    -------
+    Problem
+        State ``[q1 q2 q3 p1 p2 p3]``, each x, y, z; invariants: energy, linear
+        and angular momentum; guard: the planetoid's distance from the axis.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    given.finite("sitnikov", e=e, d=d, m3=m3, v3=v3, z3=z3, t_end=t_end)
+    if not 0 <= e < 1:
+        raise InputError(f"e={e!r} of sitnikov must be an eccentricity, 0 <= e < 1.")
+    if d <= 0 or m3 <= 0:
+        raise InputError(f"d={d!r} and m3={m3!r} of sitnikov must be positive.")
+    system = Hamiltonian(
+        _energy,
+        dof=9,
+        parameters={"m": (1.0, 1.0, 1e-5)},
+        invariants={"linear_momentum": _linear_momentum, "angular_momentum": _angular_momentum},
+        guards={"off_axis": _off_axis},
+        bodies=Bodies(masses="m", G=1.0, dimension=3),
+        name="sitnikov",
+    )
+    momentum = _apocentre_momentum(e, d)
+    return Problem(
+        system,
+        q0=[-d / 2, 0.0, 0.0, d / 2, 0.0, 0.0, 0.0, 0.0, z3],
+        p0=[0.0, -momentum, 0.0, 0.0, momentum, 0.0, 0.0, 0.0, m3 * v3],
+        parameters={"m": (1.0, 1.0, m3)},
+        t_end=t_end,
+        name="sitnikov",
+        title="Sitnikov's problem",
+        arguments={"e": e} | changed(sitnikov, d=d, m3=m3, v3=v3, z3=z3, t_end=t_end),
+        references=(
+            "L. Brugnano, F. Iavernaro, T. Susca: Numerical comparisons between Gauss-Legendre "
+            "methods and Hamiltonian BVMs defined over Gauss points",
+        ),
+        notes=(
+            "The planetoid stays on the axis only while rounding keeps the symmetry of a half turn "
+            "with the primaries swapped bit for bit; energy and angular momentum hardly see an ejection. "
+            "The barycentre drifts along the axis and is not moved to the origin."
+        ),
+    )

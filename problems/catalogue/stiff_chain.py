@@ -1,0 +1,78 @@
+"""A chain of alternating stiff linear and soft nonlinear springs.
+
+    H(q, p) = sum_i p_i^2/2 + omega^2/2 sum_{i=1..m} x_{m+i}^2
+              + 1/4 ((x_1 - x_{m+1})^4 + sum_{i=1..m-1} (x_{i+1} - x_{m+i+1} - x_i - x_{m+i})^4
+                     + (x_m + x_{2m})^4)
+
+with q = x: x_1..x_m the (scaled) positions of the stiff springs and x_{m+1}..x_{2m}
+their (scaled) lengths. L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992)
+334-348; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd
+edition (Springer 2006), section I.5.1: m = 3, omega = 50.
+"""
+
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.hamiltonian import Hamiltonian
+
+
+def stiff_chain(*, springs: int = 3, omega: float = 50.0, t_end: float = 200.0) -> Problem:
+    """Return the chain with fixed ends, as in the book.
+
+    Tests highly oscillatory motion: a method should step over the fast
+    oscillations without spoiling the slow exchange of energy among the stiff springs, whose
+    total oscillatory energy is an adiabatic invariant.
+
+    Parameters
+    ----------
+    springs : int
+        Number m of stiff springs, at least 2; 2 m degrees of freedom.
+    omega : float
+        Frequency of the stiff springs, positive.
+    t_end : float
+        End of the integration; the exchange takes a time of the order of omega.
+
+    Returns
+    -------
+    Problem
+        State ``[x_1 .. x_2m, y_1 .. y_2m]``, from x_1 = y_1 = y_{m+1} = 1, x_{m+1} = 1/omega
+        and 0 elsewhere; parameter ``omega``; invariant: energy.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    given.whole("stiff_chain", 2, springs=springs)
+    given.size("stiff_chain", 4 * springs, springs=springs)
+    given.positive("stiff_chain", omega=omega)
+    given.finite("stiff_chain", t_end=t_end)
+    k = springs
+
+    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+        kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(2 * k))
+        stiff = par.omega * par.omega / 2 * m.sum(lambda i: q[k + i] * q[k + i], range(k))
+        inner = m.sum(lambda i: (q[i + 1] - q[k + i + 1] - q[i] - q[k + i]) ** 4, range(k - 1))
+        return kinetic + (stiff + ((q[0] - q[k]) ** 4 + inner + (q[k - 1] + q[2 * k - 1]) ** 4) / 4)
+
+    q0, p0 = [0.0] * (2 * k), [0.0] * (2 * k)
+    q0[0] = p0[0] = p0[k] = 1.0
+    q0[k] = 1.0 / omega
+    return Problem(
+        Hamiltonian(energy, dof=2 * k, parameters={"omega": 50.0}, name=f"stiff_chain_{k}"),
+        q0=q0,
+        p0=p0,
+        parameters={"omega": omega},
+        t_end=t_end,
+        name="stiff_chain",
+        title="stiff and soft springs",
+        arguments={"omega": omega} | changed(stiff_chain, springs=springs, t_end=t_end),
+        references=(
+            "L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992) 334-348",
+            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+            "Springer 2006, section I.5.1",
+        ),
+        notes="Highly oscillatory: a polynomial energy of degree 4 with one large frequency.",
+    )

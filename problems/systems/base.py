@@ -1,0 +1,315 @@
+"""What all systems have in common: a traced graph, parameters, invariants, guards."""
+
+import hashlib
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems import limits
+from problems.calculus import functions
+from problems.calculus.functions import Function
+from problems.calculus.stacked import energy_gradient, gradients, stacked
+from problems.errors import InputError, shown, unknown
+from problems.trace import arguments
+from problems.trace.graph import Graph, Node
+
+Value = float | Sequence[float]
+
+_COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What makes a system N gravitating bodies, for engines that know bodies.
+
+    Attributes
+    ----------
+    masses : str
+        Name of the vector parameter with the N masses.
+    G : float or str
+        The gravitational constant, or the parameter that holds it.
+    dimension : int
+        Coordinates per body; the state holds all positions body by body, then all momenta.
+    """
+
+    masses: str = "m"
+    G: float | str = 1.0
+    dimension: int = 3
+
+
+class System:
+    """A first-order system traced once; the base of `Hamiltonian` and `VectorField`.
+
+    Attributes
+    ----------
+    kind : {"hamiltonian", "vector_field", "poisson"}
+        What the system is.
+    traced : bool
+        Whether the vector field is a graph that can be emitted; see `problems.systems.untraced`.
+    dim : int
+        Length of the state.
+    dof : int or None
+        Degrees of freedom; ``None`` where the state is not positions and momenta.
+    name : str
+        A name for messages and generated code.
+    parameters : mapping of str to float or tuple of float
+        Names and default values; the values are run-time arguments.
+    bodies : Bodies or None
+        What makes it an N-body system.
+    """
+
+    kind: ClassVar[str]
+    traced: ClassVar[bool] = True
+
+    def __init__(
+        self,
+        *,
+        dim: int,
+        dof: int | None,
+        parameters: Mapping[str, Value],
+        invariants: Mapping[str, Callable[..., Any]],
+        guards: Mapping[str, Callable[..., Any]],
+        name: str,
+    ) -> None:
+        if not isinstance(name, str):
+            raise InputError(f"name={shown(name)} of a system must be a text.")
+        for what, given in (("parameters", parameters), ("invariants", invariants), ("guards", guards)):
+            check_names(what, given)
+        self.dim = dim
+        self.dof = dof
+        self.name = name
+        self.bodies: Bodies | None = None
+        self.parameters: Mapping[str, Value] = MappingProxyType(
+            {key: _checked(key, value) for key, value in parameters.items()}
+        )
+        layout: dict[str, tuple[int, int | None]] = {}
+        offset = 0
+        for key, value in self.parameters.items():
+            size = len(value) if isinstance(value, tuple) else None
+            layout[key] = (offset, size)
+            offset += 1 if size is None else size
+        self._layout = layout
+        self.n_par = offset
+        self._graph = Graph(dof)
+        self._functions: dict[str, Function | None] = {}
+        self._derived: dict[str, Function] = {}
+        self._vector_valued: dict[str, bool] = {}
+        self.invariant_names: tuple[str, ...] = tuple(invariants)
+        self.guard_names: tuple[str, ...] = tuple(guards)
+        self._declared = (dict(invariants), dict(guards))
+
+    def _trace_declared(self) -> None:
+        invariants, guards = self._declared
+        for key, function in invariants.items():
+            what = f"invariant {key!r}"
+            value = self._call(function, what)
+            listed = isinstance(value, list | tuple | arguments.Vector)
+            values = list(value) if listed else [value]
+            nodes = [arguments.scalar(v, graph=self._graph, function=function, what=what) for v in values]
+            if not nodes:
+                raise InputError(f"{what} returns an empty list; return a number or a list of numbers.")
+            self._functions[f"invariant:{key}"] = functions.plain(self._graph, nodes)
+            self._vector_valued[f"invariant:{key}"] = listed
+        for key, function in guards.items():
+            self._functions[f"guard:{key}"] = functions.plain(
+                self._graph, [self._scalar(function, f"guard {key!r}")]
+            )
+
+    def _call(self, function: Callable[..., Any], what: str) -> Any:
+        return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, what=what)
+
+    def _scalar(self, function: Callable[..., Any], what: str) -> Node:
+        return arguments.scalar(self._call(function, what), graph=self._graph, function=function, what=what)
+
+    def trace(self, function: Callable[..., Any], what: str) -> Function:
+        """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
+
+        Parameters
+        ----------
+        function : callable
+            Returns one number; its arguments are among ``t, q, p, y, par, m``.
+        what : str
+            What it is, for messages.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For anything that cannot be traced, with the line.
+        """
+        graph = Graph(self.dof)
+        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
+        return functions.plain(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
+
+    @property
+    def separable(self) -> bool:
+        """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""
+        return False
+
+    def function(self, what: str) -> Function:
+        """Return a function of the system as a graph, for the emitters.
+
+        Parameters
+        ----------
+        what : str
+            ``"field"``, ``"force"``, ``"velocity_scale"``, ``"hamiltonian"``,
+            ``"invariant:<name>"``, ``"guard:<name>"``; ``"gradient:<invariant>"`` (dim
+            outputs for each component of the invariant); ``"invariant:<name>[i]"`` and
+            ``"gradient:<name>[i]"`` for one component; for Poisson systems ``"gradient"``
+            (of H) and ``"structure"`` (B row by row); ``"jacobian"`` and
+            ``"jacobian:force"`` (the entries that `problems.calculus.jacobian` lists). Several,
+            separated by ``", "``, are one function with all their outputs.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the system has no such function.
+        """
+        if not isinstance(what, str):
+            raise unknown(f"function of {self.name}", what, self.offered())
+        found = self._derived.get(what)
+        if found is None:
+            found = self._derive(what)
+            if found is not None:
+                self._derived[what] = found
+        if found is None and self._known(what):
+            found = self._functions[what]
+        if found is None:
+            raise unknown(f"function of {self.name}", what, self.offered())
+        return found
+
+    def _derive(self, what: str) -> Function | None:
+        """Return functions made of others: several as one, gradients, single components."""
+        if ", " in what:
+            return stacked([self.function(part) for part in what.split(", ")])
+        if what in ("jacobian", "jacobian:force"):
+            from problems.calculus.jacobian import jacobian  # it knows systems
+
+            made = jacobian(self, what)
+            return None if made is None else made.function
+        if (part := _COMPONENT.fullmatch(what)) is not None:
+            kind, name, place = part["kind"], part["name"], int(part["place"])
+            whole = self._functions.get(f"invariant:{name}")
+            if whole is None or place >= len(whole.outputs):
+                return None
+            if kind == "invariant":
+                return Function(whole.graph, (whole.outputs[place],))
+            return gradients(self._graph, [whole.outputs[place][0].node], self.dim)
+        if not what.startswith("gradient:"):
+            return None
+        if what == "gradient:energy" and self.dof is not None:
+            return energy_gradient(self.function("field"), self.dof)
+        whole = self._functions.get(f"invariant:{what.removeprefix('gradient:')}")
+        if whole is None:
+            return None
+        return gradients(self._graph, [terms[0].node for terms in whole.outputs], self.dim)
+
+    def offered(self) -> list[str]:
+        """Return the names that `function` knows."""
+        names = ["field", "hamiltonian", "force", "velocity_scale"]
+        return [name for name in names if self._known(name)] + [
+            name for name in self._functions if ":" in name and self._functions[name] is not None
+        ]
+
+    def _known(self, what: str) -> bool:
+        if what not in self._functions:
+            self._functions[what] = self._build(what)
+        return self._functions[what] is not None
+
+    def _build(self, what: str) -> Function | None:
+        raise NotImplementedError
+
+    def is_vector(self, what: str) -> bool:
+        """Whether the invariant ``what`` is a vector."""
+        return self._vector_valued.get(what, False)
+
+    def pack(self, values: Mapping[str, Value] = MappingProxyType({})) -> NDArray[np.float64]:
+        """Return the flat parameter vector, defaults filled in.
+
+        Parameters
+        ----------
+        values : mapping of str to float or sequence of float
+            Values by name; names left out keep their defaults.
+
+        Returns
+        -------
+        ndarray, shape (n_par,)
+
+        Raises
+        ------
+        problems.errors.InputError
+            For an unknown name, a wrong length or a value that is not finite.
+        """
+        par = np.empty(self.n_par)
+        for key in check_names("parameters", values):
+            if key not in self._layout:
+                raise unknown(f"parameter of {self.name}", key, self._layout)
+        for key, (offset, size) in self._layout.items():
+            value = _checked(key, values[key]) if key in values else self.parameters[key]
+            if size is None and isinstance(value, tuple):
+                raise InputError(f"parameter {key!r} of {self.name} is one number, not {len(value)}.")
+            if size is not None and (not isinstance(value, tuple) or len(value) != size):
+                raise InputError(
+                    f"parameter {key!r} of {self.name} needs {size} numbers, not {shown(value)}."
+                )
+            par[offset : offset + (size or 1)] = value
+        return par
+
+    def unpack(self, par: NDArray[np.float64]) -> dict[str, float | NDArray[np.float64]]:
+        """Return the parameters by name from the flat vector that `pack` makes; sequences as arrays."""
+        return {
+            key: float(par[offset]) if size is None else par[offset : offset + size].copy()
+            for key, (offset, size) in self._layout.items()
+        }
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of the traced field: its structure, not its parameters' values."""
+        from problems import emit  # the emitters know systems; a system needs them for its name only
+
+        text = emit.source(self, "field", "numba").text
+        body = text.replace(emit.function_name(self, "field"), "field")
+        return hashlib.sha256(f"{self.kind} {self.dim} {self.dof}\n{body}".encode()).hexdigest()
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Return a function's name as an identifier."""
+    name = getattr(function, "__name__", "system")
+    return name if name.isidentifier() else "system"
+
+
+def check_names(what: str, given: Any) -> Mapping[str, Any]:
+    """Return a mapping from names, or refuse anything else."""
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) and key for key in given):
+        raise InputError(f"{what}={shown(given)} must be a dictionary by name, as in {{'name': ...}}.")
+    return given
+
+
+def check_count(what: str, count: Any) -> int:
+    """Return ``count``, a whole number of at least 1 that is not beyond `problems.limits`, or refuse it."""
+    if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 1:
+        raise InputError(f"{what}={shown(count)} must be a whole number of at least 1.")
+    components = 2 * int(count) if what == "dof" else int(count)
+    limits.check(f"a system with {what}={shown(count)}", "COMPONENTS", components)
+    return int(count)
+
+
+def _checked(name: str, value: Any) -> Value:
+    if not isinstance(name, str) or not name.isidentifier() or name.startswith("__"):
+        raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(
+            f"parameter {name!r} is {shown(value)}, not a number or a list of numbers."
+        ) from error
+    if array.ndim > 1 or not np.isfinite(array).all():
+        raise InputError(
+            f"parameter {name!r} is {shown(value)}; give one finite number or a flat list of them."
+        )
+    return float(array) if array.ndim == 0 else tuple(array.tolist())

@@ -1,0 +1,148 @@
+"""Poisson systems y' = B(y) grad H(y), with a skew-symmetric structure matrix B."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from problems.calculus import functions
+from problems.calculus.functions import Function
+from problems.calculus.gradient import gradient
+from problems.calls import checked
+from problems.errors import InputError
+from problems.systems.base import System, Value, check_count, check_names, name_of
+from problems.trace import arguments
+from problems.trace.graph import Node, T
+from problems.trace.lines import line_of_function
+
+
+class Poisson(System):
+    """A system y' = B(y) grad H(y) that keeps its energy H, and the Casimirs of B.
+
+    Parameters
+    ----------
+    H : callable
+        The energy; names the arguments it needs among ``y, par, m`` (``t`` too, but
+        then the energy is not kept). Sums are Python's own: `m.sum` is for
+        canonical systems.
+    B : callable
+        Returns the structure matrix, dim lists of dim entries, with
+        ``B[j][i]`` written as ``-B[i][j]``; arguments as for ``H``.
+    dim : int
+        Length of the state.
+    parameters, guards, name
+        As for `Hamiltonian`.
+    invariants : mapping of str to callable
+        Quantities kept besides the energy, such as the Casimirs of B.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If B has not the right shape or is not skew-symmetric as it is written.
+
+    Examples
+    --------
+    The rigid body:
+
+    >>> def H(y):
+    ...     return (y[0]**2/2 + y[1]**2 + 3*y[2]**2/2)/2
+    >>> def B(y):
+    ...     return [[0, -y[2], y[1]], [y[2], 0, -y[0]], [-y[1], y[0], 0]]
+    >>> Poisson(H, B, dim=3)
+    Poisson(H, dim=3)
+    """
+
+    kind = "poisson"
+
+    @checked
+    def __init__(
+        self,
+        H: Callable[..., Any],
+        B: Callable[..., Any],
+        *,
+        dim: int,
+        parameters: Mapping[str, Value] = MappingProxyType({}),
+        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        name: str | None = None,
+    ) -> None:
+        dim = check_count("dim", dim)
+        if "energy" in check_names("invariants", invariants):
+            raise InputError("the invariant 'energy' is H itself; give the others only.")
+        super().__init__(
+            dim=dim,
+            dof=None,
+            parameters=parameters,
+            invariants=invariants,
+            guards=guards,
+            name=name or name_of(H),
+        )
+        energy = self._scalar(H, "H")
+        self._functions["hamiltonian"] = functions.plain(self._graph, [energy])
+        if not energy.flags & T:
+            self._functions["invariant:energy"] = self._functions["hamiltonian"]
+            self.invariant_names = ("energy", *self.invariant_names)
+        slope = self._gradient(energy, H)
+        matrix = self._matrix(B)
+        self._functions["gradient"] = functions.plain(self._graph, slope)
+        self._functions["structure"] = functions.plain(self._graph, [b for row in matrix for b in row])
+        self._functions["field"] = functions.plain(self._graph, [_product(row, slope) for row in matrix])
+        self._trace_declared()
+
+    def __repr__(self) -> str:
+        return f"Poisson({self.name}, dim={self.dim})"
+
+    def _gradient(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
+        found = gradient(energy)
+        if found.loops:
+            raise InputError(
+                f"{line_of_function(H)}: H of a Poisson system uses m.sum; write the sum in Python, "
+                "such as sum(y[i]**2 for i in range(n))."
+            )
+        slope = []
+        for place in range(self.dim):
+            total = self._graph.const(0.0)
+            for term in found.terms.get(place, ()):
+                total = total + term.node
+            slope.append(total)
+        return slope
+
+    def _matrix(self, B: Callable[..., Any]) -> list[list[Node]]:
+        rows = self._call(B, "B")
+        line = line_of_function(B)
+        listed = list | tuple | arguments.Vector
+        if (
+            not isinstance(rows, listed)
+            or len(rows) != self.dim
+            or not all(isinstance(row, listed) and len(row) == self.dim for row in rows)
+        ):
+            raise InputError(f"{line}: B must return {self.dim} lists of {self.dim} entries.")
+        matrix = [
+            [
+                arguments.scalar(b, graph=self._graph, function=B, what=f"B's entry [{i}][{j}]")
+                for j, b in enumerate(row)
+            ]
+            for i, row in enumerate(rows)
+        ]
+        for i in range(self.dim):
+            for j in range(i + 1):
+                a, b = matrix[i][j], -matrix[j][i]
+                zeros = a.op == b.op == "const" and a.data == b.data == 0.0  # 0 and -0 are two nodes
+                if a is not b and not zeros:
+                    raise InputError(
+                        f"{line}: B is not skew-symmetric as it is written: [{i}][{j}] is not minus "
+                        f"[{j}][{i}]; write the one as minus the other, and 0 on the diagonal."
+                    )
+        return matrix
+
+    def _build(self, what: str) -> Function | None:
+        return None
+
+
+def _product(row: list[Node], slope: list[Node]) -> Node:
+    """Return sum_j row_j slope_j, in the order of j, without the zeros."""
+    total: Node | None = None
+    for b, d in zip(row, slope, strict=True):
+        if any(node.op == "const" and node.data == 0.0 for node in (b, d)):
+            continue
+        total = b * d if total is None else total + b * d
+    return row[0].graph.const(0.0) if total is None else total

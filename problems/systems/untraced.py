@@ -1,0 +1,238 @@
+"""Systems whose field is not traced: a numba function, or any Python function."""
+
+import hashlib
+import inspect
+import pickle
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from types import CodeType, FunctionType, MappingProxyType, MethodType, ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.calculus.functions import Function
+from problems.calls import checked
+from problems.errors import InputError, shown
+from problems.systems.base import System, Value, check_count, name_of
+
+Array = NDArray[np.float64]
+
+UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
+
+
+class Foreign(System):
+    """A system y' = f(t, y) whose field stays as it is written.
+
+    A numba function is called from compiled code, at its own speed. Any other Python
+    function is called back from there, a few microseconds and its own time for each
+    evaluation: it is slow, and ``Solution.stats.extra["field"]`` says so.
+
+    Parameters
+    ----------
+    f : callable
+        ``f(t, y)``, which returns the derivative, or ``f(t, y, dy)``, which puts it into
+        ``dy``; ``y`` and ``dy`` are arrays of shape (dim,). If the third argument is
+        called ``par``, it gets the parameters as one flat array, in the order in which
+        they are declared.
+    dim : int
+        Length of the state.
+    parameters, invariants, guards, name
+        As for `VectorField`; invariants and guards are traced, and measured exactly.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a function of other arguments.
+
+    Notes
+    -----
+    Where f divides by zero or leaves a function's domain (`ArithmeticError`,
+    `ValueError`), it is not a number there and the integration ends with that status.
+    Other errors of a Python function are raised in the first step, and end the integration with the status
+    ``user_error`` later; numba's are printed, and make it not a
+    number. Jacobians are taken by differences. Methods that need formulas (LineIntegral, Taylor,
+    those of diffrax) refuse.
+
+    Examples
+    --------
+    >>> def van_der_pol(t, y):
+    ...     return [y[1], (1 - y[0]**2)*y[1] - y[0]]
+    >>> Foreign(van_der_pol, dim=2)
+    Foreign(van_der_pol, dim=2)
+    """
+
+    kind = "vector_field"
+    traced = False
+
+    @checked
+    def __init__(
+        self,
+        f: Callable[..., Any],
+        *,
+        dim: int,
+        parameters: Mapping[str, Value] = MappingProxyType({}),
+        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        name: str | None = None,
+    ) -> None:
+        dim = check_count("dim", dim)
+        if not callable(f):
+            raise InputError(f"f must be a function, not {shown(f)}.")
+        super().__init__(
+            dim=dim,
+            dof=None,
+            parameters=parameters,
+            invariants=invariants,
+            guards=guards,
+            name=name or name_of(f),
+        )
+        self.f = f
+        self.takes_parameters, self.in_place = _form(f)
+        self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
+        self.native: dict[int, tuple[int, Any]] = {}  # what the kernel makes of it, by lanes
+        self._trace_declared()
+
+    def __repr__(self) -> str:
+        return f"Foreign({self.name}, dim={self.dim})"
+
+    @property
+    def written(self) -> str:
+        """What the field is, for statistics."""
+        return "numba function" if self.numba else "Python function, slow"
+
+    def _build(self, what: str) -> Function | None:
+        return None
+
+    def function(self, what: str) -> Function:
+        """Return a traced function as `System.function` does; the field is none."""
+        if what == "field" or what.startswith(("field,", "jacobian")):
+            kind = self.written.partition(",")[0]
+            raise InputError(
+                f"{self.name} is not traced: its field is a {kind}, which HBVM, Gauss, DOP853 and Radau "
+                "integrate; write it as a VectorField or Hamiltonian for the others."
+            )
+        return super().function(what)
+
+    def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
+        """Put the derivative at one state into ``out``; NaN where it is not defined.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If f returns something else than dim numbers.
+        """
+        arguments = [t, y, *([par] if self.takes_parameters else [])]
+        out[:] = np.nan
+        try:
+            with np.errstate(all="ignore"):
+                if self.in_place:
+                    self.f(*arguments, out)
+                    return
+                value = self.f(*arguments)
+        except UNDEFINED:
+            out[:] = np.nan
+            return
+        try:
+            array = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"{self.name} returns {shown(value)}, not {self.dim} numbers.") from error
+        if array.shape != (self.dim,):
+            raise InputError(
+                f"{self.name} returns an array of shape {array.shape}, not ({self.dim},): "
+                "one derivative for each component of y."
+            )
+        out[:] = array
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of the function's code and of what it takes from around it, not of parameters' values."""
+        digest = hashlib.sha256(f"foreign {self.dim} {self.name}\n".encode())
+        _feed(digest, self.f, {})
+        return digest.hexdigest()
+
+
+def _form(f: Callable[..., Any]) -> tuple[bool, bool]:
+    """Return whether a function takes parameters, and whether it takes the array for its result."""
+    try:
+        signature = inspect.signature(getattr(f, "py_func", f))
+    except (TypeError, ValueError):
+        return False, False  # a builtin: f(t, y)
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    names = [p.name for p in signature.parameters.values() if p.kind in kinds and p.default is p.empty]
+    takes_parameters = names[2:3] == ["par"]
+    rest = len(names) - 2 - takes_parameters
+    if rest not in (0, 1):
+        raise InputError(
+            f"a field has the arguments (t, y), (t, y, dy), (t, y, par) or (t, y, par, dy), not {names!r}."
+        )
+    return takes_parameters, rest == 1
+
+
+def _feed(digest: Any, value: Any, seen: dict[int, tuple[int, Any]]) -> None:
+    """Add to a digest what a value is, the same from process to process.
+
+    Of a function that is its code and all that it takes from around it: defaults, variables of
+    functions around it, globals, and the functions among these likewise; of a bound method also the
+    object, of an object that can be called what is run then. ``seen`` numbers what may contain itself,
+    by id, and keeps it: an id names a value only while that lives.
+    """
+    value = getattr(value, "py_func", value)
+    if isinstance(value, int | float | complex | str | bytes | np.generic | None):
+        digest.update(f"{value!r};".encode())
+        return
+    digest.update(f"{type(value).__module__}.{type(value).__qualname__}:".encode())
+    if not isinstance(value, np.ndarray | CodeType | tuple | set | frozenset):
+        if id(value) in seen:
+            digest.update(f"{seen[id(value)][0]};".encode())
+            return
+        seen[id(value)] = (len(seen), value)
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        digest.update(f"{value.dtype} {value.shape}".encode() + value.tobytes())
+    elif isinstance(value, CodeType):
+        digest.update(value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode())
+        _feed(digest, value.co_consts, seen)
+    elif isinstance(value, FunctionType):
+        cells = [cell.cell_contents for cell in value.__closure__ or ()]
+        named = {
+            name: value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__
+        }
+        _feed(digest, (value.__code__, value.__defaults__, value.__kwdefaults__, tuple(cells), named), seen)
+    elif isinstance(value, MethodType):
+        _feed(digest, (value.__func__, value.__self__), seen)
+    elif isinstance(value, partial):
+        _feed(digest, (value.func, value.args, value.keywords), seen)
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            _feed(digest, key, seen)
+            _feed(digest, item, seen)
+    elif isinstance(value, set | frozenset):  # whose own order is that of hashes: another in each process
+        _feed(digest, tuple(sorted(repr(item) for item in value)), seen)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            _feed(digest, item, seen)
+    elif isinstance(value, ModuleType | type) or (callable(value) and hasattr(value, "__qualname__")):
+        digest.update(getattr(value, "__qualname__", value.__name__).encode())
+    else:
+        run = type(value).__call__ if callable(value) else None
+        _feed(digest, (_held(value), run if isinstance(run, FunctionType) else None), seen)
+
+
+def _held(value: Any) -> Any:
+    """Return what an object holds: its attributes, those in slots too, or else its pickled form."""
+    slots = [getattr(kind, "__slots__", ()) for kind in type(value).__mro__]
+    names = [name for group in slots for name in ((group,) if isinstance(group, str) else group)]
+    held = {name: getattr(value, name) for name in names if name != "__dict__" and hasattr(value, name)}
+    held |= getattr(value, "__dict__", {})
+    if held:
+        return held
+    try:
+        return pickle.dumps(value, 4)
+    except Exception:  # whatever a library raises for what it does not pickle
+        return None
+
+
+def _names(code: CodeType) -> list[str]:
+    """Return the names that code may look up, that of functions within it too."""
+    within = [name for inner in code.co_consts if isinstance(inner, CodeType) for name in _names(inner)]
+    return sorted({*code.co_names, *within})

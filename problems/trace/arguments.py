@@ -1,0 +1,280 @@
+"""What a user's function is called with: ``t, q, p, y, par, m``, by name."""
+
+import inspect
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NoReturn
+
+from problems import limits
+from problems.errors import InputError, shown, unknown
+from problems.trace import sums
+from problems.trace.graph import FUNCTIONS, PAR, Graph, Node, P, Q, T
+from problems.trace.lines import line_of_function, line_of_traceback, refuse
+
+# Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
+Layout = Mapping[str, tuple[int, int | None]]
+
+
+class Vector:
+    """Symbols side by side; read like a tuple, by integers or by the indices of a declared sum."""
+
+    __slots__ = ("_graph", "_name", "_offset", "_size", "_space")
+
+    def __init__(self, graph: Graph, name: str, space: str, offset: int, size: int) -> None:
+        self._graph = graph
+        self._name = name
+        self._space = space
+        self._offset = offset
+        self._size = size
+
+    def __repr__(self) -> str:
+        return f"<{self._name}: {self._size} symbols>"
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __iter__(self) -> Iterator[Node]:
+        return (self._at(i) for i in range(self._size))
+
+    def _flags(self, low: int, high: int) -> int:
+        if self._space == "par":
+            return PAR
+        if self._graph.dof is None or high < self._graph.dof:
+            return Q
+        if low >= self._graph.dof:
+            return P
+        return refuse(
+            f"{self._name}[...] in m.sum runs over positions and momenta at once", "use q[i] and p[i]"
+        )
+
+    def _at(self, i: int) -> Node:
+        place = self._offset + i
+        return self._graph.symbol(self._space, place, flags=self._flags(place, place))
+
+    def _outside(self, i: int) -> NoReturn:
+        refuse(f"{self._name}[{i}] does not exist", f"{self._name} has the indices 0 to {self._size - 1}")
+
+    def __getitem__(self, i: Any) -> Any:
+        if isinstance(i, slice):
+            return [self._at(k) for k in range(self._size)[i]]
+        if isinstance(i, sums.Index):
+            affine = i.affine.shifted(self._offset)
+            places = affine.values(i.loop)
+            low, high = int(places.min()), int(places.max())
+            if low < self._offset:
+                self._outside(low - self._offset)
+            if high >= self._offset + self._size:
+                self._outside(high - self._offset)
+            if not any(affine.coefficients):
+                return self._at(i.affine.offset)
+            return self._graph.symbol(self._space, affine, flags=self._flags(low, high), loop=i.loop)
+        if isinstance(i, Node):
+            refuse(f"{self._name}[...] is indexed by a symbol", "use integers, or the indices of m.sum")
+        try:
+            k = i.__index__()
+        except AttributeError:
+            refuse(f"{self._name}[{i!r}] is not an index", "use integers")
+        if not -self._size <= k < self._size:
+            self._outside(k)
+        return self._at(k % self._size)
+
+    def __setitem__(self, i: Any, value: Any) -> NoReturn:
+        refuse(
+            f"this changes its argument {self._name}",
+            f"build new values instead, such as x = list({self._name})",
+        )
+
+    def _whole(self, *_: Any, **__: Any) -> NoReturn:
+        refuse(
+            f"this calculates with the whole vector {self._name}",
+            f"write it in components, such as {self._name}[0]*{self._name}[0], or with m.sum",
+        )
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _whole
+    __pow__ = __neg__ = __matmul__ = __rmatmul__ = __abs__ = __array__ = __array_ufunc__ = _whole
+    __float__ = __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _whole  # type: ignore[assignment]
+    __hash__ = object.__hash__
+    __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
+
+
+class Parameters:
+    """The parameters as attributes: scalars are symbols, sequences are vectors of symbols."""
+
+    __slots__ = ("_graph", "_layout")
+
+    def __init__(self, graph: Graph, layout: Layout) -> None:
+        object.__setattr__(self, "_graph", graph)
+        object.__setattr__(self, "_layout", layout)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if name not in self._layout:
+            refuse(
+                str(unknown("parameter", name, self._layout)).rstrip("."),
+                f"declare it: parameters={{{name!r}: value}}",
+            )
+        offset, size = self._layout[name]
+        if size is None:
+            return self._graph.symbol("par", offset, flags=PAR)
+        return Vector(self._graph, f"par.{name}", "par", offset, size)
+
+    def __getitem__(self, name: Any) -> Any:
+        if not isinstance(name, str):
+            refuse(f"par[{name!r}] is not a parameter", "write par.name")
+        return getattr(self, name)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        refuse(f"this changes the parameter {name}", "parameters are read only inside the function")
+
+
+class Mathematics:
+    """The functions that a traced function may use; ``m`` in its arguments."""
+
+    pi = math.pi
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+
+    def sum(self, term: Any, index: Iterable[Any] | None = None) -> Any:
+        """Return the sum of ``term(i)`` over ``index``, as one declared sum."""
+        if index is None:
+            refuse("m.sum needs a term and an index list", "write m.sum(lambda i: q[i]**2, range(n))")
+        return sums.declare(self._graph, term, index)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        refuse(
+            str(unknown("function", f"m.{name}", [f"m.{f}" for f in (*_PUBLIC, "sum", "pi")])).rstrip("."),
+            "write it with these functions",
+        )
+
+
+_PUBLIC = tuple(name for name in FUNCTIONS if name != "sign")
+
+
+def _function(name: str) -> Callable[[Mathematics, Any], Any]:
+    def call(self: Mathematics, x: Any) -> Any:
+        graph = self._graph
+        return graph.call(name, graph.node(x))
+
+    call.__name__ = name
+    call.__doc__ = f"Return {name}(x) of a symbol or a number."
+    return call
+
+
+for _name in _PUBLIC:
+    setattr(Mathematics, _name, _function(_name))
+
+
+def call(
+    function: Callable[..., Any],
+    *,
+    graph: Graph,
+    dim: int,
+    layout: Layout,
+    what: str,
+) -> Any:
+    """Run a user's function on symbols, with the arguments that it names.
+
+    Parameters
+    ----------
+    function : callable
+        Its arguments are among ``t, q, p, y, par, m`` (``q, p`` where the graph has a ``dof``).
+    graph : Graph
+        Where the operations are kept.
+    dim : int
+        Length of the state.
+    layout : mapping
+        Offset and length of each parameter in ``par``.
+    what : str
+        What the function is, for messages: ``"H"``, ``"invariant 'L'"``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an unknown argument, or anything that cannot be traced, with the line.
+    """
+    if not callable(function):
+        raise InputError(f"{what} must be a function, not {shown(function)}.")
+    place = line_of_function(function)
+    offered: dict[str, Callable[[], Any]] = {
+        "t": lambda: graph.symbol("t", 0, flags=T),
+        "y": lambda: Vector(graph, "y", "y", 0, dim),
+        "par": lambda: Parameters(graph, layout),
+        "m": lambda: Mathematics(graph),
+    }
+    if graph.dof is not None:
+        dof = graph.dof
+        offered["q"] = lambda: Vector(graph, "q", "y", 0, dof)
+        offered["p"] = lambda: Vector(graph, "p", "y", dof, dof)
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{what} must be a function whose arguments have names, not {shown(function)}; "
+            "put it into one, as in lambda q: abs(q[0])."
+        ) from None
+    arguments: list[Any] = []
+    named: dict[str, Any] = {}
+    for parameter in parameters:
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            continue
+        if parameter.default is not parameter.empty:
+            continue  # bound by the user, as in `lambda q, p, k=k: ...`
+        if parameter.name in offered:
+            value = offered[parameter.name]()
+        else:
+            remedy = (
+                f"write par.{parameter.name}"
+                if parameter.name in layout
+                else "name those it needs among " + ", ".join(sorted(offered))
+            )
+            raise InputError(f"{place}: {what} asks for an argument {parameter.name!r}; {remedy}.")
+        if parameter.kind is parameter.POSITIONAL_ONLY:
+            arguments.append(value)
+        else:
+            named[parameter.name] = value
+    graph.limit = int(min(limits.limit("OPERATIONS"), 2**62))
+    try:
+        return function(*arguments, **named)
+    except InputError:
+        raise
+    except NameError as error:
+        name = error.name or "?"
+        if name in _PUBLIC or name in ("sum", "pi", "math", "np", "numpy"):
+            remedy = "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.sum, m.pi"
+        elif name in layout:
+            remedy = f"declare the argument par and write par.{name}"
+        elif name in offered:
+            remedy = f"declare the argument {name}"
+        else:
+            remedy = f"make it a parameter, parameters={{{name!r}: value}}, and write par.{name}"
+        raise InputError(
+            f"{line_of_traceback(error.__traceback__)}: the name {name!r} is not known here; {remedy}."
+        ) from error
+    except Exception as error:
+        line = line_of_traceback(error.__traceback__) or place
+        raise InputError(f"{line}: {what} failed with {type(error).__name__}: {error}") from error
+    finally:
+        graph.limit = None
+
+
+def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str) -> Node:
+    """Return what a function returned as one node, or raise when it is not one number."""
+    place = line_of_function(function)
+    if value is None:
+        raise InputError(f"{place}: {what} returns nothing; end it with a return statement.")
+    if isinstance(value, list | tuple | Vector | dict) or getattr(value, "shape", ()) != ():
+        raise InputError(
+            f"{place}: {what} returns {len(value)} values, not one number; return one scalar, "
+            "such as the sum of its terms."
+        )
+    try:
+        node = graph.node(value)
+    except InputError as error:
+        raise InputError(f"{place}: {what} returns {value!r}, which is not a number.") from error
+    if node.loop is not None:
+        raise InputError(f"{place}: {what} returns a symbol of an m.sum's term; return the sum itself.")
+    return node

@@ -1,0 +1,279 @@
+"""A function run once on symbols, its operations kept in the user's own order.
+
+A `Graph` holds the operations; equal operations on equal arguments are one
+`Node` (hash-consing), so common subexpressions cost nothing. Only rewritings
+that leave every bit of the result as it is are made: ``a + (-b)`` is ``a - b``,
+``(-a)*b`` is ``-(a*b)``, ``1*a`` is ``a``, a division by a power of two is a
+multiplication, two factors of which one is a power of two are one, ``b + a``
+reuses ``a + b``. (Adding a literal zero is dropped, which can change the sign of
+a zero and nothing else.) Sums are never re-associated and never sorted: on a
+problem with a symmetry, such as Sitnikov's, the order of the operations decides
+whether rounding keeps it.
+
+Powers: ``x**2`` is ``x*x``; ``x**n`` is one node, expanded by the emitters to
+products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``;
+``x**(n + 1/2)`` is ``x**n*sqrt(x)``; negative powers are ``1/x**n``.
+"""
+
+import math
+import numbers
+from collections.abc import Callable, Hashable
+from fractions import Fraction
+from typing import Any
+
+from problems import limits
+from problems.trace.lines import refuse, users_line
+from problems.trace.node import FUNCTIONS, PAR, STATE, Node, P, Q, T
+
+_EVALUATE: dict[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "tan": math.tan,
+    "exp": math.exp,
+    "log": math.log,
+    "abs": math.fabs,
+    "sign": lambda x: math.copysign(1.0, x),
+}
+
+
+def is_power_of_two(value: float) -> bool:
+    """Whether multiplying by ``value`` is exact (barring overflow and underflow)."""
+    return value != 0.0 and math.isfinite(value) and abs(math.frexp(value)[0]) == 0.5
+
+
+def _described(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    return f"an array of shape {shape}" if shape else f"{value!r:.40}"
+
+
+class Graph:
+    """Hash-consed operations of one system.
+
+    Parameters
+    ----------
+    dof : int or None
+        Number of positions at the head of the state (``None``: all of the state
+        counts as positions).
+    """
+
+    def __init__(self, dof: int | None = None) -> None:
+        self.dof = dof
+        self.nodes: list[Node] = []
+        self.loops: dict[Hashable, Any] = {}
+        self.in_term = False  # whether the term of a declared sum is being traced
+        self.limit: int | None = None  # number of nodes, while a user's function makes them
+        self._table: dict[Hashable, Node] = {}
+
+    def _intern(
+        self,
+        op: str,
+        args: tuple[Node, ...],
+        data: Any = None,
+        *,
+        key: Hashable = None,
+        flags: int = 0,
+        loop: Any = None,
+    ) -> Node:
+        if key is None:
+            key = (op, *(arg.id for arg in args))
+        found = self._table.get(key)
+        if found is not None:
+            return found
+        for arg in args:
+            flags |= arg.flags
+            if arg.loop is not None and arg.loop is not loop:
+                if loop is not None:
+                    refuse(
+                        "this mixes the terms of two sums",
+                        "use the symbols of one m.sum inside its own term only",
+                    )
+                loop = arg.loop
+        node = Node(self, op, args, data, flags, loop)
+        if self.limit is not None and node.id >= self.limit:
+            limits.check(f"{users_line()}: this", "OPERATIONS", node.id + 1, limits.WRITTEN_OUT)
+        self.nodes.append(node)
+        self._table[key] = node
+        return node
+
+    def const(self, value: float) -> Node:
+        """Return the node of a literal."""
+        # repr tells 0.0 from -0.0, which compare equal.
+        return self._intern("const", (), value, key=("const", repr(value)))
+
+    def symbol(self, space: str, index: Any, *, flags: int, loop: Any = None) -> Node:
+        """Return the node of one input: ``space`` is "t", "y", "par" or "out"."""
+        key = ("symbol", space, index, None if loop is None else loop.id)
+        return self._intern("symbol", (), (space, index), key=key, flags=flags, loop=loop)
+
+    def index(self, affine: Any, loop: Any) -> Node:
+        """Return the node of a loop index used as a number."""
+        return self._intern("index", (), affine, key=("index", affine, loop.id), loop=loop)
+
+    def sum(self, body: Node, loop: Any) -> Node:
+        """Return the node of a declared sum of ``body`` over ``loop``, in the loop's order."""
+        key = ("sum", body.id, loop.id)
+        found = self._table.get(key)
+        if found is None:
+            found = Node(self, "sum", (body,), loop, body.flags, None)
+            self.nodes.append(found)
+            self._table[key] = found
+        return found
+
+    def node(self, value: Any) -> Node:
+        """Return ``value``, a number or a node of this graph, as a node."""
+        if isinstance(value, Node):
+            if value.graph is not self:
+                refuse(
+                    "this symbol belongs to another traced function",
+                    "do not keep symbols between calls; return what is needed instead",
+                )
+            return value
+        as_node = getattr(value, "as_node", None)
+        if as_node is not None:
+            return as_node()
+        if isinstance(value, numbers.Real) and not isinstance(value, bool):
+            number = float(value)
+            if not math.isfinite(number):
+                refuse(f"the constant {value!r} is not finite", "use finite numbers only")
+            return self.const(number)
+        return refuse(
+            f"this calculates with {_described(value)} as if it were one number",
+            "write the formula in components, such as q[0]*p[1] - q[1]*p[0]",
+        )
+
+    def add(self, a: Node, b: Node) -> Node:
+        """Return ``a + b``."""
+        if a.op == "const":
+            if b.op == "const":
+                return self.node(a.data + b.data)
+            if a.data == 0.0:
+                return b
+        elif b.op == "const" and b.data == 0.0:
+            return a
+        if b.op == "neg":
+            return self.sub(a, b.args[0])
+        if a.op == "neg":
+            return self.sub(b, a.args[0])
+        return self._intern("add", (a, b), key=("add", *sorted((a.id, b.id))))
+
+    def sub(self, a: Node, b: Node) -> Node:
+        """Return ``a - b``."""
+        if b.op == "const":
+            if a.op == "const":
+                return self.node(a.data - b.data)
+            if b.data == 0.0:
+                return a
+        elif a.op == "const" and a.data == 0.0:
+            return self.neg(b)
+        if b.op == "neg":
+            return self.add(a, b.args[0])
+        return self._intern("sub", (a, b))
+
+    def neg(self, a: Node) -> Node:
+        """Return ``-a``."""
+        if a.op == "const":
+            return self.const(-a.data)
+        if a.op == "neg":
+            return a.args[0]
+        return self._intern("neg", (a,))
+
+    def mul(self, a: Node, b: Node) -> Node:
+        """Return ``a*b``."""
+        if b.op == "const" and a.op != "const":
+            a, b = b, a  # a product does not depend on the order of its two factors
+        if a.op == "const":
+            if b.op == "const":
+                return self.node(a.data * b.data)
+            if a.data == 1.0:
+                return b
+            if a.data == -1.0:
+                return self.neg(b)
+            if b.op == "mul" and b.args[0].op == "const":
+                inner = b.args[0].data
+                if is_power_of_two(a.data) or is_power_of_two(inner):
+                    return self.mul(self.node(a.data * inner), b.args[1])
+        if a.op == "neg":
+            return self.neg(self.mul(a.args[0], b))
+        if b.op == "neg":
+            return self.neg(self.mul(a, b.args[0]))
+        return self._intern("mul", (a, b), key=("mul", *sorted((a.id, b.id))))
+
+    def div(self, a: Node, b: Node) -> Node:
+        """Return ``a/b``."""
+        if b.op == "const":
+            if b.data == 0.0:
+                refuse("this divides by the constant 0", "divide by a number that is not zero")
+            if a.op == "const" and Fraction(a.data) / Fraction(b.data) == Fraction(a.data / b.data):
+                # Folded only where exact: 1/3 stays a division, which double-double evaluates further.
+                return self.node(a.data / b.data)
+            if is_power_of_two(b.data):
+                return self.mul(self.const(1.0 / b.data), a)
+        if a.op == "neg":
+            return self.neg(self.div(a.args[0], b))
+        if b.op == "neg":
+            return self.neg(self.div(a, b.args[0]))
+        return self._intern("div", (a, b))
+
+    def power(self, base: Node, twice: int) -> Node:
+        """Return ``base**(twice/2)``."""
+        if twice < 0:
+            return self.div(self.const(1.0), self.power(base, -twice))
+        whole = self.int_power(base, twice // 2)
+        if twice % 2 == 0:
+            return whole
+        return self.mul(whole, self.call("sqrt", base))
+
+    def int_power(self, base: Node, n: int) -> Node:
+        """Return ``base**n`` for ``n >= 0``: 1, the base, a product, or one node."""
+        if n == 0:
+            return self.const(1.0)
+        if n == 1:
+            return base
+        if n == 2:
+            return self.mul(base, base)
+        if base.op == "const":
+            return self.node(self.expanded(base, n))
+        return self._intern("pow", (base,), n, key=("pow", base.id, n))
+
+    def expanded(self, base: Node, n: int) -> Node:
+        """Return ``base**n``, ``n >= 1``, as products by binary powering."""
+        if n == 1:
+            return base
+        half = self.expanded(base, n // 2)
+        square = self.mul(half, half)
+        return self.mul(square, base) if n % 2 else square
+
+    def call(self, name: str, a: Node) -> Node:
+        """Return the function ``name`` of ``a``."""
+        if a.op == "const":
+            try:
+                return self.node(_EVALUATE[name](a.data))
+            except ValueError:
+                refuse(f"{name}({a.data!r}) is not defined", "keep to the function's domain")
+        return self._intern(name, (a,))
+
+    def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
+        """Return the operation of ``node`` on other arguments."""
+        match node.op:
+            case "add":
+                return self.add(*args)
+            case "sub":
+                return self.sub(*args)
+            case "mul":
+                return self.mul(*args)
+            case "div":
+                return self.div(*args)
+            case "neg":
+                return self.neg(*args)
+            case "pow":
+                return self.int_power(args[0], node.data)
+            case "sum":
+                return self.sum(args[0], node.data)
+            case "const" | "symbol" | "index":
+                return node
+            case _:
+                return self.call(node.op, args[0])
+
+
+__all__ = ["FUNCTIONS", "PAR", "STATE", "Graph", "Node", "P", "Q", "T", "is_power_of_two"]
