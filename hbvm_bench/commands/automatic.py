@@ -13,11 +13,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hbvm_bench import automatic as automatic_
-from hbvm_bench import general as general_
-from hbvm_bench import machine, processes, terminal
-from hbvm_bench.cells import on_terminal
-from hbvm_bench.store import ensure_writable
+from hbvm_bench.measure import machine
+from hbvm_bench.report import terminal
+from hbvm_bench.report.cells import on_terminal
+from hbvm_bench.run import processes
+from hbvm_bench.store.store import ensure_writable
+from hbvm_bench.studies.automatic import runs as automatic_
+from hbvm_bench.studies.general import runs as general_
 from problems.errors import InputError
 
 
@@ -72,7 +74,9 @@ def _measured(
     path = scratch / "request.json"
     path.write_bytes(msgspec.json.encode(request))
     try:
-        code = processes.wait([sys.executable, "-m", "hbvm_bench.automatic", str(path)], environment)
+        code = processes.wait(
+            [sys.executable, "-m", "hbvm_bench.studies.automatic.runs", str(path)], environment
+        )
     except KeyboardInterrupt:
         raise typer.Exit(130) from None
     if code == 2:  # it has said why

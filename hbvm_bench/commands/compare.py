@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench import compare as comparing
-from hbvm_bench import terminal
-from hbvm_bench.store import Store
+from hbvm_bench.report import terminal
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import compare as comparing
 
 CHANGED = 1
 

@@ -8,7 +8,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench import findings, terminal
+from hbvm_bench.commands import findings
+from hbvm_bench.report import terminal
 
 
 def inspect(

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.store import Store, ensure_writable
+from hbvm_bench.store.store import Store, ensure_writable
 from problems.errors import InputError
 
 

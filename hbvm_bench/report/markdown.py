@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hbvm_bench.table import Row, seconds
+from hbvm_bench.summaries.rows import Row, seconds
 
 if TYPE_CHECKING:  # so that the escapes below cost no plotting library
     from collections.abc import Sequence
 
-    from hbvm_bench.metrics import Metric
+    from hbvm_bench.measure.metrics import Metric
     from hbvm_bench.report.content import Content
 
 
@@ -24,7 +24,7 @@ def markdown(content: "Content") -> str:
         undefined=StrictUndefined,
         keep_trailing_newline=True,
     )
-    from hbvm_bench.cells import in_markdown  # which itself needs the escapes below
+    from hbvm_bench.report.cells import in_markdown  # which itself needs the escapes below
 
     environment.filters |= {"plain": plain, "code": code, "one_line": one_line, "table": in_markdown}
     environment.globals |= {"row_cells": row_cells}

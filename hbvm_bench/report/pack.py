@@ -15,14 +15,14 @@ from typing import Any
 import msgspec
 from plotly.offline import get_plotlyjs
 
-from hbvm_bench.metrics import METRICS
-from hbvm_bench.records import Record
-from hbvm_bench.report import motion
-from hbvm_bench.report.canvas import Picture
+from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report.content import Content
-from hbvm_bench.report.plots import as_csv, as_json, numbers
-from hbvm_bench.report.style import Look
-from hbvm_bench.table import group_of, status_of
+from hbvm_bench.report.figures import motion
+from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.figures.plots import as_csv, as_json, numbers
+from hbvm_bench.report.figures.style import Look
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of, status_of
 
 # Marker names: of matplotlib, of plotly.
 SYMBOLS = {
