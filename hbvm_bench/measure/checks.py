@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Checks
 from hbvm_bench.measure import laws
-from hbvm_bench.measure.laws import Law
 from hbvm_bench.measure.measured import Measured, largest_distance, positions
 from hbvm_bench.measure.starts import scaled
+from hbvm_bench.store.records import Law
 from integrators.protocol import MethodBase, Program, Status
 from problems.analysis import invariants
 from problems.problem import Problem

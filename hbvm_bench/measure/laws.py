@@ -2,82 +2,13 @@
 
 import math
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
+from hbvm_bench.store.records import Law
 
 Array = NDArray[np.float64]
-
-
-class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The law of an invariant's error; numbers that do not exist are ``None``.
-
-    Attributes
-    ----------
-    law : str or None
-        A key of `hbvm_bench.measure.drift.LAWS`; ``None`` where the samples do not say.
-    why : str
-        Why there is no law.
-    slope, slope_low, slope_high : float or None
-        Power of t, with its 95 % interval.
-    floor : float
-        What is there before the growth.
-    growth : float or None
-        Rate of an exponential, in 1/t.
-    rate, rate_low, rate_high : float or None
-        Mean signed drift per unit of time, with its 95 % interval over the starts;
-        for the energy only, the other invariants' errors have no sign.
-    mean, mean_error : float or None
-        Mean over the starts at the end, without the offset of each, and its standard
-        error (`hbvm_bench.measure.drift.Mean`); for the energy of several starts only.
-    positive : int or None
-        How many of the starts end above 0.
-    reached : float
-        What the growth alone reached at the end.
-    end : float
-        The end of the span, from the start on.
-    starts : int
-        Trajectories it was found from.
-    """
-
-    law: str | None = None
-    why: str = ""
-    slope: float | None = None
-    slope_low: float | None = None
-    slope_high: float | None = None
-    floor: float = 0.0
-    growth: float | None = None
-    rate: float | None = None
-    rate_low: float | None = None
-    rate_high: float | None = None
-    mean: float | None = None
-    mean_error: float | None = None
-    positive: int | None = None
-    reached: float = 0.0
-    end: float = 0.0
-    starts: int = 0
-
-    def curve(self, t: Array) -> Array:
-        """Return the law as it was fitted, at times since the start, shape (n,); for drawing."""
-        slope = math.nan if self.slope is None else self.slope
-        growth = math.nan if self.growth is None else self.growth
-        fitted = drift.Drift(
-            law=self.law,
-            why=self.why,
-            slope=slope,
-            slope_low=math.nan,
-            slope_high=math.nan,
-            floor=self.floor,
-            growth=growth,
-            rate=math.nan,
-            rate_low=math.nan,
-            rate_high=math.nan,
-            starts=self.starts,
-            reached=self.reached,
-        )
-        return fitted.curve(t, self.end)
 
 
 def find(t: Array, errors: Array, *, signed: bool) -> Law:
@@ -110,6 +41,27 @@ def find(t: Array, errors: Array, *, signed: bool) -> Law:
         end=float(t[size - 1]),
         starts=len(errors),
     )
+
+
+def curve(law: Law, t: Array) -> Array:
+    """Return a law as it was fitted, at times since the start, shape (n,); for drawing."""
+    slope = math.nan if law.slope is None else law.slope
+    growth = math.nan if law.growth is None else law.growth
+    fitted = drift.Drift(
+        law=law.law,
+        why=law.why,
+        slope=slope,
+        slope_low=math.nan,
+        slope_high=math.nan,
+        floor=law.floor,
+        growth=growth,
+        rate=math.nan,
+        rate_low=math.nan,
+        rate_high=math.nan,
+        starts=law.starts,
+        reached=law.reached,
+    )
+    return fitted.curve(t, law.end)
 
 
 def _finite(number: float) -> float | None:

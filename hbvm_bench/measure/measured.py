@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.measure.laws import Law
 from hbvm_bench.reference.solutions import Reference
-from hbvm_bench.store.records import Compile, Counters, Result, Timing
+from hbvm_bench.store.records import Compile, Counters, Law, Result, Timing
 from integrators.integrate import Solution
 from integrators.protocol import Status
 from problems import emit

@@ -13,7 +13,6 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from hbvm_bench.campaign.file import Case, Limits, Role
-from hbvm_bench.measure.laws import Law
 
 T = TypeVar("T")
 SCHEMA = 2  # 1 had position errors in units of length
@@ -173,6 +172,55 @@ class Counters(msgspec.Struct, frozen=True, kw_only=True):
     evaluations: int | None = None
     iterations: int | None = None
     solver: str | None = None
+
+
+class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The law that an invariant's error follows in time; numbers that do not exist are ``None``.
+
+    Attributes
+    ----------
+    law : str or None
+        A key of `hbvm_bench.measure.drift.LAWS`; ``None`` where the samples do not say.
+    why : str
+        Why there is no law.
+    slope, slope_low, slope_high : float or None
+        Power of t, with its 95 % interval.
+    floor : float
+        What is there before the growth.
+    growth : float or None
+        Rate of an exponential, in 1/t.
+    rate, rate_low, rate_high : float or None
+        Mean signed drift per unit of time, with its 95 % interval over the starts;
+        for the energy only, the other invariants' errors have no sign.
+    mean, mean_error : float or None
+        Mean over the starts at the end, without the offset of each, and its standard
+        error (`hbvm_bench.measure.drift.Mean`); for the energy of several starts only.
+    positive : int or None
+        How many of the starts end above 0.
+    reached : float
+        What the growth alone reached at the end.
+    end : float
+        The end of the span, from the start on.
+    starts : int
+        Trajectories it was found from.
+    """
+
+    law: str | None = None
+    why: str = ""
+    slope: float | None = None
+    slope_low: float | None = None
+    slope_high: float | None = None
+    floor: float = 0.0
+    growth: float | None = None
+    rate: float | None = None
+    rate_low: float | None = None
+    rate_high: float | None = None
+    mean: float | None = None
+    mean_error: float | None = None
+    positive: int | None = None
+    reached: float = 0.0
+    end: float = 0.0
+    starts: int = 0
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):

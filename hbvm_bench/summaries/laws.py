@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hbvm_bench.measure.laws import Law
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Law, Record
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import group_of
 

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
-from hbvm_bench.measure.laws import Law, find
+from hbvm_bench.measure.laws import curve, find
 from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_range
 from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.store.records import Law
 from hbvm_bench.summaries.laws import text
 from hbvm_bench.summaries.rows import group_of
 
@@ -121,6 +122,6 @@ def _law(law: Law, t: Array) -> tuple[Array, Array]:
     if law.law is None or t.size < 2:
         return np.empty(0), np.empty(0)
     at = np.geomspace(max(t[0], t[-1] / EARLIEST) if law.starts == 1 else t[0], t[-1], LAW_POINTS)
-    fitted = law.curve(at)
+    fitted = curve(law, at)
     good = fitted > 0
     return at[good], fitted[good]

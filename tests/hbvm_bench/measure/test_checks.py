@@ -84,7 +84,7 @@ def test_a_law_is_plain_numbers_and_draws_its_curve():
     law = laws.find(t, 1e-16 * rows, signed=True)
     assert law.law == "square root"
     assert law.slope_low < 0.5 < law.slope_high
-    assert law.curve(np.array([1e4]))[0] == pytest.approx(1e-16 * 100.0, rel=1.0)
+    assert laws.curve(law, np.array([1e4]))[0] == pytest.approx(1e-16 * 100.0, rel=1.0)
     assert laws.find(t, np.full((1, t.size), np.nan), signed=True).law is None
 
 

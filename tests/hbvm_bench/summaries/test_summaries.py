@@ -3,8 +3,7 @@ import math
 import pytest
 
 from hbvm_bench.campaign.file import Campaign, Case, Ensemble, MethodEntry
-from hbvm_bench.measure.laws import Law
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index
 from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
 from hbvm_bench.summaries.profiles import Goal
