@@ -15,7 +15,6 @@ from rich.table import Table
 
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.report.cells import on_terminal
 from hbvm_bench.run import processes
 from hbvm_bench.store.store import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
@@ -53,7 +52,7 @@ def automatic(
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         result = _measured(problems or [], rounds, avx2, out, Path(scratch))
     page = automatic_.keep(result, out) if out is not None else None
-    console.print(on_terminal(automatic_.sides(result.duels)))
+    terminal.print_table(automatic_.sides(result.duels))
     console.print(machine.sentence(result.machine), highlight=False)
     if page is not None:
         terminal.console(stderr=True).print(str(page), style="dim")

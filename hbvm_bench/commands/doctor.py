@@ -53,7 +53,6 @@ def doctor(
 
 
 def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
-    from hbvm_bench.report.cells import on_terminal
     from hbvm_bench.run import processes
     from hbvm_bench.studies.peers import check
 
@@ -73,7 +72,7 @@ def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(result), indent=1).decode())
     else:
-        terminal.console().print(on_terminal(check.table(result)))
+        terminal.print_table(check.table(result))
         for method, reason in result.refused.items():
             print(f"{method} did not run: {reason}")
     if result.refused or any(row.beyond for row in result.rows):

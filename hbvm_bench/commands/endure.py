@@ -14,7 +14,6 @@ import typer
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.report.cells import on_terminal
 from hbvm_bench.run import processes
 from hbvm_bench.store.store import ensure_writable
 from hbvm_bench.studies.endure import law, runs
@@ -68,7 +67,7 @@ def endure(
         print(msgspec.json.format(msgspec.json.encode(as_data(result)), indent=1).decode())
     else:
         for table in report.tables(result):
-            terminal.console().print(on_terminal(table))
+            terminal.print_table(table)
         terminal.console().print(machine.sentence(result.machine), highlight=False)
     terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
 

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.measure import machine
-from hbvm_bench.report.cells import in_markdown
-from hbvm_bench.report.markdown import plain
+from hbvm_bench.report.markdown import in_markdown, plain
 from hbvm_bench.studies.automatic import runs as automatic
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.contests import CONTESTS

@@ -13,7 +13,6 @@ from rich.text import Text
 
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.report.cells import on_terminal
 from hbvm_bench.run import processes
 from hbvm_bench.store.store import ensure_writable
 from hbvm_bench.studies.race import results, standings, tables
@@ -171,7 +170,7 @@ def _declare(contests: Sequence[Contest], quick: bool, *, error: bool) -> None:
 def _show(races: Sequence[Race]) -> None:
     for table in [tables.headline(races), tables.goals(races), *map(tables.fastest, races)]:
         if table.rows:
-            terminal.console().print(on_terminal(table))
+            terminal.print_table(table)
     for said in dict.fromkeys(machine.sentence(race.machine) for race in races):
         terminal.console().print(said, highlight=False)
 

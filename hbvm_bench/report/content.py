@@ -11,7 +11,6 @@ from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure.metrics import METRICS, Metric
 from hbvm_bench.report import provenance, words
-from hbvm_bench.report.cells import Table
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import Look, looks, method_name
 from hbvm_bench.report.overview import Overview, overview
@@ -20,6 +19,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, damage, progress
 from hbvm_bench.summaries import fairness
 from hbvm_bench.summaries.rows import columns, tasks
+from hbvm_bench.summaries.table import Table
 
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3

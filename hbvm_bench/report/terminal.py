@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 from rich import box
 from rich.console import Console, Group, RenderableType
-from rich.table import Table
+from rich.table import Table as RichTable
 from rich.text import Text
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
+from hbvm_bench.summaries.table import Table
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -34,6 +35,20 @@ def console(*, stderr: bool = False) -> Console:
     if not made.is_terminal:
         made.width = PIPE_WIDTH
     return made
+
+
+def print_table(table: Table) -> None:
+    """Print a table of text."""
+    made = RichTable(
+        title=Text(table.title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, caption=table.note
+    )
+    for index, head in enumerate(table.head):
+        made.add_column(
+            Text(head), justify="left" if table.is_words(index) else "right", overflow="fold", min_width=6
+        )
+    for row in table.rows:
+        made.add_row(*(Text(cell) for cell in row))
+    console().print(made)
 
 
 def print_results(
@@ -77,12 +92,12 @@ def _results(
     lines = rows(records, sort)
     hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
-    made = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     made.add_column("#", justify="right", no_wrap=True)
     made.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:
         made.add_column(metric.short, justify="right", no_wrap=True)
-    remarks = Table.grid(padding=(0, 2))
+    remarks = RichTable.grid(padding=(0, 2))
     group = ""
     for row in lines:
         if row.group != group:

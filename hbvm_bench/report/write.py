@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hbvm_bench.report import pack
+from hbvm_bench.report.as_markdown import markdown
 from hbvm_bench.report.content import Content, gather
 from hbvm_bench.report.html import page
-from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.store import Store, again, write_all
 from problems.errors import InputError
 

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from hbvm_bench.report.cells import Table
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
 from hbvm_bench.summaries.outcomes import reason_of
 from hbvm_bench.summaries.points import family_of, problems_of
 from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.table import Table
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample

@@ -23,14 +23,14 @@ from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Run
-from hbvm_bench.report.cells import Table, in_markdown
-from hbvm_bench.report.markdown import code, plain
+from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.run import processes
 from hbvm_bench.store.records import decoded
 from hbvm_bench.store.store import atomic, ensure_writable
 from hbvm_bench.studies.race import truth
 from hbvm_bench.studies.race.accuracy import sample_times
 from hbvm_bench.studies.race.contests import chosen
+from hbvm_bench.summaries.table import Table
 from integrators.protocol import MethodBase, Status
 from problems.errors import InputError
 from problems.problem import Problem

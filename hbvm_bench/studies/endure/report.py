@@ -11,18 +11,18 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import drift, machine
 from hbvm_bench.measure.drift import LAWS
 from hbvm_bench.report import shell
-from hbvm_bench.report.cells import Table, in_markdown
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
 from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
-from hbvm_bench.report.markdown import code
+from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.store import write_all
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words
 from hbvm_bench.studies.endure.runs import Endurance, of_method
 from hbvm_bench.studies.race.tables import NONE
 from hbvm_bench.summaries import fairness
 from hbvm_bench.summaries.rows import seconds
+from hbvm_bench.summaries.table import Table
 
 Array = NDArray[np.float64]
 

@@ -25,12 +25,12 @@ from hbvm_bench.campaign.identity import digest_of, make_method
 from hbvm_bench.measure import ensemble, machine
 from hbvm_bench.measure.starts import cloud
 from hbvm_bench.measure.timing import WARM_UP, Run
-from hbvm_bench.report.cells import Table
 from hbvm_bench.run import processes
 from hbvm_bench.store.store import atomic
 from hbvm_bench.studies.peers import alone as peers_alone
 from hbvm_bench.studies.peers.alone import Script
 from hbvm_bench.summaries.rows import seconds as in_words
+from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array, Status
 from problems.errors import InputError
 from problems.problem import Problem

@@ -9,12 +9,11 @@ from pathlib import Path
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report import shell
-from hbvm_bench.report.cells import Table, in_markdown
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.plots import as_csv
 from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import Look
-from hbvm_bench.report.markdown import code
+from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.store import write_all
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.accuracy import SAMPLES
@@ -25,6 +24,7 @@ from hbvm_bench.studies.race.rounds import SHORTEST
 from hbvm_bench.studies.race.settings import FAMILIES
 from hbvm_bench.studies.race.standings import calibrated, present
 from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries.table import Table
 
 FIGURES = "figures"
 BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 from hbvm_bench.measure import machine
-from hbvm_bench.report.cells import Table
 from hbvm_bench.studies.race import standings
 from hbvm_bench.studies.race.results import Outcome, Probe, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
 from hbvm_bench.studies.race.standings import LEVELS, POSITION_OVER_ENERGY, Ratio
 from hbvm_bench.summaries.rows import seconds
+from hbvm_bench.summaries.table import Table
 
 NONE = "–"
 
