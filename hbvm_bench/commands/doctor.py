@@ -55,6 +55,7 @@ def doctor(
 def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
     from hbvm_bench.run import processes
     from hbvm_bench.studies.peers import check
+    from hbvm_bench.summaries import peers
 
     if out is not None:
         ensure_writable(out.parent)
@@ -63,16 +64,16 @@ def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
         asked = check.Request(out=str(made), rounds=rounds or check.ROUNDS)
         request.write_bytes(msgspec.json.encode(asked))
         code = processes.wait([sys.executable, "-m", "hbvm_bench.studies.peers.check", str(request)])
-        result = check.load(made)
+        result = peers.load(made)
     if code != 0 or result is None:
         print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(UNHEALTHY)
     if out is not None:
-        check.save(result, out)
+        peers.save(result, out)
     if as_json:
         print(msgspec.json.format(msgspec.json.encode(result), indent=1).decode())
     else:
-        terminal.print_table(check.table(result))
+        terminal.print_table(peers.table(result))
         for method, reason in result.refused.items():
             print(f"{method} did not run: {reason}")
     if result.refused or any(row.beyond for row in result.rows):

@@ -17,7 +17,7 @@ from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, damage, progress
-from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries import fairness, peers
 from hbvm_bench.summaries.rows import columns, tasks
 from hbvm_bench.summaries.table import Table
 
@@ -74,7 +74,7 @@ class Content:
     settings : list
         See `words.settings_count`.
     peers : Table or None
-        What the bench costs every peer; see `hbvm_bench.studies.peers.check`.
+        What the bench costs every peer; see `hbvm_bench.summaries.peers`.
     excluded : list of str
         What takes no part in the ranking, and why.
     versions, machine : list of (str, str)
@@ -172,7 +172,7 @@ def gather(stores: Sequence[Store]) -> Content:
         records=records,
         rules=(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
         settings=words.settings_count(records),
-        peers=fairness.peers(),
+        peers=peers.kept(),
         excluded=words.excluded(records),
         versions=provenance.versions(records),
         machine=provenance.machines(records),

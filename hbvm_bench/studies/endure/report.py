@@ -20,7 +20,7 @@ from hbvm_bench.store.store import write_all
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words
 from hbvm_bench.studies.endure.runs import Endurance, of_method
 from hbvm_bench.studies.race.tables import NONE
-from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import Table
 
@@ -42,8 +42,7 @@ def write(result: Endurance, directory: Path) -> Path:
     """
     look = looks(result)
     made = over_time(result, look)
-    peers = fairness.peers()
-    shown = [*tables(result), *([] if peers is None else [peers])]
+    shown = [*tables(result), *filter(None, [peers.kept()])]
     content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
     content["processor"] = machine.sentence(result.machine)
     environment = shell.environment("hbvm_bench.studies.endure", autoescape=False)

@@ -1,8 +1,8 @@
 """What the bench costs a peer: each is run through the harness, as campaigns time it, and alone.
 
 ``python -m hbvm_bench.studies.peers.check REQUEST.json`` runs it: the harness and the library in turn, round
-by round, in one process on one core, with compiling and setting up outside both clocks. The result that comes
-with the package (`KEPT`) is printed in every report; ``hbvm-bench doctor --peers --out`` makes it anew.
+by round, in one process on one core, with compiling and setting up outside both clocks. The result is a
+`hbvm_bench.summaries.peers.PeerCheck`; ``hbvm-bench doctor --peers --out`` keeps it.
 """
 
 import gc
@@ -11,48 +11,30 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median, quantiles
 from typing import Any
 
 import msgspec
 import numpy as np
 
 import problems
-from hbvm_bench.campaign.identity import digest_of, make_method
+from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import ensemble, machine
 from hbvm_bench.measure.starts import cloud
 from hbvm_bench.measure.timing import WARM_UP, Run
 from hbvm_bench.run import processes
-from hbvm_bench.store.store import atomic
 from hbvm_bench.studies.peers import alone as peers_alone
 from hbvm_bench.studies.peers.alone import Script
-from hbvm_bench.summaries.rows import seconds as in_words
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.peers import PeerCheck, Row, digest, save
 from integrators.protocol import Array, Status
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
-ALLOWED = 1.05
-"""Largest median of the ratio harness over library."""
-
-OVERHEAD = 2e-5
-"""Seconds a call may take longer whatever its ratio, which is then that of a very short run."""
-
-DIFFERENCE = 1e-6
-"""Most difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
-times where our adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
-over 1,500,000 steps; 0 where steps vary."""
-
 ROUNDS = 15
 CLOCK = time.process_time
 """The processor's time, in which other work on the machine does not count."""
-
-KEPT = Path(__file__).with_name("check.json")
-COMMAND = "hbvm-bench doctor --peers"
 
 
 @dataclass(frozen=True)
@@ -118,78 +100,6 @@ PAIRS = (
     Pair(KEPLER, 15000.0, "SemiImplicitEuler(h=0.01)", peers_alone.diffrax, SOLVE),
     Pair(PLANETS, 120000.0, "WHFast512(h=0.5)", peers_alone.rebound, INTEGRATE),
 )
-
-
-class Row(msgspec.Struct, frozen=True, kw_only=True):
-    """One method through the harness and alone.
-
-    Attributes
-    ----------
-    problem, method, call : str
-        What was integrated, how, and what the library alone is called by.
-    seconds, alone : list of float
-        Of the processor's time: of a run through the harness, and of the library alone, one of each round.
-    steps, alone_steps : int
-        That each took.
-    difference : float
-        Largest difference of the states at the end, over the largest component.
-    """
-
-    problem: str
-    method: str
-    call: str
-    seconds: list[float]
-    alone: list[float]
-    steps: int
-    alone_steps: int
-    difference: float
-
-    @property
-    def ratios(self) -> list[float]:
-        """Harness over library, round by round."""
-        return [a / b for a, b in zip(self.seconds, self.alone, strict=True)]
-
-    @property
-    def beyond(self) -> bool:
-        """Whether the harness costs more than is allowed, takes other steps or comes elsewhere."""
-        other = self.steps != self.alone_steps or not self.difference <= DIFFERENCE
-        overhead = median(a - b for a, b in zip(self.seconds, self.alone, strict=True))
-        return other or (median(self.ratios) > ALLOWED and overhead > OVERHEAD)
-
-
-class PeerCheck(msgspec.Struct, frozen=True, kw_only=True):
-    """The result.
-
-    Attributes
-    ----------
-    rows : list of Row
-        In the order of `PAIRS`.
-    refused : dict of str
-        Why a pair did not run, by its method and problem.
-    machine, versions : dict
-        Where, and with what.
-    measured : str
-        When.
-    sources : str
-        The `digest` of the code that was measured.
-    """
-
-    rows: list[Row]
-    refused: dict[str, str]
-    machine: dict[str, str | int]
-    versions: dict[str, str]
-    measured: str
-    sources: str = ""
-
-
-@cache
-def digest() -> str:
-    """Return the sha256 of the sources that a result depends on: this check's, and the adapters'."""
-    adapters = {type(make_method(pair.method)).__module__ for pair in PAIRS}
-    lazily = {"integrators.peers.diffrax.steps", "integrators.peers.diffrax.solve"}
-    return digest_of(
-        ("hbvm_bench.studies.peers.check", "problems.catalogue.kepler", *sorted(adapters | lazily))
-    )
 
 
 def geodesic(t_end: float) -> Problem:
@@ -260,7 +170,7 @@ def check(
         machine=described,
         versions={name: version(name) for name in ("hbvm-bench", *libraries)},
         measured=datetime.now(UTC).isoformat(timespec="seconds"),
-        sources=digest(),
+        sources=digest(row.method for row in rows),
     )
 
 
@@ -318,63 +228,6 @@ def _alone(script: Script) -> tuple[float, int, Array]:
         if collecting:
             gc.enable()
     return spent, *script.end(run, made)
-
-
-def table(result: PeerCheck) -> Table:
-    """Return the result as a table; rows beyond what is allowed are marked."""
-    rows: list[tuple[str, ...]] = []
-    for row in result.rows:
-        low, middle, high = quantiles(row.ratios, n=4, method="inclusive")
-        mark = " (beyond)" if row.beyond else ""
-        rows.append(
-            (
-                row.method,
-                row.problem,
-                row.call,
-                f"{middle:.3f} [{low:.3f}, {high:.3f}]{mark}",
-                in_words(median(row.alone)),
-                str(row.steps),
-                str(row.alone_steps),
-                f"{row.difference:.0e}",
-            )
-        )
-    rounds = len(result.rows[0].seconds) if result.rows else 0
-    versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
-    return Table(
-        "Every peer through this bench, over the same library alone",
-        (
-            "method",
-            "problem",
-            "called by",
-            "bench / alone",
-            "time alone",
-            "steps, bench",
-            "steps, alone",
-            "end states differ by",
-        ),
-        rows,
-        f"Median and quartiles of the ratio of the processor's times in each of {rounds} rounds, the two in "
-        f"turn in one process, compiled and set up before; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} "
-        "microseconds a call. The end states of REBOUND's fixed steps differ because it adds up its clock, "
-        f"which our adapter sets to whole steps. Measured on {result.measured[:10]}"
-        f"{'' if result.sources == digest() else ', with an earlier version of this code'}, with {versions}. "
-        f"{machine.sentence(result.machine)} To repeat it: {COMMAND}.",
-        words=(1, 2),
-    )
-
-
-def save(result: PeerCheck, path: Path) -> None:
-    """Write a result, all of it or nothing."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
-
-
-def load(path: Path = KEPT) -> PeerCheck | None:
-    """Return a result, by default the one that comes with the package; ``None`` where there is none."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=PeerCheck)
-    except OSError:
-        return None
 
 
 def main(path: Path) -> None:

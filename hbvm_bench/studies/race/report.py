@@ -23,7 +23,7 @@ from hbvm_bench.studies.race.results import SCHEMA, Race, by_kind
 from hbvm_bench.studies.race.rounds import SHORTEST
 from hbvm_bench.studies.race.settings import FAMILIES
 from hbvm_bench.studies.race.standings import calibrated, present
-from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.table import Table
 
 FIGURES = "figures"
@@ -177,7 +177,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         "top": top,
         "rules": RULES,
         # older results were timed in another way than the one that was checked
-        "peers": fairness.peers() if all(race.schema == SCHEMA for race in races) else None,
+        "peers": peers.kept() if all(race.schema == SCHEMA for race in races) else None,
         "families": [(family.title, family.code) for family in FAMILIES.values()],
         "processors": list(dict.fromkeys(machine.sentence(race.machine) for race in races)),
         "machine": list(last.machine.items()),

@@ -10,8 +10,9 @@ import integrators.registry
 from hbvm_bench import cli
 from hbvm_bench.run import processes
 from hbvm_bench.studies.peers import check
-from hbvm_bench.studies.peers.check import PAIRS, PeerCheck, Row
-from hbvm_bench.summaries import fairness
+from hbvm_bench.studies.peers.check import PAIRS
+from hbvm_bench.summaries import peers
+from hbvm_bench.summaries.peers import PeerCheck, Row
 
 for library in ("heyoka", "rebound", "diffrax"):
     pytest.importorskip(library)
@@ -70,21 +71,21 @@ def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(
 ):
     def wait(command):
         request = msgspec.json.decode(Path(command[-1]).read_bytes())
-        check.save(result, Path(request["out"]))
+        peers.save(result, Path(request["out"]))
         return 0
 
     monkeypatch.setattr(processes, "wait", wait)
     assert result.rows[0].beyond is beyond
     out = tmp_path / "peers.json"
     assert cli.main(["doctor", "--peers", "--out", str(out)]) == int(beyond)
-    assert check.load(out) == result
-    assert ("(beyond)" in check.table(result).rows[0][3]) is beyond
+    assert peers.load(out) == result
+    assert ("(beyond)" in peers.table(result).rows[0][3]) is beyond
 
 
 def test_the_reports_print_what_was_kept_with_its_day_machine_and_command():
-    shown = fairness.peers()
+    shown = peers.kept()
     assert shown is not None
-    kept = check.load()
+    kept = peers.load()
     assert kept is not None
     assert {row.method.partition("(")[0] for row in kept.rows} == {p.method.partition("(")[0] for p in PAIRS}
     for words in (kept.measured[:10], str(kept.machine["processor"]), "hbvm-bench doctor --peers"):
@@ -108,10 +109,10 @@ def test_a_peer_that_raises_does_not_lose_what_the_others_gave():
     result = check.check([good, bad], rounds=2, short=True, tell=lambda what: None)
     assert len(result.rows) == 1
     assert result.refused == {f"{bad.method} on {bad.problem}": "ZeroDivisionError: broken"}
-    assert result.sources == check.digest()
+    assert result.sources == peers.digest([good.method])
 
 
 def test_a_result_of_other_sources_says_so():
-    now = msgspec.structs.replace(made_up(), sources=check.digest())
-    assert "an earlier version" in check.table(made_up()).note
-    assert "an earlier version" not in check.table(now).note
+    now = msgspec.structs.replace(made_up(), sources=peers.digest(["Taylor()"]))
+    assert "an earlier version" in peers.table(made_up()).note
+    assert "an earlier version" not in peers.table(now).note
