@@ -14,8 +14,9 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.commands import listing
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.report import terminal
+from hbvm_bench.store.files import ensure_writable, write_all
 from hbvm_bench.store.records import printable
-from hbvm_bench.store.store import Store, ensure_writable, write_all
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 app = typer.Typer(

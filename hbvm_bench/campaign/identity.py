@@ -38,7 +38,7 @@ BOOKKEEPING = frozenset(
     f"hbvm_bench.{name}"
     for name in (
         *("campaign.entries", "campaign.file", "campaign.grid", "campaign.identity", "campaign.spec"),
-        *("campaign.sweep", "store.records", "store.store"),
+        *("campaign.sweep", "store.files", "store.records", "store.store"),
     )
 )
 # A library's numbers also depend on what it computes with.

@@ -16,7 +16,7 @@ from rich.table import Table
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
-from hbvm_bench.store.store import ensure_writable
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
 from hbvm_bench.studies.general import runs as general_
 from problems.errors import InputError

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
-from hbvm_bench.store.store import ensure_writable
+from hbvm_bench.store.files import ensure_writable
 from problems.errors import InputError
 
 UNHEALTHY = 1

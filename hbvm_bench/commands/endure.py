@@ -15,7 +15,7 @@ from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
-from hbvm_bench.store.store import ensure_writable
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.endure import law, runs
 from hbvm_bench.studies.endure.runs import Endurance, Request
 from problems.errors import InputError

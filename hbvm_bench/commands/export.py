@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.store.store import Store, ensure_writable
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import export as exporting
 
 

@@ -11,7 +11,7 @@ import typer
 from hbvm_bench.report import terminal
 from hbvm_bench.report.figures import plots
 from hbvm_bench.report.figures.png import small
-from hbvm_bench.store.store import ensure_writable, write_all
+from hbvm_bench.store.files import ensure_writable, write_all
 from problems.errors import unknown
 
 if TYPE_CHECKING:  # what computes costs seconds to import

@@ -14,7 +14,7 @@ from rich.text import Text
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
-from hbvm_bench.store.store import ensure_writable
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.race import results, standings, tables
 from hbvm_bench.studies.race.child import Request
 from hbvm_bench.studies.race.contests import CONTESTS, chosen

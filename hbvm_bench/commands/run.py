@@ -16,7 +16,8 @@ from hbvm_bench.run import executors, loop, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError
-from hbvm_bench.store.store import Index, Store, ensure_writable
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
 
 UNFINISHED = 1

@@ -9,7 +9,7 @@ from typing import Any
 import problems
 from hbvm_bench.gallery import pictures
 from hbvm_bench.reference import solutions as reference
-from hbvm_bench.store.store import write_all
+from hbvm_bench.store.files import write_all
 from hbvm_bench.summaries import engines
 from problems import registry
 from problems.analysis import structure

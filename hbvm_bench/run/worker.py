@@ -29,8 +29,9 @@ from hbvm_bench.measure.measured import Measured, measure
 from hbvm_bench.measure.metrics import evaluate, guard_violation
 from hbvm_bench.measure.solve import solve
 from hbvm_bench.reference import solutions
+from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, TimingRound
-from hbvm_bench.store.store import NAME, atomic, encode_series
+from hbvm_bench.store.store import NAME, encode_series
 from integrators.integrate import Solution
 from integrators.protocol import Program, Status
 from problems.errors import InputError

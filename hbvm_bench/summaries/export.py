@@ -14,8 +14,9 @@ import numpy as np
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store, atomic, damage
+from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError, MissingLibraryError, unknown
 
 Row = dict[str, Any]

@@ -12,7 +12,7 @@ import msgspec
 
 from hbvm_bench.campaign.identity import digest_of, make_method
 from hbvm_bench.measure import machine
-from hbvm_bench.store.store import atomic
+from hbvm_bench.store.files import atomic
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import Table
 

@@ -21,8 +21,9 @@ from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.run.loop import is_kept
+from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
-from hbvm_bench.store.store import NAME_LENGTH, Index, Store, decode_series, encode_series, write_all
+from hbvm_bench.store.store import NAME_LENGTH, Index, Store, decode_series, encode_series
 from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
 

@@ -25,8 +25,8 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Run
 from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.run import processes
+from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import decoded
-from hbvm_bench.store.store import atomic, ensure_writable
 from hbvm_bench.studies.race import truth
 from hbvm_bench.studies.race.accuracy import sample_times
 from hbvm_bench.studies.race.contests import chosen

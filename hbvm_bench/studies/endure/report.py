@@ -16,7 +16,7 @@ from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
 from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
 from hbvm_bench.report.markdown import code, in_markdown
-from hbvm_bench.store.store import write_all
+from hbvm_bench.store.files import write_all
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words
 from hbvm_bench.studies.endure.runs import Endurance, of_method
 from hbvm_bench.studies.race.tables import NONE

@@ -20,8 +20,8 @@ from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
+from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import decoded
-from hbvm_bench.store.store import atomic
 from hbvm_bench.studies.race.accuracy import GOLDEN
 from integrators.protocol import Program, Status
 from problems.analysis import invariants

@@ -14,7 +14,7 @@ from hbvm_bench.report.figures.plots import as_csv
 from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.markdown import code, in_markdown
-from hbvm_bench.store.store import write_all
+from hbvm_bench.store.files import write_all
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.accuracy import SAMPLES
 from hbvm_bench.studies.race.contests import CONTESTS

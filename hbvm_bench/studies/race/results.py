@@ -11,8 +11,8 @@ from statistics import median, quantiles
 import msgspec
 
 from hbvm_bench.measure import machine
+from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import decoded
-from hbvm_bench.store.store import atomic, ensure_writable
 from problems.errors import InputError
 
 SCHEMA = 2

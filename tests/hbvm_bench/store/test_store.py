@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import Case
+from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.store.store import Store, atomic, ensure_writable
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 ID = "0123456789abcdef" * 4
