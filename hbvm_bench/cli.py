@@ -6,7 +6,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 from typer.exceptions import TyperException
 
@@ -125,8 +124,7 @@ def show(
     index = store.index()
     records = store.records()
     if as_json:
-        encoded = msgspec.json.encode(listing.as_json(index, records))
-        print(msgspec.json.format(encoded, indent=1).decode())
+        terminal.print_json(listing.as_json(index, records))
         return
     if not records:
         raise InputError(f"the run in {str(directory)!r} has no finished case yet; run: {index.command}.")

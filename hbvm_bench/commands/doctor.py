@@ -13,7 +13,7 @@ from rich.text import Text
 
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.files import ensure_writable, write_json
 from problems.errors import InputError
 
 UNHEALTHY = 1
@@ -45,7 +45,7 @@ def doctor(
     healthy = examining.healthy(findings)
     if as_json:
         content = {key: [asdict(one) for one in group] for key, group in findings.items()}
-        print(msgspec.json.format(msgspec.json.encode(content | {"healthy": healthy}), indent=1).decode())
+        terminal.print_json(content | {"healthy": healthy})
     else:
         _print(findings)
     if not healthy:
@@ -69,9 +69,9 @@ def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
         print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(UNHEALTHY)
     if out is not None:
-        peers.save(result, out)
+        write_json(out, result)
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(result), indent=1).decode())
+        terminal.print_json(result)
     else:
         terminal.print_table(peers.table(result))
         for method, reason in result.refused.items():

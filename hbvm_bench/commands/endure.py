@@ -64,7 +64,7 @@ def endure(
     from hbvm_bench.studies.endure import report
 
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(as_data(result)), indent=1).decode())
+        terminal.print_json(as_data(result))
     else:
         for table in report.tables(result):
             terminal.print_table(table)

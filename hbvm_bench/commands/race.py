@@ -71,7 +71,7 @@ def race(
         failed = _run(request, environment)
     races = results.load(directory, list(CONTESTS))
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(as_data(races)), indent=1).decode())
+        terminal.print_json(as_data(races))
     else:
         _show([one for one in races if one.contest.key in {contest.key for contest in contests}])
     from hbvm_bench.studies.race import report

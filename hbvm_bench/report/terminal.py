@@ -1,6 +1,7 @@
 """What the command line shows of results: tables that fit."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console, Group, RenderableType
@@ -8,6 +9,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from hbvm_bench.measure.metrics import Metric
+from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
 from hbvm_bench.summaries.table import Table
@@ -35,6 +37,11 @@ def console(*, stderr: bool = False) -> Console:
     if not made.is_terminal:
         made.width = PIPE_WIDTH
     return made
+
+
+def print_json(value: Any) -> None:
+    """Print a value for programs."""
+    print(json_of(value).decode(), end="")
 
 
 def print_table(table: Table) -> None:

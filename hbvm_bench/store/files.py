@@ -6,6 +6,9 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Any
+
+import msgspec
 
 from problems.errors import InputError
 
@@ -29,6 +32,17 @@ def atomic(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}.") from error
         raise
+
+
+def json_of(value: Any) -> bytes:
+    """Return a value as JSON for people: indented, and ended by a line end."""
+    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as JSON, all of it or nothing."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(json_of(value))
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.file import Campaign, Case
 from hbvm_bench.campaign.identity import is_ours, make_method, make_problem
 from hbvm_bench.campaign.spec import Spec, parse_spec
-from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.files import atomic, ensure_writable, write_json
 from hbvm_bench.store.records import SCHEMA, Outcome, Record, Result, decoded
 from problems import limits
 from problems.errors import InputError
@@ -142,9 +142,7 @@ class Store:
             encoded = series if isinstance(series, bytes) else encode_series(series)
             with atomic(self._series_path(record.id)) as path:
                 path.write_bytes(encoded)
-        encoded = msgspec.json.format(msgspec.json.encode(record), indent=1)
-        with atomic(self._record_path(record.id)) as path:
-            path.write_bytes(encoded + b"\n")
+        write_json(self._record_path(record.id), record)
 
     def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
         """Return the series of a case by name; empty where it has none."""
@@ -159,8 +157,7 @@ class Store:
 
     def write_index(self, index: Index) -> None:
         """Store what the run was asked to do."""
-        with atomic(self.directory / INDEX) as path:
-            path.write_bytes(msgspec.json.format(msgspec.json.encode(index), indent=1) + b"\n")
+        write_json(self.directory / INDEX, index)
 
     def index(self) -> Index:
         """Return what the run was asked to do.

@@ -12,7 +12,6 @@ import msgspec
 
 from hbvm_bench.campaign.identity import digest_of, make_method
 from hbvm_bench.measure import machine
-from hbvm_bench.store.files import atomic
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import Table
 
@@ -143,12 +142,6 @@ def table(result: PeerCheck) -> Table:
         f"{machine.sentence(result.machine)} To repeat it: {COMMAND}.",
         words=(1, 2),
     )
-
-
-def save(result: PeerCheck, path: Path) -> None:
-    """Write a result, all of it or nothing."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
 
 
 def kept() -> Table | None:

@@ -25,7 +25,7 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Run
 from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.run import processes
-from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.files import atomic, ensure_writable, write_json
 from hbvm_bench.store.records import decoded
 from hbvm_bench.studies.race import truth
 from hbvm_bench.studies.race.accuracy import sample_times
@@ -171,10 +171,7 @@ def main(path: Path) -> int:
 
 def save(results: Sequence[Result], path: Path) -> None:
     """Write results of one kind of processor, all of them or nothing."""
-    with atomic(path) as temporary:
-        temporary.write_bytes(
-            msgspec.json.format(msgspec.json.encode(Kept(runs=list(results))), indent=1) + b"\n"
-        )
+    write_json(path, Kept(runs=list(results)))
 
 
 def load(path: Path) -> list[Result]:

@@ -16,13 +16,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign.grid import GOLDEN
 from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
-from hbvm_bench.store.files import atomic
+from hbvm_bench.store.files import write_json
 from hbvm_bench.store.records import decoded
-from hbvm_bench.studies.race.accuracy import GOLDEN
 from integrators.protocol import Program, Status
 from problems.analysis import invariants
 from problems.errors import InputError
@@ -240,8 +240,7 @@ def run(problem: Problem, program: Program, text: str, start: int, times: Array)
 
 def save(result: Endurance, directory: Path) -> None:
     """Write the result, all of it or nothing."""
-    with atomic(directory / FILE) as path:
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+    write_json(directory / FILE, result)
 
 
 def load(directory: Path) -> Endurance:

@@ -24,9 +24,10 @@ from hbvm_bench.measure import ensemble, machine
 from hbvm_bench.measure.starts import cloud
 from hbvm_bench.measure.timing import WARM_UP, Run
 from hbvm_bench.run import processes
+from hbvm_bench.store.files import write_json
 from hbvm_bench.studies.peers import alone as peers_alone
 from hbvm_bench.studies.peers.alone import Script
-from hbvm_bench.summaries.peers import PeerCheck, Row, digest, save
+from hbvm_bench.summaries.peers import PeerCheck, Row, digest
 from integrators.protocol import Array, Status
 from problems.errors import InputError
 from problems.problem import Problem
@@ -234,10 +235,8 @@ def main(path: Path) -> None:
     """Do what a request asks."""
     processes.settle()
     request = msgspec.json.decode(path.read_bytes(), type=Request)
-    save(
-        check(rounds=request.rounds, tell=lambda what: print(what, file=sys.stderr, flush=True)),
-        Path(request.out),
-    )
+    result = check(rounds=request.rounds, tell=lambda what: print(what, file=sys.stderr, flush=True))
+    write_json(Path(request.out), result)
 
 
 if __name__ == "__main__":

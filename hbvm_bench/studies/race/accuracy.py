@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign.grid import GOLDEN
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure.measured import largest_distance, positions
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 SAMPLES = 400
 NOWHERE = 1e-9  # of the span
 CALLS = 20
-GOLDEN = (5**0.5 - 1) / 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from statistics import median, quantiles
 import msgspec
 
 from hbvm_bench.measure import machine
-from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.files import ensure_writable, write_json
 from hbvm_bench.store.records import decoded
 from problems.errors import InputError
 
@@ -273,8 +273,7 @@ def save(race: Race, directory: Path) -> Path:
     """Write the result of a contest, all of it or nothing, and return its path."""
     ensure_writable(directory)
     target = directory / f"{race.contest.key}.json"
-    with atomic(target) as path:
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(race), indent=1) + b"\n")
+    write_json(target, race)
     return target
 
 

@@ -9,6 +9,7 @@ import pytest
 import integrators.registry
 from hbvm_bench import cli
 from hbvm_bench.run import processes
+from hbvm_bench.store.files import write_json
 from hbvm_bench.studies.peers import check
 from hbvm_bench.studies.peers.check import PAIRS
 from hbvm_bench.summaries import peers
@@ -71,7 +72,7 @@ def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(
 ):
     def wait(command):
         request = msgspec.json.decode(Path(command[-1]).read_bytes())
-        peers.save(result, Path(request["out"]))
+        write_json(Path(request["out"]), result)
         return 0
 
     monkeypatch.setattr(processes, "wait", wait)
