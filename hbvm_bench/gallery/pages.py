@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import problems
-from hbvm_bench import engines, reference
 from hbvm_bench.gallery import pictures
-from hbvm_bench.store import write_all
+from hbvm_bench.reference import solutions as reference
+from hbvm_bench.store.files import write_all
+from hbvm_bench.summaries import engines
 from problems import registry
 from problems.analysis import structure
 from problems.analysis.latex import latex
@@ -72,8 +73,8 @@ REFERENCES = """## References
 
 Position errors are measured against solutions that two independent computations agree on: heyoka's Taylor
 method in 128-bit arithmetic and Gauss collocation in double-double arithmetic (for large systems the
-collocation and the Taylor method in long double). Each is a text file under `hbvm_bench/references/` with its
-provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
+collocation and the Taylor method in long double). Each is a text file in `hbvm_bench/reference/data/`, with
+its provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
 recomputes and compares.
 
 | problem | up to t = | the two differ by (relative) |

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import integrators
 import problems
-from hbvm_bench.report.style import GRID, INK, MUTED
+from hbvm_bench.report.figures.style import GRID, INK, MUTED
 from problems.errors import InputError
 from problems.problem import Problem
 

@@ -4,7 +4,9 @@ import re
 
 import pytest
 
-from hbvm_bench import campaign, cli, runner
+from hbvm_bench import cli
+from hbvm_bench.campaign import file as campaign
+from hbvm_bench.run import loop
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -190,7 +192,7 @@ def written(text: str) -> str:
 def fault(line: str) -> Fault:
     """Return a row of the table."""
     text, says = (part.strip() for part in line.split(" => "))
-    return Fault(text, lambda: runner.plan(campaign.parse(written(text))), re.escape(says))
+    return Fault(text, lambda: loop.plan(campaign.parse(written(text))), re.escape(says))
 
 
 @pytest.mark.parametrize("row", [fault(line) for line in TABLE.strip("\n").splitlines()], ids=str)

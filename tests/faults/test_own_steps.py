@@ -8,7 +8,7 @@ import pytest
 
 import integrators
 import problems
-from hbvm_bench.spec import parse_spec
+from hbvm_bench.campaign.spec import parse_spec
 from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
 from problems import Foreign, Hamiltonian, Problem, VectorField

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.identity import make_problem
+from hbvm_bench.campaign.identity import make_problem
 from problems import registry
 from problems.errors import InputError, UnknownNameError
 

@@ -7,8 +7,8 @@ import pytest
 
 import problems
 from hbvm_bench import cli
+from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.gallery import compile_times, pages, pictures
-from hbvm_bench.spec import parse_spec
 from problems import registry
 from problems.errors import InputError
 

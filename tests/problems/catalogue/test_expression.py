@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 import integrators
 import problems
-from hbvm_bench import campaign, runner
-from hbvm_bench.identity import make_problem
+from hbvm_bench.campaign import file as campaign
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.run import loop
 from problems import emit
 from problems.analysis import structure
 from problems.catalogue import _formula as formula
@@ -269,9 +270,9 @@ problems = ["""
 use = "HBVM(k=4, s=2, h=0.1)"
 """
     )
-    (case,) = runner.plan(campaign.load(str(file)))
+    (case,) = loop.plan(campaign.load(str(file)))
     assert case.problem.system.separable
     assert case.problem.par.tolist() == [2.0]
     file.write_text(file.read_text().replace("p^2/2", "p.x"))
     with pytest.raises(InputError, match="column"):
-        runner.plan(campaign.load(str(file)))
+        loop.plan(campaign.load(str(file)))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench import collocation, reference, trusted
-from hbvm_bench.identity import make_problem
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.reference import collocation, trusted
+from hbvm_bench.reference import solutions as reference
 from problems.calculus.gradient import reachable
 from problems.catalogue import kepler, molecules, pendulum
 from problems.errors import InputError
