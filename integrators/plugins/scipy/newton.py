@@ -147,7 +147,7 @@ def grouped(pattern: Any) -> NDArray[np.intp]:
     Each column goes to the first group with room for it (A. R. Curtis, M. J. D. Powell, J. K. Reid,
     *On the estimation of sparse Jacobian matrices*, 1974).
     """
-    columns = sparse.csc_matrix(pattern)
+    columns = pattern.tocsc()
     taken = np.zeros((0, columns.shape[0]), dtype=bool)  # rows, by group
     groups = np.empty(columns.shape[1], dtype=np.intp)
     for j in range(groups.size):
