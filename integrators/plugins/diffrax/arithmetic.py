@@ -1,11 +1,9 @@
-"""Legendre polynomials and sums on JAX arrays; imported only once JAX is known to be installed."""
+"""Sums and products of JAX arrays; imported only once JAX is known to be installed."""
 
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-
-from integrators import legendre
 
 
 def add(y: Any, rest: Any, increment: Any) -> tuple[Any, Any]:
@@ -38,22 +36,3 @@ def apply(matrix: Any, x: Any) -> Any:
 def real(dtype: Any) -> Any:
     """Return the real type of the same precision."""
     return jnp.finfo(dtype).dtype
-
-
-def _xi(j: int) -> float:
-    """Return xi_j as a number without a type of its own, which single precision stays single with."""
-    return float(legendre.xi(j))
-
-
-def basis(c: Any, n: int) -> list[Any]:
-    """Return P_0 .. P_{n-1} at c."""
-    P = [jnp.ones_like(c), (c - 0.5) / _xi(1)]
-    for j in range(1, n - 1):
-        P.append(((c - 0.5) * P[j] - j * _xi(j) * P[j - 1]) / ((j + 1) * _xi(j + 1)))
-    return P[:n]
-
-
-def integrals(c: Any, n: int) -> list[Any]:
-    """Return the integrals of P_0 .. P_{n-1} from 0 to c."""
-    P = basis(jnp.asarray(c), n + 1)
-    return [c] + [_xi(j + 1) * P[j + 1] - _xi(j) * P[j - 1] for j in range(1, n)]
