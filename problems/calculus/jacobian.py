@@ -10,22 +10,16 @@ with the places of its entries as further columns of the list.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calculus.functions import Function
-from problems.calculus.gradient import LoopTerm, Term, gradient
-from problems.emit.rewrite import body_of
-from problems.errors import unknown
-from problems.systems.base import System
-from problems.trace.graph import STATE, Graph, Node, Q
-from problems.trace.sums import Affine, Loop
+from problems.calculus.function import Function, LoopTerm, Term
+from problems.calculus.gradient import gradient
+from problems.trace.graph import STATE, Affine, Graph, Loop, Node, Q, reachable
 
 Integers = NDArray[np.int64]
 
-NAMES = {"jacobian": "field", "jacobian:force": "force"}
 LARGEST = 2_000_000  # integers in one loop's list; beyond, source text is the wrong place for a list
 _CAPTURED = 1 << 40  # places beyond any state stand for values that a loop's term takes from outside
 
@@ -34,8 +28,13 @@ _CAPTURED = 1 << 40  # places beyond any state stand for values that a loop's te
 class Jacobian:
     """The derivatives of a field with respect to the state, entry by entry.
 
+    Its values come from the emitters, in the order of ``rows`` and ``columns``:
+    ``emit.numpy(system, system.jacobian())(t, y, par)``; ``emit.numba`` likewise.
+
     Attributes
     ----------
+    name : str
+        What generated code and messages call it.
     function : Function
         One output per entry, for the emitters.
     rows, columns : ndarray of int64, shape (n,)
@@ -44,6 +43,7 @@ class Jacobian:
         The matrix is size by size.
     """
 
+    name: str
     function: Function
     rows: Integers
     columns: Integers
@@ -55,52 +55,29 @@ class Jacobian:
         return self.rows.size / self.size**2
 
 
-_known: WeakKeyDictionary[System, dict[str, Jacobian | None]] = WeakKeyDictionary()
-
-
-def jacobian(system: System, what: str = "jacobian") -> Jacobian | None:
-    """Return a system's Jacobian, or ``None`` where there is none to be written down.
-
-    Its values come from the emitters: ``emit.numpy(system, what)(t, y, par)``, in the
-    order of ``rows`` and ``columns``; ``emit.numba`` likewise.
+def jacobian(function: Function, name: str) -> Jacobian | None:
+    """Return the derivatives of a function with respect to as many components of the state.
 
     Parameters
     ----------
-    system : System
-        A traced system.
-    what : {"jacobian", "jacobian:force"}
-        Of the field with respect to the state, or (separable systems) of the force
-        with respect to the positions.
+    function : Function
+        A field, or the force of a separable system, which depends on the positions alone.
+    name : str
+        See `Jacobian`.
 
     Returns
     -------
     Jacobian or None
-        ``None`` for a system that is not traced, and where the list of entries would
-        be larger than `LARGEST`: the derivatives must then be taken by differences.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For another name, or a system that has no such function.
+        ``None`` where the list of entries would be larger than `LARGEST`.
     """
-    if what not in NAMES:
-        raise unknown("Jacobian", what, NAMES)
-    known = _known.setdefault(system, {})
-    if what not in known:
-        known[what] = None if not system.traced else _differentiated(system.function(NAMES[what]))
-    return known[what]
-
-
-def _differentiated(function: Function) -> Jacobian | None:
-    size = len(function.outputs)
-    entries = _Entries(function.graph)
+    entries = _Entries(function.graph, len(function.outputs))
     for loop, terms in function.loops:
         for term in terms:
             entries.of_loop_term(loop, term.index, term.node)
     for row, terms in enumerate(function.outputs):
         for term in terms:
             entries.of_term(row, term.node)
-    return entries.collected(size)
+    return entries.collected(name)
 
 
 @dataclass
@@ -112,17 +89,19 @@ class _InLoop:
 
 
 class _Entries:
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Graph, size: int) -> None:
         self.graph = graph
+        self.size = size
         self.plain: dict[tuple[int, int], list[Node]] = {}
         self.loops: dict[int, _InLoop] = {}
         self.too_large = False
 
     def of_term(self, row: int, node: Node) -> None:
         """Enter the derivatives of a summand of one output."""
-        found = gradient(node)
-        for column, terms in found.terms.items():
-            self.plain.setdefault((row, column), []).extend(term.node for term in terms)
+        found = gradient(node, self.size)
+        for column, terms in enumerate(found.outputs):
+            if terms:
+                self.plain.setdefault((row, column), []).extend(term.node for term in terms)
         for loop, terms in found.loops:
             for term in terms:
                 self._enter(loop, _constant(loop, row), term.index, term.node)
@@ -142,7 +121,7 @@ class _Entries:
         isolated = _copied(self.graph, node, loop, captured) if node.loop is loop else captured(node)
         if not isolated.flags & STATE:
             return
-        for found_loop, terms in gradient(self.graph.sum(isolated, loop)).loops:
+        for found_loop, terms in gradient(self.graph.sum(isolated, loop), self.size).loops:
             assert found_loop is loop
             for term in terms:
                 slope = _copied(self.graph, term.node, loop, lambda inner: _brought_back(inner, outside))
@@ -156,8 +135,8 @@ class _Entries:
         if inner.op == "symbol":
             self._enter(loop, row, _constant(loop, inner.data[1]), slope)
             return
-        found = gradient(inner)
-        for column, terms in found.terms.items():
+        found = gradient(inner, self.size)
+        for column, terms in enumerate(found.outputs):
             for term in terms:
                 self._enter(loop, row, _constant(loop, column), slope * term.node)
         for other, terms in found.loops:
@@ -170,7 +149,7 @@ class _Entries:
             self.too_large = True
             return
         pairs = np.hstack([np.repeat(loop.rows, m, axis=0), np.tile(other.rows, (n, 1))])
-        both = _loop(self.graph, pairs)
+        both = self.graph.loop(pairs)
         left = _moved(self.graph, slope, loop, both, 0)
         for term in terms:
             right = _moved(self.graph, term.node, other, both, loop.width)
@@ -182,8 +161,9 @@ class _Entries:
         before = nodes.get((row, column))
         nodes[row, column] = node if before is None else before + node
 
-    def collected(self, size: int) -> Jacobian | None:
+    def collected(self, name: str) -> Jacobian | None:
         """Return the Jacobian; its entries in order, the loops' lists with their places."""
+        size = self.size
         flat = [np.array([row * size + column for row, column in self.plain], dtype=np.int64)]
         for part in self.loops.values():
             flat += [row.values(part.loop) * size + column.values(part.loop) for row, column in part.nodes]
@@ -192,7 +172,7 @@ class _Entries:
             places = np.zeros(1, dtype=np.int64)  # a constant field: one entry, which is 0
         loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
         for part in self.loops.values():
-            made = self._with_places(part, places, size)
+            made = self._with_places(part, places)
             if made is None:
                 return None
             loops.append(made)
@@ -203,12 +183,10 @@ class _Entries:
             place = int(np.searchsorted(places, row * size + column))
             outputs[place] = tuple(Term(node, node.id) for node in nodes)
         function = Function(self.graph, tuple(outputs), tuple(loops))
-        return Jacobian(function, places // size, places % size, size)
+        return Jacobian(name, function, places // size, places % size, size)
 
-    def _with_places(
-        self, part: _InLoop, places: Integers, size: int
-    ) -> tuple[Loop, tuple[LoopTerm, ...]] | None:
-        loop = part.loop
+    def _with_places(self, part: _InLoop, places: Integers) -> tuple[Loop, tuple[LoopTerm, ...]] | None:
+        loop, size = part.loop, self.size
         width = loop.width
         if len(loop) * (width + len(part.nodes)) > LARGEST:
             return None
@@ -216,7 +194,7 @@ class _Entries:
             np.searchsorted(places, row.values(loop) * size + column.values(loop))
             for row, column in part.nodes
         ]
-        longer = _loop(self.graph, np.hstack([loop.rows, np.stack(columns, axis=1)]))
+        longer = self.graph.loop(np.hstack([loop.rows, np.stack(columns, axis=1)]))
         terms: list[LoopTerm] = []
         for i, node in enumerate(part.nodes.values()):
             place = tuple(int(j == width + i) for j in range(longer.width))
@@ -235,15 +213,10 @@ def _widened(affine: Affine, loop: Loop, at: int) -> Affine:
     return Affine(tuple(coefficients), affine.offset)
 
 
-def _loop(graph: Graph, rows: Integers) -> Loop:
-    rows = np.ascontiguousarray(rows, dtype=np.int64)
-    return graph.loops.setdefault((rows.shape, rows.tobytes()), Loop(rows, len(graph.loops)))
-
-
 def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) -> Node:
     """Return ``root`` with ``leaf`` applied to the loop's symbols and to what comes from outside."""
     done: dict[int, Node] = {}
-    for node in body_of([root], loop):
+    for node in reachable([root], loop):
         if node.op in ("symbol", "index"):
             done[node.id] = leaf(node)
         else:

@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus import functions
-from problems.calculus.functions import Function
+from problems.calculus.function import plain
 from problems.calculus.gradient import gradient
 from problems.calls import checked
 from problems.errors import InputError
 from problems.systems.base import System, Value, check_count, check_names, name_of
 from problems.trace import arguments
 from problems.trace.graph import Node, T
-from problems.trace.lines import line_of_function
+from problems.trace.source_line import line_of_function
 
 
 class Poisson(System):
@@ -77,31 +76,31 @@ class Poisson(System):
             name=name or name_of(H),
         )
         energy = self._scalar(H, "H")
-        self._functions["hamiltonian"] = functions.plain(self._graph, [energy])
+        self._functions["hamiltonian"] = plain(self._graph, [energy])
         if not energy.flags & T:
             self._functions["invariant:energy"] = self._functions["hamiltonian"]
             self.invariant_names = ("energy", *self.invariant_names)
         slope = self._gradient(energy, H)
         matrix = self._matrix(B)
-        self._functions["gradient"] = functions.plain(self._graph, slope)
-        self._functions["structure"] = functions.plain(self._graph, [b for row in matrix for b in row])
-        self._functions["field"] = functions.plain(self._graph, [_product(row, slope) for row in matrix])
-        self._trace_declared()
+        self._functions["gradient"] = plain(self._graph, slope)
+        self._functions["structure"] = plain(self._graph, [b for row in matrix for b in row])
+        self._functions["field"] = plain(self._graph, [_product(row, slope) for row in matrix])
+        self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:
         return f"Poisson({self.name}, dim={self.dim})"
 
     def _gradient(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
-        found = gradient(energy)
+        found = gradient(energy, self.dim)
         if found.loops:
             raise InputError(
                 f"{line_of_function(H)}: H of a Poisson system uses m.sum; write the sum in Python, "
                 "such as sum(y[i]**2 for i in range(n))."
             )
         slope = []
-        for place in range(self.dim):
+        for terms in found.outputs:
             total = self._graph.const(0.0)
-            for term in found.terms.get(place, ()):
+            for term in terms:
                 total = total + term.node
             slope.append(total)
         return slope
@@ -117,10 +116,7 @@ class Poisson(System):
         ):
             raise InputError(f"{line}: B must return {self.dim} lists of {self.dim} entries.")
         matrix = [
-            [
-                arguments.scalar(b, graph=self._graph, function=B, what=f"B's entry [{i}][{j}]")
-                for j, b in enumerate(row)
-            ]
+            [self._node(b, B, f"B's entry [{i}][{j}]") for j, b in enumerate(row)]
             for i, row in enumerate(rows)
         ]
         for i in range(self.dim):
@@ -133,9 +129,6 @@ class Poisson(System):
                         f"[{j}][{i}]; write the one as minus the other, and 0 on the diagonal."
                     )
         return matrix
-
-    def _build(self, what: str) -> Function | None:
-        return None
 
 
 def _product(row: list[Node], slope: list[Node]) -> Node:

@@ -3,9 +3,8 @@
 import numpy as np
 
 from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
-from problems.emit.text import Printer
-from problems.trace.graph import FUNCTIONS, Node
-from problems.trace.sums import Affine, Loop
+from problems.emit.printer import Printer
+from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
 
 _PREFIX = {"y": "y", "par": "c", "out": "a"}
 

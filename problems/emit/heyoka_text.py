@@ -1,8 +1,8 @@
 """Emission to heyoka: expressions of its own symbols, all sums written out."""
 
 from problems.emit.plan import Let, Plan, Store
-from problems.emit.scalar import FUNCTIONS
-from problems.emit.text import Printer
+from problems.emit.printer import Printer
+from problems.trace.graph import FUNCTIONS
 
 
 def heyoka_text(plan: Plan, name: str) -> str:

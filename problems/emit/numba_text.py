@@ -4,30 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.calculus.gradient import LoopTerm
+from problems.calculus.function import LoopTerm
 from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
-from problems.emit.text import Printer
-from problems.trace.graph import Node
-from problems.trace.sums import Affine, Loop
+from problems.emit.printer import Printer
+from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
 
-FUNCTIONS = {
-    "sqrt": "sqrt",
-    "sin": "sin",
-    "cos": "cos",
-    "tan": "tan",
-    "exp": "exp",
-    "log": "log",
-    "abs": "fabs",
-    "sign": "copysign(1.0, {})",
-}
-PREFIX = {"y": "y", "par": "c", "out": "a"}
+_FUNCTIONS = {name: name for name in FUNCTIONS} | {"abs": "fabs", "sign": "copysign(1.0, {})"}
+_PREFIX = {"y": "y", "par": "c", "out": "a"}
 
 
 class _Writer:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self.printer = Printer(plan.uses, FUNCTIONS)
+        self.printer = Printer(plan.uses, _FUNCTIONS)
         self.tables: dict[int, tuple[str, str]] = {}
 
     def write(self) -> None:
@@ -64,7 +54,7 @@ class _Writer:
             if space == "t":
                 self.printer.names[node.id] = "t"
             elif isinstance(place, int):
-                self.printer.assign(node, f"{space}[{place}]", f"{PREFIX[space]}{place}")
+                self.printer.assign(node, f"{space}[{place}]", f"{_PREFIX[space]}{place}")
             else:
                 assert header is not None
                 self.printer.assign(node, f"{space}[{header.index(place)}]")
