@@ -5,6 +5,9 @@ states are the doubles that the integrators see, every operation carries 32
 digits, and the result is rounded once. What is left is the integrator's error.
 """
 
+import operator
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,6 +22,13 @@ Array = NDArray[np.float64]
 
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000
+_OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "neg": operator.neg,
+}
 
 
 def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]:
@@ -104,21 +114,9 @@ class _Interpreter:
         if node.op == "sum":
             return self._sum(node, node.data)
         args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
-        match node.op:
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "mul":
-                return args[0] * args[1]
-            case "div":
-                return args[0] / args[1]
-            case "neg":
-                return -args[0]
-            case "pow":
-                return args[0] ** node.data
-            case _:
-                return double_double.FUNCTIONS[node.op](args[0])
+        if node.op == "pow":
+            return args[0] ** node.data
+        return _OPERATIONS[node.op](*args)
 
     def _sum(self, node: Node, loop: Loop) -> DD:
         terms = self._rows(self._inside([node.args[0]], loop)[node.args[0].id], len(loop))

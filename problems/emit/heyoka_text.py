@@ -1,26 +1,33 @@
 """Emission to heyoka: expressions of its own symbols, all sums written out."""
 
-from problems.emit.plan import Let, Plan, Store
+from collections.abc import Callable
+
+from problems.emit.plan import Plan
 from problems.emit.printer import Printer
-from problems.trace.graph import FUNCTIONS
+from problems.trace.graph import FUNCTIONS, Affine, Node
+
+_FUNCTIONS = {name: f"hy.{name}" for name in FUNCTIONS} | {
+    "abs": "(hy.relu({0}) + hy.relu(-({0})))",
+    "sign": "(hy.relup({0}) - hy.relup(-({0})))",
+}
+
+
+class _HeyokaPrinter(Printer):
+    def let(self, node: Node, index: Callable[[Affine], str] | None = None) -> None:
+        if node.op == "symbol":  # an expression by itself: no variable is needed to hold it
+            space, place = node.data
+            self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
+        else:
+            super().let(node, index)
+
+    def store(self, place: int, value: str) -> None:
+        self.line(f"out[{place}] = {value}")
 
 
 def heyoka_text(plan: Plan, name: str) -> str:
     """Return ``def name(t, y, par, hy)``, which returns the list of expressions."""
-    functions = {f: f"hy.{f}" for f in FUNCTIONS} | {
-        "abs": "(hy.relu({0}) + hy.relu(-({0})))",
-        "sign": "(hy.relup({0}) - hy.relup(-({0})))",
-    }
-    printer = Printer(plan.uses, functions)
+    printer = _HeyokaPrinter(plan, _FUNCTIONS)
     printer.line(f"out = [None]*{plan.n_out}")
-    for statement in plan.first:
-        match statement:
-            case Let(node) if node.op == "symbol":
-                space, place = node.data
-                printer.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
-            case Let(node):
-                printer.let(node)
-            case Store(place, node):
-                printer.line(f"out[{place}] = {printer.text(node)}")
+    printer.statements(plan.first)
     printer.line("return out")
-    return f"def {name}(t, y, par, hy):\n" + "\n".join(printer.lines) + "\n"
+    return printer.finished(f"{name}(t, y, par, hy)")

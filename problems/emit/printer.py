@@ -1,31 +1,65 @@
-"""Expressions as Python text, shared by all emitters."""
+"""A plan as Python text: what all targets have in common."""
 
-from problems.trace.graph import Node
+from collections.abc import Callable, Sequence
+
+from problems.emit.plan import Let, Plan, Reduce, Store
+from problems.trace.graph import Affine, Loop, Node
 
 _SUM, _PRODUCT, _LEAF = 1, 2, 3
 _OPERATORS = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}
 _LONGEST = 72
+_PREFIX = {"y": "y", "par": "c", "out": "a"}  # of the variables that hold inputs and outputs
 
 
 class Printer:
-    """Prints operations; a value used once is printed where it is used.
+    """Prints a plan's statements; a value used once is printed where it is used.
 
     Parameters
     ----------
-    uses : dict
-        How often each node is used.
+    plan : Plan
+        What to print.
     functions : dict
         Name of each function in the target, or a template with ``{}``.
     """
 
-    def __init__(self, uses: dict[int, int], functions: dict[str, str]) -> None:
+    def __init__(self, plan: Plan, functions: dict[str, str]) -> None:
+        self.plan = plan
         self.names: dict[int, str] = {}
         self.lines: list[str] = []
         self.indent = "    "
-        self._uses = uses
         self._functions = functions
         self._pending: dict[int, tuple[str, int]] = {}
         self._count = 0
+        self._tables: dict[str, str] = {}
+
+    # What a target does in its own way.
+    def store(self, place: int, value: str) -> None:
+        """Print that an output is complete."""
+        raise NotImplementedError
+
+    def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
+        """Print a declared sum."""
+        raise NotImplementedError
+
+    def statements(self, statements: Sequence[Let | Reduce | Store]) -> None:
+        """Print statements in order."""
+        for statement in statements:
+            match statement:
+                case Let(node):
+                    self.let(node)
+                case Store(place, node):
+                    self.store(place, self.text(node))
+                case Reduce(node, loop, body):
+                    self.reduce(node, loop, body)
+
+    def finished(self, signature: str) -> str:
+        """Return the function that the lines make, preceded by its tables if it has any."""
+        head = "".join(f"{name} = {text}\n" for text, name in self._tables.items())
+        return head + f"def {signature}:\n" + "\n".join(self.lines) + "\n"
+
+    def table(self, text: str) -> str:
+        """Return the name of a table of numbers, one for each text."""
+        return self._tables.setdefault(text, f"TABLE_{len(self._tables)}")
 
     def line(self, text: str) -> None:
         """Add a line."""
@@ -39,15 +73,26 @@ class Printer:
         self.names[node.id] = name
         self.line(f"{name} = {text}")
 
-    def let(self, node: Node) -> None:
-        """Compute a value, or keep its text for the one place that uses it."""
-        if node.op == "const":
-            return
-        text, level = self._operation(node)
-        if self._uses.get(node.id, 0) == 1 and len(text) < _LONGEST:
-            self._pending[node.id] = (text, level)
-        else:
-            self.assign(node, text)
+    def let(self, node: Node, index: Callable[[Affine], str] | None = None) -> None:
+        """Read an input, compute a value, or keep its text for the one place that uses it.
+
+        ``index`` returns the text of a place that differs from term to term of a loop.
+        """
+        if node.op == "symbol":
+            space, place = node.data
+            if space == "t":
+                self.names[node.id] = "t"
+            elif isinstance(place, int):
+                self.assign(node, f"{space}[{place}]", f"{_PREFIX[space]}{place}")
+            else:
+                assert index is not None
+                self.assign(node, f"{space}[{index(place)}]")
+        elif node.op != "const":
+            text, level = self._operation(node)
+            if self.plan.uses.get(node.id, 0) == 1 and len(text) < _LONGEST:
+                self._pending[node.id] = (text, level)
+            else:
+                self.assign(node, text)
 
     def waiting(self, node: Node) -> bool:
         """Whether a value's text waits for the one place that uses it."""
