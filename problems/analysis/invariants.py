@@ -161,7 +161,7 @@ def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) ->
     found: dict[str, Array] = {}
     for name in system.invariant_names:
         values = [value.rounded() for value in _along(system, par, f"invariant:{name}", states, t)]
-        found[name] = np.stack(values, axis=1) if system.is_vector(f"invariant:{name}") else values[0]
+        found[name] = np.stack(values, axis=1) if system.is_vector(name) else values[0]
     return found
 
 

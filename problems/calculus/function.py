@@ -82,7 +82,7 @@ class Function:
         return Function(self.graph, outputs, loops)
 
 
-def plain(graph: Graph, nodes: Iterable[Node]) -> Function:
+def function_of(graph: Graph, nodes: Iterable[Node]) -> Function:
     """Return the function whose outputs are ``nodes``."""
     return Function(graph, tuple((Term(node, node.id),) for node in nodes))
 
@@ -99,9 +99,9 @@ def stacked(functions: Sequence[Function]) -> Function:
 
 def joined(parts: Iterable[tuple[int, Loops]]) -> Loops:
     """Join summands in loops, each part moved by some places, so that each loop runs once."""
-    found: dict[int, tuple[Loop, list[LoopTerm]]] = {}
+    found: dict[Loop, list[LoopTerm]] = {}
     for by, loops in parts:
         for loop, entries in loops:
-            moved = [LoopTerm(entry.index.shifted(by), entry.node) for entry in entries]
-            found.setdefault(loop.id, (loop, []))[1].extend(moved)
-    return tuple((loop, tuple(entries)) for loop, entries in found.values())
+            moved = (LoopTerm(entry.index.shifted(by), entry.node) for entry in entries)
+            found.setdefault(loop, []).extend(moved)
+    return tuple((loop, tuple(entries)) for loop, entries in found.items())

@@ -158,7 +158,7 @@ class _Sweep:
     def _out_of_loops(self, parts: list[_Adjoint]) -> list[_Adjoint]:
         graph = self.graph
         outside: list[_Adjoint] = []
-        inside: dict[int, tuple[Loop, list[_Adjoint]]] = {}
+        inside: dict[Loop, list[_Adjoint]] = {}
         for part in parts:
             loop = next((n.loop for n in (part.num, part.den) if n is not None and n.loop is not None), None)
             # A contribution from inside a loop that does not vary there still occurs once per term.
@@ -166,9 +166,9 @@ class _Sweep:
             if loop is None:
                 outside.append(part)
             else:
-                inside.setdefault(loop.id, (loop, []))[1].append(part)
+                inside.setdefault(loop, []).append(part)
         sums: list[_Adjoint] = []
-        for loop, loop_parts in inside.values():
+        for loop, loop_parts in inside.items():
             total = _added(loop_parts, graph)
             if total is not None:
                 body = _Adjoint(_ONE, total.num, total.den, 0).node(graph)
@@ -264,7 +264,7 @@ def gradient(root: Node, dim: int) -> Function:
     """
     graph = root.graph
     outputs: list[tuple[Term, ...]] = [()] * dim
-    loops: dict[int, tuple[Loop, list[LoopTerm]]] = {}
+    loops: dict[Loop, list[LoopTerm]] = {}
     sweep = _Sweep(root)
     sweep.parts[root.id] = [_Adjoint(_ONE, None, None, root.id)]
     for node in reversed(sweep.nodes):
@@ -279,9 +279,8 @@ def gradient(root: Node, dim: int) -> Function:
         if total is None:
             continue
         if node.op == "symbol" and loop is not None:
-            entry = LoopTerm(node.data[1], total.node(graph))
-            loops.setdefault(loop.id, (loop, []))[1].append(entry)
+            loops.setdefault(loop, []).append(LoopTerm(node.data[1], total.node(graph)))
         else:
             sweep.pull(node, total)
-    ordered = tuple((loop, tuple(entries[::-1])) for _, (loop, entries) in sorted(loops.items()))
-    return Function(graph, tuple(outputs), ordered)
+    ordered = sorted(loops, key=lambda loop: loop.id)
+    return Function(graph, tuple(outputs), tuple((loop, tuple(loops[loop][::-1])) for loop in ordered))

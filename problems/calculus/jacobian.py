@@ -80,20 +80,13 @@ def jacobian(function: Function, name: str) -> Jacobian | None:
     return entries.collected(name)
 
 
-@dataclass
-class _InLoop:
-    """Derivatives in one loop: ``nodes[a, b]`` stands at row a, column b, for each term."""
-
-    loop: Loop
-    nodes: dict[tuple[Affine, Affine], Node]
-
-
 class _Entries:
     def __init__(self, graph: Graph, size: int) -> None:
         self.graph = graph
         self.size = size
         self.plain: dict[tuple[int, int], list[Node]] = {}
-        self.loops: dict[int, _InLoop] = {}
+        # Derivatives in a loop: that at [row, column] stands there for each term.
+        self.loops: dict[Loop, dict[tuple[Affine, Affine], Node]] = {}
         self.too_large = False
 
     def of_term(self, row: int, node: Node) -> None:
@@ -110,13 +103,16 @@ class _Entries:
         """Enter the derivatives of a summand that stands in a loop."""
         outside: dict[int, Node] = {}
 
-        def stand_in(inner: Node) -> Node:
-            # As a symbol of the loop it keeps a derivative of its own in every term.
+        def captured(inner: Node) -> Node:
+            if inner.loop is not None or not inner.flags & STATE:
+                return inner
             outside[inner.id] = inner
+            # As a symbol of the loop it keeps a derivative of its own in every term.
             return self.graph.symbol("captured", _constant(loop, _CAPTURED + inner.id), flags=Q, loop=loop)
 
-        def captured(inner: Node) -> Node:
-            return stand_in(inner) if inner.loop is None and inner.flags & STATE else inner
+        def brought_back(inner: Node) -> Node:
+            stand_in = inner.op == "symbol" and inner.data[0] == "captured"
+            return outside[inner.data[1].offset - _CAPTURED] if stand_in else inner
 
         isolated = _copied(self.graph, node, loop, captured) if node.loop is loop else captured(node)
         if not isolated.flags & STATE:
@@ -124,7 +120,7 @@ class _Entries:
         for found_loop, terms in gradient(self.graph.sum(isolated, loop), self.size).loops:
             assert found_loop is loop
             for term in terms:
-                slope = _copied(self.graph, term.node, loop, lambda inner: _brought_back(inner, outside))
+                slope = _copied(self.graph, term.node, loop, brought_back)
                 if term.index.offset < _CAPTURED:
                     self._enter(loop, row, term.index, slope)
                 else:
@@ -157,49 +153,38 @@ class _Entries:
             self._enter(both, _widened(row, both, 0), column, left * right)
 
     def _enter(self, loop: Loop, row: Affine, column: Affine, node: Node) -> None:
-        nodes = self.loops.setdefault(loop.id, _InLoop(loop, {})).nodes
+        nodes = self.loops.setdefault(loop, {})
         before = nodes.get((row, column))
         nodes[row, column] = node if before is None else before + node
 
     def collected(self, name: str) -> Jacobian | None:
         """Return the Jacobian; its entries in order, the loops' lists with their places."""
+        lengths = [len(loop) * (loop.width + len(nodes)) for loop, nodes in self.loops.items()]
+        if self.too_large or max(lengths, default=0) > LARGEST:
+            return None
         size = self.size
-        flat = [np.array([row * size + column for row, column in self.plain], dtype=np.int64)]
-        for part in self.loops.values():
-            flat += [row.values(part.loop) * size + column.values(part.loop) for row, column in part.nodes]
-        places = np.unique(np.concatenate(flat))
+        inside = {
+            loop: [row.values(loop) * size + column.values(loop) for row, column in nodes]
+            for loop, nodes in self.loops.items()
+        }
+        plain = np.array([row * size + column for row, column in self.plain], dtype=np.int64)
+        places = np.unique(np.concatenate([plain, *(flat for each in inside.values() for flat in each)]))
         if places.size == 0:
             places = np.zeros(1, dtype=np.int64)  # a constant field: one entry, which is 0
-        loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
-        for part in self.loops.values():
-            made = self._with_places(part, places)
-            if made is None:
-                return None
-            loops.append(made)
-        if self.too_large:
-            return None
         outputs: list[tuple[Term, ...]] = [()] * places.size
-        for (row, column), nodes in self.plain.items():
-            place = int(np.searchsorted(places, row * size + column))
+        for place, nodes in zip(np.searchsorted(places, plain), self.plain.values(), strict=True):
             outputs[place] = tuple(Term(node, node.id) for node in nodes)
+        loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
+        for loop, nodes in self.loops.items():
+            columns = np.stack([np.searchsorted(places, flat) for flat in inside[loop]], axis=1)
+            longer = self.graph.loop(np.hstack([loop.rows, columns]))
+            terms: list[LoopTerm] = []
+            for i, node in enumerate(nodes.values(), start=loop.width):
+                place = tuple(int(j == i) for j in range(longer.width))
+                terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
+            loops.append((longer, tuple(terms)))
         function = Function(self.graph, tuple(outputs), tuple(loops))
         return Jacobian(name, function, places // size, places % size, size)
-
-    def _with_places(self, part: _InLoop, places: Integers) -> tuple[Loop, tuple[LoopTerm, ...]] | None:
-        loop, size = part.loop, self.size
-        width = loop.width
-        if len(loop) * (width + len(part.nodes)) > LARGEST:
-            return None
-        columns = [
-            np.searchsorted(places, row.values(loop) * size + column.values(loop))
-            for row, column in part.nodes
-        ]
-        longer = self.graph.loop(np.hstack([loop.rows, np.stack(columns, axis=1)]))
-        terms: list[LoopTerm] = []
-        for i, node in enumerate(part.nodes.values()):
-            place = tuple(int(j == width + i) for j in range(longer.width))
-            terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
-        return longer, tuple(terms)
 
 
 def _constant(loop: Loop, place: int) -> Affine:
@@ -223,14 +208,6 @@ def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) 
             args = tuple(done[arg.id] if arg.id in done else leaf(arg) for arg in node.args)
             done[node.id] = graph.apply(node, args)
     return done[root.id] if root.id in done else leaf(root)
-
-
-def _brought_back(node: Node, outside: dict[int, Node]) -> Node:
-    return outside[node.data[1].offset - _CAPTURED] if _is_stand_in(node) else node
-
-
-def _is_stand_in(node: Node) -> bool:
-    return node.op == "symbol" and node.data[0] == "captured"
 
 
 def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:

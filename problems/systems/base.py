@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
-from problems.calculus.function import Function, plain, stacked
+from problems.calculus.function import Function, function_of, stacked
 from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
 from problems.errors import InputError, shown, unknown
 from problems.trace import arguments
-from problems.trace.graph import Graph, Node
+from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
 
@@ -79,6 +79,8 @@ class System:
             raise InputError(f"name={shown(name)} of a system must be a text.")
         for what, given in (("parameters", parameters), ("invariants", invariants), ("guards", guards)):
             check_names(what, given)
+        if self.kind != "vector_field" and "energy" in invariants:
+            raise InputError("the invariant 'energy' is H itself; give the others only.")
         self.dim = dim
         self.dof = dof
         self.name = name
@@ -101,22 +103,30 @@ class System:
         self.invariant_names: tuple[str, ...] = tuple(invariants)
         self.guard_names: tuple[str, ...] = tuple(guards)
 
+    def _set_energy(self, energy: Node) -> None:
+        self._functions["hamiltonian"] = function_of(self._graph, [energy])
+        if not energy.flags & T:  # with explicit time it is not kept
+            self._functions["invariant:energy"] = self._functions["hamiltonian"]
+            self.invariant_names = ("energy", *self.invariant_names)
+
     def _trace_declared(
         self, invariants: Mapping[str, Callable[..., Any]], guards: Mapping[str, Callable[..., Any]]
     ) -> None:
         for key, function in invariants.items():
             what = f"invariant {key!r}"
             value = self._call(function, what)
-            if isinstance(value, list | tuple | arguments.Vector):
-                self._vectors.add(f"invariant:{key}")
+            if arguments.is_list(value):
+                self._vectors.add(key)
             else:
                 value = [value]
             nodes = [self._node(v, function, what) for v in value]
             if not nodes:
                 raise InputError(f"{what} returns an empty list; return a number or a list of numbers.")
-            self._functions[f"invariant:{key}"] = plain(self._graph, nodes)
+            self._functions[f"invariant:{key}"] = function_of(self._graph, nodes)
         for key, function in guards.items():
-            self._functions[f"guard:{key}"] = plain(self._graph, [self._scalar(function, f"guard {key!r}")])
+            self._functions[f"guard:{key}"] = function_of(
+                self._graph, [self._scalar(function, f"guard {key!r}")]
+            )
 
     def _call(self, function: Callable[..., Any], what: str) -> Any:
         return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, what=what)
@@ -144,7 +154,7 @@ class System:
         """
         graph = Graph(self.dof)
         value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
-        return plain(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
+        return function_of(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
 
     @property
     def separable(self) -> bool:
@@ -233,9 +243,9 @@ class System:
             self._jacobians[what] = jacobian(self.function(what), name) if self.traced else None
         return self._jacobians[what]
 
-    def is_vector(self, what: str) -> bool:
-        """Whether the invariant ``what`` is a vector."""
-        return what in self._vectors
+    def is_vector(self, invariant: str) -> bool:
+        """Whether an invariant is a list of numbers."""
+        return invariant in self._vectors
 
     def pack(self, values: Mapping[str, Value] = MappingProxyType({})) -> NDArray[np.float64]:
         """Return the flat parameter vector, defaults filled in.

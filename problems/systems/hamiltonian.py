@@ -5,12 +5,12 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus.function import Function, LoopTerm, Term, joined, plain, stacked
+from problems.calculus.function import Function, LoopTerm, Term, function_of, joined, stacked
 from problems.calculus.gradient import gradient
 from problems.calls import checked
 from problems.errors import InputError, shown, unknown
-from problems.systems.base import Bodies, System, Value, check_count, check_names, name_of
-from problems.trace.graph import PAR, Loop, Node, P, T
+from problems.systems.base import Bodies, System, Value, check_count, name_of
+from problems.trace.graph import PAR, Loop, Node, P
 
 
 class Hamiltonian(System):
@@ -60,8 +60,6 @@ class Hamiltonian(System):
         name: str | None = None,
     ) -> None:
         dof = check_count("dof", dof)
-        if "energy" in check_names("invariants", invariants):
-            raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=2 * dof,
             dof=dof,
@@ -74,13 +72,10 @@ class Hamiltonian(System):
             bodies = _checked_bodies(bodies, self.parameters)
         self.bodies = bodies
         self._energy = self._scalar(H, "H")
-        self._functions["hamiltonian"] = plain(self._graph, [self._energy])
-        if not self._energy.flags & T:  # with explicit time the energy is not kept
-            self._functions["invariant:energy"] = self._functions["hamiltonian"]
-            self.invariant_names = ("energy", *self.invariant_names)
+        self._set_energy(self._energy)
         self._trace_declared(invariants, guards)
         if domain is not None:
-            self._functions["domain"] = plain(self._graph, [self._scalar(domain, "domain")])
+            self._functions["domain"] = function_of(self._graph, [self._scalar(domain, "domain")])
 
     def __repr__(self) -> str:
         return f"Hamiltonian({self.name}, dof={self.dof})"

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus.function import plain
+from problems.calculus.function import function_of
 from problems.calculus.gradient import gradient
 from problems.calls import checked
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, check_names, name_of
+from problems.systems.base import System, Value, check_count, name_of
 from problems.trace import arguments
-from problems.trace.graph import Node, T
+from problems.trace.graph import Node
 from problems.trace.source_line import line_of_function
 
 
@@ -65,8 +65,6 @@ class Poisson(System):
         name: str | None = None,
     ) -> None:
         dim = check_count("dim", dim)
-        if "energy" in check_names("invariants", invariants):
-            raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=dim,
             dof=None,
@@ -76,15 +74,12 @@ class Poisson(System):
             name=name or name_of(H),
         )
         energy = self._scalar(H, "H")
-        self._functions["hamiltonian"] = plain(self._graph, [energy])
-        if not energy.flags & T:
-            self._functions["invariant:energy"] = self._functions["hamiltonian"]
-            self.invariant_names = ("energy", *self.invariant_names)
+        self._set_energy(energy)
         slope = self._gradient(energy, H)
         matrix = self._matrix(B)
-        self._functions["gradient"] = plain(self._graph, slope)
-        self._functions["structure"] = plain(self._graph, [b for row in matrix for b in row])
-        self._functions["field"] = plain(self._graph, [_product(row, slope) for row in matrix])
+        self._functions["gradient"] = function_of(self._graph, slope)
+        self._functions["structure"] = function_of(self._graph, [b for row in matrix for b in row])
+        self._functions["field"] = function_of(self._graph, [_product(row, slope) for row in matrix])
         self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:
@@ -108,11 +103,10 @@ class Poisson(System):
     def _matrix(self, B: Callable[..., Any]) -> list[list[Node]]:
         rows = self._call(B, "B")
         line = line_of_function(B)
-        listed = list | tuple | arguments.Vector
         if (
-            not isinstance(rows, listed)
+            not arguments.is_list(rows)
             or len(rows) != self.dim
-            or not all(isinstance(row, listed) and len(row) == self.dim for row in rows)
+            or not all(arguments.is_list(row) and len(row) == self.dim for row in rows)
         ):
             raise InputError(f"{line}: B must return {self.dim} lists of {self.dim} entries.")
         matrix = [

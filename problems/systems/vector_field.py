@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus.function import plain
+from problems.calculus.function import function_of
 from problems.calls import checked
 from problems.errors import InputError
 from problems.systems.base import System, Value, check_count, name_of
@@ -48,14 +48,14 @@ class VectorField(System):
             name=name or name_of(f),
         )
         value = self._call(f, "f")
-        if not isinstance(value, list | tuple | arguments.Vector) or len(value) != dim:
+        if not arguments.is_list(value) or len(value) != dim:
             got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"
             raise InputError(
                 f"{line_of_function(f)}: f returns {got}, not a list of dim={dim}; "
                 "return one derivative for each component of y."
             )
         nodes = [self._node(v, f, f"f's component {i}") for i, v in enumerate(value)]
-        self._functions["field"] = plain(self._graph, nodes)
+        self._functions["field"] = function_of(self._graph, nodes)
         self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:

@@ -97,6 +97,11 @@ class Vector:
     __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
 
 
+def is_list(value: Any) -> bool:
+    """Whether a function returned several numbers."""
+    return isinstance(value, list | tuple | Vector)
+
+
 class Parameters:
     """The parameters as attributes: scalars are symbols, sequences are vectors of symbols."""
 
@@ -251,7 +256,7 @@ def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str)
     """Return what a function returned as one node, or raise when it is not one number."""
     if value is None:
         wrong = "nothing; end it with a return statement"
-    elif isinstance(value, list | tuple | Vector | dict) or getattr(value, "shape", ()) != ():
+    elif is_list(value) or isinstance(value, dict) or getattr(value, "shape", ()) != ():
         wrong = f"{len(value)} values, not one number; return one scalar, such as the sum of its terms"
     else:
         try:
