@@ -153,7 +153,12 @@ class Mathematics:
         if name not in _PUBLIC:
             known = [f"m.{function}" for function in (*_PUBLIC, "sum", "pi")]
             refuse(str(unknown("function", f"m.{name}", known)).rstrip("."), "write it with these functions")
-        return lambda x: self._graph.call(name, self._graph.node(x))
+
+        def function(x: Any) -> Node:
+            return self._graph.call(name, self._graph.node(x))
+
+        function.__qualname__ = f"m.{name}"  # as Python's messages call it
+        return function
 
 
 _PUBLIC = tuple(name for name in FUNCTIONS if name != "sign")

@@ -114,14 +114,12 @@ def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
     except TypeError:
         refuse(f"the index of m.sum is {shown(index)}", "give a range or a list of integers")
     limits.check(f"{users_line()}: this", "TERMS", len(listed))
+    if not listed:
+        return np.zeros((0, 1), dtype=np.int64)
     try:
         rows = np.array([row if isinstance(row, tuple | list) else (row,) for row in listed])
     except (TypeError, ValueError):
         rows = np.array(None)
-    if len(rows.shape) == 2 and rows.shape[0] == 0:
-        return rows.astype(np.int64)
-    if rows.shape == (0,):
-        return np.zeros((0, 1), dtype=np.int64)
     if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
         refuse(
             "the index of m.sum is not a list of integers or of equally long tuples of integers",
