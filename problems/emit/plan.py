@@ -5,6 +5,7 @@ become products; statements are ordered so that one pair of bodies is finished
 before the next begins. The order of additions is the same in all cases.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -72,7 +73,7 @@ class Plan:
         Outputs that the loops add to, so that they start from (negative) zero.
     scatters : list of Scatter
         The loops that add onto outputs.
-    uses : dict
+    uses : Counter
         How often each node is used; one used once is printed in place.
     spare : dict
         For each declared sum, an output that is not yet in use when the sum is computed.
@@ -83,7 +84,7 @@ class Plan:
     zeros: list[int] = field(default_factory=list)
     scatters: list[Scatter] = field(default_factory=list)
     last: list[Let | Reduce | Store] = field(default_factory=list)
-    uses: dict[int, int] = field(default_factory=dict)
+    uses: Counter[int] = field(default_factory=Counter)
     spare: dict[int, int] = field(default_factory=dict)
 
 
@@ -94,10 +95,9 @@ class _Expansion:
         self.graph = graph
         self.limit = limit
         self.done: dict[int, Node] = {}
-        self._uses: dict[int, int] = {}
         nodes = reachable(roots)
-        for arg in [arg for node in nodes for arg in node.args] + list(roots):
-            self._uses[arg.id] = self._uses.get(arg.id, 0) + 1
+        self._uses = Counter(root.id for root in roots)
+        self._uses.update(arg.id for node in nodes for arg in node.args)
         for node in nodes:
             if node.loop is None:
                 self.done[node.id] = self._sum(node) if node.op == "sum" else self._apply(node, self.done)
@@ -259,20 +259,19 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
     uses = plan.uses
     for statement in plan.first + plan.last:
         if isinstance(statement, Let):
-            for arg in statement.node.args:
-                uses[arg.id] = uses.get(arg.id, 0) + 1
+            uses.update(arg.id for arg in statement.node.args)
         elif isinstance(statement, Store):
-            uses[statement.node.id] = uses.get(statement.node.id, 0) + 1
+            uses[statement.node.id] += 1
         else:
             _count_body(uses, statement.body, [statement.node.args[0]])
     for scatter in plan.scatters:
         _count_body(uses, scatter.body, [entry.node for entry in scatter.entries])
 
 
-def _count_body(uses: dict[int, int], body: Sequence[Node], roots: Sequence[Node]) -> None:
+def _count_body(uses: Counter[int], body: Sequence[Node], roots: Sequence[Node]) -> None:
     for arg in [arg for node in body for arg in node.args] + list(roots):
         # What a loop takes from outside is computed once, before the loop.
-        uses[arg.id] = uses.get(arg.id, 0) + (1 if arg.loop is not None else 2)
+        uses[arg.id] += 1 if arg.loop is not None else 2
 
 
 def _demanded(root: Node, done: set[int]) -> list[Node]:

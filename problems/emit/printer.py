@@ -89,7 +89,7 @@ class Printer:
                 self.assign(node, f"{space}[{index(place)}]")
         elif node.op != "const":
             text, level = self._operation(node)
-            if self.plan.uses.get(node.id, 0) == 1 and len(text) < _LONGEST:
+            if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
                 self._pending[node.id] = (text, level)
             else:
                 self.assign(node, text)
