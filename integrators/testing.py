@@ -23,7 +23,7 @@ from integrators import registry
 from integrators.exercises import blow_up, pendulum, two_bodies
 from integrators.integrate import integrate
 from integrators.protocol import SAMPLINGS, MethodBase, Program, Samples, Stats, Status, Stepper
-from problems import Problem
+from problems import Problem, emit
 from problems.errors import InputError, UnknownNameError
 
 Check = Callable[[MethodBase, Problem], str | None]
@@ -223,7 +223,8 @@ def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | Non
                 others[f"that of {changed!r}"] = _start(changed, problem).checkpoint()
                 break
     for other in (pendulum(), two_bodies(), blow_up()):
-        if other.system.fingerprint != problem.system.fingerprint and method.accepts(other) is None:
+        same = emit.fingerprint(other.system) == emit.fingerprint(problem.system)
+        if not same and method.accepts(other) is None:
             others[f"that of {other.system.name}"] = _start(method, other).checkpoint()
     if problem.par.size:
         twice = method.compile(problem.system).start(problem.y0, problem.par * 2.0, problem.t0)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from problems import emit
 from problems.analysis import invariants
 from problems.calls import checked
 from problems.errors import InputError, shown
-from problems.systems.base import check_names
-from problems.systems.hamiltonian import System, Value
+from problems.systems.base import System, Value, check_names
 
 Array = NDArray[np.float64]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -138,7 +138,7 @@ class Problem:
     def _identity(self) -> tuple[Any, ...]:
         return (
             repr(self),
-            self.system.fingerprint,
+            emit.fingerprint(self.system),
             self.y0.tobytes(),
             self.par.tobytes(),
             self.t0,
@@ -167,7 +167,7 @@ class Problem:
         dict of str to ndarray
             Shape (n,), or (n, k) for a vector; the energy first.
         """
-        return invariants.invariants(self, y, t)
+        return invariants.invariants(self.system, self.par, y, t)
 
     def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return how far each invariant is from its value at the start, relative to its size there.
@@ -185,15 +185,15 @@ class Problem:
         -------
         dict of str to ndarray, shape (n,)
         """
-        return invariants.errors(self, y, t)
+        return invariants.errors(self.system, self.par, y, t, start=(self.t0, self.y0))
 
     def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
-        return invariants.guards(self, y, t)
+        return invariants.guards(self.system, self.par, y, t)
 
     def velocity(self, y: ArrayLike) -> Array | None:
         """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
-        return invariants.velocity(self, y)
+        return invariants.velocity(self.system, self.par, y)
 
 
 def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:

@@ -25,6 +25,7 @@ from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
 from integrators.kernel import store as kept
 from integrators.protocol import MethodBase
+from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -123,7 +124,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
     grid = case.grid.times(problem)
     return {
         "problem": case.problem,
-        "field": problem.system.fingerprint,
+        "field": emit.fingerprint(problem.system),
         "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
         "parameters": [value.hex() for value in problem.par.tolist()],
         "method": type(method).__name__,

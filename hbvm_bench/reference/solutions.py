@@ -146,7 +146,7 @@ def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
             "method": f"heyoka taylor_adaptive, fp_type=real128, tol={TOLERANCE}, high_accuracy=True",
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
-            "field": problem.system.fingerprint,
+            "field": emit.fingerprint(problem.system),
             "check": f"largest difference of any component from tol={CHECK_TOLERANCE}: {difference:.1e}",
         },
         t=hexadecimal(times),

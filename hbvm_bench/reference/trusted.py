@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.reference import collocation, solutions
 from hbvm_bench.reference.solutions import ReferenceFile
+from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -149,7 +150,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             ),
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
-            "field": problem.system.fingerprint,
+            "field": emit.fingerprint(problem.system),
         },
         t=solutions.hexadecimal(opinions.times[:kept]),
         y=[[_text(problem, value) for value in row] for row in opinions.states[:kept]],

@@ -128,7 +128,7 @@ class Radau(_SciPyMethod):
 
     Notes
     -----
-    The Jacobian is the traced system's own (`problems.calculus.jacobian`), as our implicit methods have
+    The Jacobian is the traced system's own (`problems.System.jacobian`), as our implicit methods have
     it; SciPy's finite differences where there is none. It is L-stable, so it damps oscillations:
     no method for conserving energy.
     """
@@ -150,16 +150,15 @@ class SciPyProgram(PeerProgram):
         super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
         from problems import emit
-        from problems.calculus.jacobian import jacobian
 
         started = perf_counter()
         self.method, self.solver = method, getattr(integrate, method.solver)
         self.field = emit.numba(system, "field")
         # The first call compiles for these types.
         self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
-        self.jacobian = jacobian(system) if method.solver == "Radau" else None
+        self.jacobian = system.jacobian() if method.solver == "Radau" else None
         if self.jacobian is not None:
-            self.entries = emit.numba(system, "jacobian")
+            self.entries = emit.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
         self.from_cache = None
         self.compile_seconds = perf_counter() - started

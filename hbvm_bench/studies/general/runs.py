@@ -21,7 +21,8 @@ from hbvm_bench.campaign.identity import make_method
 from integrators.protocol import Status, Stepper
 from problems.errors import InputError, unknown
 from problems.problem import Problem
-from problems.systems.hamiltonian import Hamiltonian, VectorField
+from problems.systems.hamiltonian import Hamiltonian
+from problems.systems.vector_field import VectorField
 
 Array = NDArray[np.float64]
 

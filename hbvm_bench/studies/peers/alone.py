@@ -14,7 +14,6 @@ import numpy as np
 from integrators.peers.options import load
 from integrators.protocol import Array, MethodBase
 from problems import emit
-from problems.calculus.jacobian import jacobian
 from problems.problem import Problem
 
 
@@ -207,8 +206,8 @@ def scipy(problem: Problem, method: Any) -> Script:
         return out
 
     known = {}
-    if type(method).__name__ == "Radau" and (pattern := jacobian(problem.system)) is not None:
-        entries = emit.numba(problem.system, "jacobian")
+    if type(method).__name__ == "Radau" and (pattern := problem.system.jacobian()) is not None:
+        entries = emit.numba(problem.system, pattern)
 
         def jac(t: float, y: Array) -> Array:
             matrix, values = np.zeros((y.size, y.size)), np.empty(pattern.rows.size)

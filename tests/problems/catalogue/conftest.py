@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from problems import Problem
-from problems.calculus.gradient import reachable
+from problems.trace.graph import reachable
 
 # Every problem of the catalogue, the large families small enough to be compiled by every engine.
 SMALL = {

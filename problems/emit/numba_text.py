@@ -4,75 +4,46 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.calculus.gradient import LoopTerm
+from problems.calculus.function import LoopTerm
 from problems.emit.loops import Nest, Range, Table, nest, ranges
-from problems.emit.plan import Let, Plan, Reduce, Scatter, Store
-from problems.emit.text import Printer
-from problems.trace.graph import Node
-from problems.trace.sums import Affine, Loop
+from problems.emit.plan import Plan, Scatter
+from problems.emit.printer import Printer
+from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
 
-FUNCTIONS = {
-    "sqrt": "sqrt",
-    "sin": "sin",
-    "cos": "cos",
-    "tan": "tan",
-    "exp": "exp",
-    "log": "log",
-    "abs": "fabs",
-    "sign": "copysign(1.0, {})",
-}
-PREFIX = {"y": "y", "par": "c", "out": "a"}
+_FUNCTIONS = {name: name for name in FUNCTIONS} | {"abs": "fabs", "sign": "copysign(1.0, {})"}
 
 
-class _Writer:
-    def __init__(self, plan: Plan) -> None:
-        self.plan = plan
-        self.printer = Printer(plan.uses, FUNCTIONS)
-        self.tables: dict[int, tuple[str, str]] = {}
-
+class _NumbaPrinter(Printer):
     def write(self) -> None:
-        self._statements(self.plan.first)
+        self.statements(self.plan.first)
         for places in _runs(self.plan.zeros):
             # -0.0 is what leaves the first summand as it is, its sign included.
             if len(places) <= 3:
                 for place in places:
-                    self.printer.line(f"out[{place}] = -0.0")
+                    self.line(f"out[{place}] = -0.0")
             else:
-                self.printer.line(f"for k in {places}:")
-                self.printer.line("    out[k] = -0.0")
+                self.line(f"for k in {places}:")
+                self.line("    out[k] = -0.0")
         for scatter in self.plan.scatters:
             self._loop(scatter.loop, scatter.body, scatter)
-        self._statements(self.plan.last)
+        self.statements(self.plan.last)
 
-    def _statements(self, statements: list[Let | Reduce | Store]) -> None:
-        for statement in statements:
-            match statement:
-                case Let(node):
-                    self._let(node)
-                case Store(place, node):
-                    self.printer.line(f"out[{place}] = {self.printer.text(node)}")
-                case Reduce(node, loop, body):
-                    # By way of an output not yet in use: the sum is a lane where outputs are lanes.
-                    spare = self.plan.spare[node.id]
-                    self.printer.line(f"out[{spare}] = -0.0")
-                    self.printer.assign(node, f"out[{spare}]")
-                    self._loop(loop, body, node)
+    def store(self, place: int, value: str) -> None:
+        self.line(f"out[{place}] = {value}")
 
-    def _let(self, node: Node, header: Range | Nest | Table | None = None) -> None:
-        if node.op == "symbol":
-            space, place = node.data
-            if space == "t":
-                self.printer.names[node.id] = "t"
-            elif isinstance(place, int):
-                self.printer.assign(node, f"{space}[{place}]", f"{PREFIX[space]}{place}")
-            else:
-                assert header is not None
-                self.printer.assign(node, f"{space}[{header.index(place)}]")
-        elif node.op == "index":
-            assert header is not None
-            self.printer.assign(node, f"float({header.index(node.data)})")
+    def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
+        # By way of an output not yet in use: the sum is a lane where outputs are lanes.
+        spare = self.plan.spare[node.id]
+        self.line(f"out[{spare}] = -0.0")
+        self.assign(node, f"out[{spare}]")
+        self._loop(loop, body, node)
+
+    def _inside(self, node: Node, header: Range | Nest | Table) -> None:
+        """Print a value inside a loop."""
+        if node.op == "index":
+            self.assign(node, f"float({header.index(node.data)})")
         else:
-            self.printer.let(node)
+            self.let(node, header.index)
 
     def _loop(self, loop: Loop, body: Sequence[Node], target: Scatter | Node) -> None:
         """Print a loop that adds to the outputs of a scatter, or to a declared sum."""
@@ -82,26 +53,25 @@ class _Writer:
             return
         pieces = ranges(loop)
         if pieces is None:
-            name, text = f"TABLE_{len(self.tables)}", f"np.array({loop.rows.tolist()}, dtype=np.int64)"
-            name, _ = self.tables.setdefault(loop.id, (name, text))
+            name = self.table(f"np.array({loop.rows.tolist()}, dtype=np.int64)")
             self._simple(Table(name, len(loop), loop.width), body, target)
         else:
             for piece in pieces:
                 self._simple(piece, body, target)
 
     def _simple(self, header: Range | Table, body: Sequence[Node], target: Scatter | Node) -> None:
-        printer, outside = self.printer, self.printer.indent
+        outside = self.indent
         carried: dict[int, int] = {}
         if isinstance(header, Range) and isinstance(target, Scatter) and header.n > 1:
             carried = _carried(header, target)
             for i in carried:
-                printer.line(f"a{i} = out[{header.along(target.entries[i].index).offset}]")
+                self.line(f"a{i} = out[{header.along(target.entries[i].index).offset}]")
         opening = header.opening()
         for line in opening:
-            printer.line(line)
-        printer.indent = outside + "    " * bool(opening)
+            self.line(line)
+        self.indent = outside + "    " * bool(opening)
         for node in body:
-            self._let(node, header)
+            self._inside(node, header)
         if isinstance(target, Node):
             self._add_to_sum(target)
         else:
@@ -115,36 +85,36 @@ class _Writer:
                 elif i in later:
                     self._add(f"a{later[i]}", place, entry)
                 elif target.unique[i]:
-                    printer.line(f"{place} = {printer.text(entry.node)}")
+                    self.line(f"{place} = {self.text(entry.node)}")
                 else:
                     self._add(place, place, entry)
-        printer.indent = outside
+        self.indent = outside
         if isinstance(header, Range) and isinstance(target, Scatter):
             for first, second in carried.items():
                 along = header.along(target.entries[second].index)
                 last = along.offset + along.coefficients[0] * (header.n - 1)
-                printer.line(f"out[{last}] = a{first}")
+                self.line(f"out[{last}] = a{first}")
 
     def _nested(self, header: Nest, body: Sequence[Node], target: Scatter | Node) -> None:
         """Print two nested loops; what depends on i alone stays out of the inner one, sums too."""
-        printer, outside = self.printer, self.printer.indent
+        outside = self.indent
         outer = _outer(body)
         held = _held(target) if isinstance(target, Scatter) else []
-        printer.line(f"for i in {header.outer}:")
-        printer.indent = outside + "    "
+        self.line(f"for i in {header.outer}:")
+        self.indent = outside + "    "
         for node in body:
             if node.id in outer:
-                self._let(node, header)
-                if printer.waiting(node):  # for the inner loop
-                    printer.assign(node, printer.text(node))
+                self._inside(node, header)
+                if self.waiting(node):  # for the inner loop
+                    self.assign(node, self.text(node))
         entries = target.entries if isinstance(target, Scatter) else ()
         for i in held:
-            printer.line(f"a{i} = out[{header.index(entries[i].index)}]")
-        printer.line(f"for j in {header.inner}:")
-        printer.indent = outside + "        "
+            self.line(f"a{i} = out[{header.index(entries[i].index)}]")
+        self.line(f"for j in {header.inner}:")
+        self.indent = outside + "        "
         for node in body:
             if node.id not in outer:
-                self._let(node, header)
+                self._inside(node, header)
         if isinstance(target, Node):
             self._add_to_sum(target)
         else:
@@ -153,24 +123,24 @@ class _Writer:
                 if i in held:
                     self._add(f"a{i}", f"a{i}", entry)
                 elif target.unique[i]:
-                    printer.line(f"{place} = {printer.text(entry.node)}")
+                    self.line(f"{place} = {self.text(entry.node)}")
                 else:
                     self._add(place, place, entry)
-        printer.indent = outside + "    "
+        self.indent = outside + "    "
         for i in held:
-            printer.line(f"out[{header.index(entries[i].index)}] = a{i}")
-        printer.indent = outside
+            self.line(f"out[{header.index(entries[i].index)}] = a{i}")
+        self.indent = outside
 
     def _add_to_sum(self, node: Node) -> None:
-        total = self.printer.names[node.id]
-        self.printer.line(f"{total} = {total} + {self.printer.text(node.args[0], 2)}")
+        total = self.names[node.id]
+        self.line(f"{total} = {total} + {self.text(node.args[0], 2)}")
 
     def _add(self, to: str, before: str, entry: LoopTerm) -> None:
         node = entry.node
-        if node.op == "neg" and self.printer.waiting(node):
-            self.printer.line(f"{to} = {before} - {self.printer.text(node).removeprefix('-')}")
+        if node.op == "neg" and self.waiting(node):
+            self.line(f"{to} = {before} - {self.text(node).removeprefix('-')}")
         else:
-            self.printer.line(f"{to} = {before} + {self.printer.text(node, 2)}")
+            self.line(f"{to} = {before} + {self.text(node, 2)}")
 
 
 def _outer(body: Sequence[Node]) -> set[int]:
@@ -236,7 +206,6 @@ def _runs(places: list[int]) -> list[range]:
 
 def numba_text(plan: Plan, name: str) -> str:
     """Return ``def name(t, y, par, out)`` on scalars, preceded by its index tables if it has any."""
-    writer = _Writer(plan)
-    writer.write()
-    head = "".join(f"{table} = {text}\n" for table, text in writer.tables.values())
-    return head + f"def {name}(t, y, par, out):\n" + "\n".join(writer.printer.lines) + "\n"
+    printer = _NumbaPrinter(plan, _FUNCTIONS)
+    printer.write()
+    return printer.finished(f"{name}(t, y, par, out)")
