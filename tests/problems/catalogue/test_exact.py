@@ -11,7 +11,7 @@ import integrators
 import problems
 from problems import emit
 from problems.catalogue import _given as given
-from problems.catalogue import kepler, molecules, pendulum, period_annulus, solar_system, three_bodies
+from problems.catalogue import figure_eight, kepler, morse, pendulum, period_annulus, solar_system
 from problems.catalogue.henon_heiles import SADDLES, beyond_triangle, inside_triangle
 from problems.errors import InputError
 
@@ -51,12 +51,12 @@ def test_the_morse_oscillators_exact_solution_solves_the_equation(arguments):
         w = mpmath.exp(-a * y[0])
         return [y[1] / m, -2 * depth * a * (1 - w) * w]
 
-    _satisfies(problem, molecules.exact_state, slope)
+    _satisfies(problem, morse.exact_state, slope)
 
 
 def test_no_exact_solution_is_claimed_where_there_is_none():
     with pytest.raises(InputError, match="not bound"):
-        molecules.exact_state(problems.load("morse", p=2.0), 1.0)
+        morse.exact_state(problems.load("morse", p=2.0), 1.0)
     with pytest.raises(InputError, match="no simple exact solution"):
         pendulum.exact_state(problems.load("pendulum", p=2.5), 1.0)
     fast = problems.Problem(problems.load("kepler").system, q0=[1.0, 0.0], p0=[0.0, 2.0], t_end=1.0)
@@ -149,7 +149,7 @@ def _line(node):
 
 def test_the_figure_eight_and_arenstorfs_orbits_close():
     cases = [
-        (problems.load("figure_eight", t_end=three_bodies.EIGHT_PERIOD), 0.02, 1e-13),  # measured 3e-14
+        (problems.load("figure_eight", t_end=figure_eight.PERIOD), 0.02, 1e-13),  # measured 3e-14
         (problems.load("cr3bp", loops=2), 0.002, 1e-12),  # measured 2e-13
         (problems.load("cr3bp", loops=3), 0.0002, 1e-6),  # unstable: measured 2e-8
         (problems.load("cr3bp", loops=4), 0.0002, 1e-6),  # unstable: measured 3e-8

@@ -10,7 +10,7 @@ import problems
 from hbvm_bench import collocation, reference, trusted
 from hbvm_bench.identity import make_problem
 from problems.calculus.gradient import reachable
-from problems.catalogue import kepler, molecules, pendulum
+from problems.catalogue import kepler, morse, pendulum
 from problems.errors import InputError
 
 STORED = sorted(path.stem for path in reference.folder().glob("*.json"))
@@ -126,7 +126,7 @@ def test_every_problem_of_the_catalogue_has_a_reference():
         ("kepler", kepler.exact_state),
         ("kepler_eccentric", kepler.exact_state),
         ("pendulum", pendulum.exact_state),
-        ("morse", molecules.exact_state),
+        ("morse", morse.exact_state),
     ],
 )
 def test_references_are_the_exact_solutions_where_there_are_any(stem, exact):

@@ -1,4 +1,4 @@
-"""Diatomic molecules: the Morse oscillator, with its exact solution, and a molecule that turns.
+"""The Morse oscillator, with its exact solution.
 
     H(q, p) = p^2/(2 m) + D (1 - exp(-a q))^2
 
@@ -16,25 +16,11 @@ from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 _DEFAULT = {"D": 1.0, "a": 1.0, "m": 1.0}
-_REFERENCE = (
-    "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
-    "Physical Review 34 (1929) 57-64"
-)
 
 
-def _morse_energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     w = 1 - m.exp(-par.a * q[0])
     return p[0] * p[0] / (2 * par.m) + par.D * (w * w)
-
-
-def _diatomic_energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-    r = m.sqrt(q[0] * q[0] + q[1] * q[1])
-    w = 1 - m.exp(-par.a * (r - par.r0))
-    return (p[0] * p[0] + p[1] * p[1]) / (2 * par.m) + par.D * (w * w)
-
-
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
 
 
 def morse(
@@ -68,7 +54,7 @@ def morse(
     given.positive("morse", D=D, a=a, m=m)
     values = {"D": D, "a": a, "m": m}
     return Problem(
-        Hamiltonian(_morse_energy, dof=1, parameters=_DEFAULT, name="morse"),
+        Hamiltonian(_energy, dof=1, parameters=_DEFAULT, name="morse"),
         q0=[q],
         p0=[p],
         parameters=values,
@@ -76,7 +62,10 @@ def morse(
         name="morse",
         title="the Morse oscillator",
         arguments={"q": q, "p": p} | changed(morse, **values, t_end=t_end),
-        references=(_REFERENCE,),
+        references=(
+            "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
+            "Physical Review 34 (1929) 57-64",
+        ),
         notes="Separable, not polynomial; an exact solution for bound motion.",
     )
 
@@ -109,50 +98,3 @@ def exact_state(problem: Problem, t: Any) -> list[Any]:
     c, s = mpmath.cos(angle), mpmath.sin(angle)
     now = middle + x * c + y * s
     return [mpmath.log(now) / a, mass * frequency * (y * c - x * s) / (a * now)]
-
-
-def diatomic(*, r: float = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: float = 200.0) -> Problem:
-    """Return a diatomic molecule that vibrates and turns in the plane, with a Morse bond of length 1.
-
-    Tests a central force that is neither Kepler's nor a spring's: the orbit is a rosette.
-
-    Parameters
-    ----------
-    r : float
-        Distance of the atoms at the start, positive.
-    vr, vt : float
-        Velocity along and across the bond at the start.
-    t_end : float
-        End of the integration.
-
-    Returns
-    -------
-    Problem
-        State ``[q1, q2, p1, p2]`` of the relative motion; parameters ``D = 4``, ``a = 2``,
-        ``r0 = 1``, ``m = 1``; invariants: energy, angular momentum.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
-    """
-    given.finite("diatomic", vr=vr, vt=vt, t_end=t_end)
-    given.positive("diatomic", r=r)
-    system = Hamiltonian(
-        _diatomic_energy,
-        dof=2,
-        parameters={"D": 4.0, "a": 2.0, "r0": 1.0, "m": 1.0},
-        invariants={"angular_momentum": _turn},
-        name="diatomic",
-    )
-    return Problem(
-        system,
-        q0=[r, 0.0],
-        p0=[vr, vt],
-        t_end=t_end,
-        name="diatomic",
-        title="a diatomic molecule",
-        arguments=changed(diatomic, r=r, vr=vr, vt=vt, t_end=t_end),
-        references=(_REFERENCE,),
-        notes="A central force whose orbits do not close.",
-    )

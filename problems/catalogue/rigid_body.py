@@ -1,0 +1,86 @@
+"""The free rigid body in body axes, a Poisson system.
+
+E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
+(Springer 2006), section VII.5.
+"""
+
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.problem import Problem
+from problems.registry import changed
+from problems.systems.poisson import Poisson
+
+
+def _energy(y: Any, par: Any) -> Any:
+    squares = [y[i] * y[i] for i in range(3)]
+    turning = sum(squares[i] / (2 * par.inertia[i]) for i in range(3))
+    return turning + par.quartic / 4 * sum(square * square for square in squares)
+
+
+def _structure(y: Any) -> Any:
+    return [[0, -y[2], y[1]], [y[2], 0, -y[0]], [-y[1], y[0], 0]]
+
+
+def _casimir(y: Any) -> Any:
+    return (y[0] * y[0] + y[1] * y[1] + y[2] * y[2]) / 2
+
+
+def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
+    """Return the free rigid body in body axes, or one with a quartic energy.
+
+        B = [[0, -y3, y2], [y3, 0, -y1], [-y2, y1, 0]]
+        H = sum_i y_i^2/(2 I_i) + quartic/4 sum_i y_i^4
+
+    with the moments of inertia I = (2, 1, 2/3), from (cos 1.1, 0, sin 1.1). Tests a
+    Casimir beside the energy: with ``quartic=0`` both are quadratic and every Gauss
+    method keeps them; otherwise only methods that keep the energy by design do.
+
+    Parameters
+    ----------
+    quartic : float
+        Strength of the quartic energy.
+    t_end : float
+        End of the integration.
+
+    Returns
+    -------
+    Problem
+        State: angular momentum ``[y1, y2, y3]``; parameters ``inertia``, ``quartic``;
+        invariants: energy, and the Casimir |y|^2/2.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values that are not finite.
+    """
+    given.finite("rigid_body", quartic=quartic, t_end=t_end)
+    system = Poisson(
+        _energy,
+        _structure,
+        dim=3,
+        parameters={"inertia": (2.0, 1.0, 2 / 3), "quartic": 0.0},
+        invariants={"casimir": _casimir},
+        name="rigid_body",
+    )
+    return Problem(
+        system,
+        y0=[given.nearest(lambda: _start(0)), 0.0, given.nearest(lambda: _start(1))],
+        parameters={"quartic": quartic},
+        t_end=t_end,
+        name="rigid_body",
+        title="the free rigid body",
+        arguments={"quartic": quartic} | changed(rigid_body, t_end=t_end),
+        references=(
+            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+            "Springer 2006, section VII.5",
+        ),
+        notes="A Poisson system with a quadratic Casimir; a quartic energy on request.",
+    )
+
+
+def _start(component: int) -> Any:
+    import mpmath
+
+    angle = mpmath.mpf("1.1")
+    return mpmath.sin(angle) if component else mpmath.cos(angle)

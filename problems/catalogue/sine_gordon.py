@@ -1,0 +1,62 @@
+"""The sine-Gordon equation on a periodic interval, discretised in space as `_waves` says."""
+
+from typing import Any
+
+from problems.catalogue import _given as given
+from problems.catalogue import _waves as waves
+from problems.problem import Problem
+from problems.registry import changed
+
+
+def sine_gordon(*, n: int = 200, gamma: float = 1.5, length: float = 40.0, t_end: float = 100.0) -> Problem:
+    """Return the sine-Gordon equation u_tt = u_xx - sin u, discretised.
+
+    From u = 0, u_t = (4/gamma) sech(x/gamma): a breather for gamma > 1, the double pole
+    for gamma = 1, a kink and an antikink that part for gamma < 1. Tests many unknowns with
+    nearest-neighbour coupling, and stiffness as n grows.
+
+    Parameters
+    ----------
+    n : int
+        Number of points, at least 3; thousands are compiled as a loop.
+    gamma : float
+        Shape of the start, positive.
+    length : float
+        Length of the interval, -length/2 <= x < length/2.
+    t_end : float
+        End of the integration.
+
+    Returns
+    -------
+    Problem
+        State ``[u_0 .. u_{n-1}, u'_0 .. u'_{n-1}]``; parameter ``stiffness`` = 1/dx^2;
+        invariant: energy (that of the equation divided by dx).
+
+    Raises
+    ------
+    problems.errors.InputError
+        For values out of range.
+    """
+    given.whole("sine_gordon", 3, n=n)
+    given.size("sine_gordon", 2 * n, n=n)
+    given.positive("sine_gordon", gamma=gamma, length=length)
+    given.finite("sine_gordon", t_end=t_end)
+    return Problem(
+        waves.hamiltonian(n, lambda u, par, m: 1 - m.cos(u), "sine_gordon"),
+        q0=[0.0] * n,
+        p0=[given.nearest(lambda i=i: _hump(i, n, gamma, length)) for i in range(n)],
+        parameters={"stiffness": (n / length) ** 2},
+        t_end=t_end,
+        name="sine_gordon",
+        title="the sine-Gordon equation",
+        arguments={"n": n, "gamma": gamma} | changed(sine_gordon, length=length, t_end=t_end),
+        references=waves.REFERENCES,
+        notes="Many unknowns, trigonometric force; the explicit step is bounded by dx.",
+    )
+
+
+def _hump(i: int, n: int, gamma: float, length: float) -> Any:
+    import mpmath
+
+    x = mpmath.mpf(length) * (mpmath.mpf(i) / n - mpmath.mpf(1) / 2)
+    return 4 / mpmath.mpf(gamma) * mpmath.sech(x / mpmath.mpf(gamma))
