@@ -9,10 +9,11 @@ Physics of Plasmas 20 (2013) 084503.
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.catalogue import _starts as starts
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
@@ -27,6 +28,13 @@ def _turn(q: Any, p: Any) -> Any:
     return q[0] * p[1] - q[1] * p[0]
 
 
+@entry(
+    title="a charged particle in a magnetic field",
+    references=("H. Qin et al., Why is Boris algorithm so good?, Physics of Plasmas 20 (2013) 084503",),
+    notes="Not separable: momenta are not velocities. Gyration and drift.",
+    picture=Plane(span=300.0),
+    expected=Expected(h=0.2, energy=1e-15, default=7e-15),
+)
 def charged_particle(
     *,
     x: float = 0.0,
@@ -60,10 +68,9 @@ def charged_particle(
     problems.errors.InputError
         For values that are not finite, or a start in the centre.
     """
-    given.finite("charged_particle", x=x, y=y, vx=vx, vy=vy, charge=charge, t_end=t_end)
     if x == 0 and y == 0:
         raise InputError("x=0 and y=0 of charged_particle are the singular centre; start elsewhere.")
-    momentum = [given.nearest(lambda c=c: _canonical(x, y, vx, vy)[c]) for c in range(2)]
+    momentum = [starts.nearest(lambda c=c: _canonical(x, y, vx, vy)[c]) for c in range(2)]
     system = Hamiltonian(
         _energy,
         dof=2,
@@ -71,18 +78,7 @@ def charged_particle(
         invariants={"angular_momentum": _turn},
         name="charged_particle",
     )
-    return Problem(
-        system,
-        q0=[x, y],
-        p0=momentum,
-        parameters={"charge": charge},
-        t_end=t_end,
-        name="charged_particle",
-        title="a charged particle in a magnetic field",
-        arguments=changed(charged_particle, x=x, y=y, vx=vx, vy=vy, charge=charge, t_end=t_end),
-        references=("H. Qin et al., Why is Boris algorithm so good?, Physics of Plasmas 20 (2013) 084503",),
-        notes="Not separable: momenta are not velocities. Gyration and drift.",
-    )
+    return Problem(system, q0=[x, y], p0=momentum, parameters={"charge": charge}, t_end=t_end)
 
 
 def _canonical(x: float, y: float, vx: float, vy: float) -> tuple[Any, Any]:

@@ -9,9 +9,10 @@ atom with respect to the other, and m their reduced mass.
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.calls import Positive
+from problems.entry import Expected, entry
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
@@ -25,7 +26,17 @@ def _turn(q: Any, p: Any) -> Any:
     return q[0] * p[1] - q[1] * p[0]
 
 
-def diatomic(*, r: float = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: float = 200.0) -> Problem:
+@entry(
+    title="a diatomic molecule",
+    references=(
+        "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
+        "Physical Review 34 (1929) 57-64",
+    ),
+    notes="A central force whose orbits do not close.",
+    picture=Plane(span=60.0),
+    expected=Expected(h=0.2, energy=5e-15, default=9e-15),
+)
+def diatomic(*, r: Positive = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: float = 200.0) -> Problem:
     """Return a diatomic molecule that vibrates and turns in the plane, with a Morse bond of length 1.
 
     Tests a central force that is neither Kepler's nor a spring's: the orbit is a rosette.
@@ -50,8 +61,6 @@ def diatomic(*, r: float = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: float =
     problems.errors.InputError
         For values out of range.
     """
-    given.finite("diatomic", vr=vr, vt=vt, t_end=t_end)
-    given.positive("diatomic", r=r)
     system = Hamiltonian(
         _energy,
         dof=2,
@@ -59,17 +68,4 @@ def diatomic(*, r: float = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: float =
         invariants={"angular_momentum": _turn},
         name="diatomic",
     )
-    return Problem(
-        system,
-        q0=[r, 0.0],
-        p0=[vr, vt],
-        t_end=t_end,
-        name="diatomic",
-        title="a diatomic molecule",
-        arguments=changed(diatomic, r=r, vr=vr, vt=vt, t_end=t_end),
-        references=(
-            "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
-            "Physical Review 34 (1929) 57-64",
-        ),
-        notes="A central force whose orbits do not close.",
-    )
+    return Problem(system, q0=[r, 0.0], p0=[vr, vt], t_end=t_end)

@@ -5,10 +5,10 @@ problem in the case of equal masses", Annals of Mathematics 152 (2000) 881-901,
 with the start found by C. Simo.
 """
 
-from problems.catalogue import _given as given
 from problems.catalogue import _gravity as gravity
+from problems.entry import Expected, entry
+from problems.picture import Orbits
 from problems.problem import Problem
-from problems.registry import changed
 
 # The published eight digits (0.97000436, 0.24308753; 0.93240737, 0.86473146; 6.32591398) hold the
 # positions; the velocity of the third body and the period are refined to them by Newton's method.
@@ -17,6 +17,16 @@ VELOCITY = (-0.93240736813907869742, -0.86473146183495370212)
 PERIOD = 6.3259140097821386327
 
 
+@entry(
+    title="the figure eight of three bodies",
+    references=(
+        "A. Chenciner, R. Montgomery, A remarkable periodic solution of the three-body problem "
+        "in the case of equal masses, Annals of Mathematics 152 (2000) 881-901",
+    ),
+    notes="A stable periodic orbit without a dominant mass.",
+    picture=Orbits(span=PERIOD, points=600),
+    expected=Expected(h=0.05, energy=5e-16, default=2e-15),
+)
 def figure_eight(*, t_end: float | None = None) -> Problem:
     """Return three equal masses that chase each other along a figure eight; G = 1.
 
@@ -39,20 +49,10 @@ def figure_eight(*, t_end: float | None = None) -> Problem:
     problems.errors.InputError
         If ``t_end`` is not finite.
     """
-    span = 100 * PERIOD if t_end is None else t_end
-    given.finite("figure_eight", t_end=span)
     (x, y), (u, v) = POSITION, VELOCITY
     return Problem(
         gravity.hamiltonian((1.0, 1.0, 1.0), name="figure_eight", dimension=2),
         q0=[x, y, -x, -y, 0.0, 0.0],
         p0=[-u / 2, -v / 2, -u / 2, -v / 2, u, v],
-        t_end=span,
-        name="figure_eight",
-        title="the figure eight of three bodies",
-        arguments=changed(figure_eight, t_end=t_end),
-        references=(
-            "A. Chenciner, R. Montgomery, A remarkable periodic solution of the three-body problem "
-            "in the case of equal masses, Annals of Mathematics 152 (2000) 881-901",
-        ),
-        notes="A stable periodic orbit without a dominant mass.",
+        t_end=100 * PERIOD if t_end is None else t_end,
     )

@@ -6,9 +6,9 @@ BIT 51 (2011) 91-101.
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.entry import Expected, entry
+from problems.picture import Curves
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.poisson import Poisson
 
 
@@ -28,6 +28,15 @@ def _casimir(y: Any, par: Any, m: Any) -> Any:
     return par.a * par.b * m.log(y[0]) - par.b * m.log(y[1]) + m.log(y[2])
 
 
+@entry(
+    title="three species of Lotka and Volterra",
+    references=(
+        "D. Cohen, E. Hairer, Linear energy-preserving integrators for Poisson systems, BIT 51 (2011) 91-101",
+    ),
+    notes="A Poisson system: the structure matrix depends on the state. A logarithmic Casimir.",
+    picture=Curves(curves=((0, "y₁"), (1, "y₂"), (2, "y₃")), span=20.0, points=500),
+    expected=Expected(h=0.1, energy=1e-15, default=4e-15),
+)
 def lotka_volterra(*, t_end: float = 100.0) -> Problem:
     """Return three species of predators and prey.
 
@@ -53,7 +62,6 @@ def lotka_volterra(*, t_end: float = 100.0) -> Problem:
     problems.errors.InputError
         If ``t_end`` is not finite.
     """
-    given.finite("lotka_volterra", t_end=t_end)
     system = Poisson(
         _energy,
         _structure,
@@ -62,16 +70,4 @@ def lotka_volterra(*, t_end: float = 100.0) -> Problem:
         invariants={"casimir": _casimir},
         name="lotka_volterra",
     )
-    return Problem(
-        system,
-        y0=[1.0, 1.9, 0.5],
-        t_end=t_end,
-        name="lotka_volterra",
-        title="three species of Lotka and Volterra",
-        arguments=changed(lotka_volterra, t_end=t_end),
-        references=(
-            "D. Cohen, E. Hairer, Linear energy-preserving integrators for Poisson systems, "
-            "BIT 51 (2011) 91-101",
-        ),
-        notes="A Poisson system: the structure matrix depends on the state. A logarithmic Casimir.",
-    )
+    return Problem(system, y0=[1.0, 1.9, 0.5], t_end=t_end)

@@ -9,10 +9,11 @@ the atoms less its value at rest, and m their reduced mass.
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.calls import Positive
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Phase
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 _DEFAULT = {"D": 1.0, "a": 1.0, "m": 1.0}
@@ -23,8 +24,25 @@ def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     return p[0] * p[0] / (2 * par.m) + par.D * (w * w)
 
 
+@entry(
+    title="the Morse oscillator",
+    references=(
+        "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
+        "Physical Review 34 (1929) 57-64",
+    ),
+    notes="Separable, not polynomial; an exact solution for bound motion.",
+    shows=("q", "p"),
+    picture=Phase(span=8.0, points=600),
+    expected=Expected(h=0.2, energy=1e-15, default=2e-15),
+)
 def morse(
-    *, q: float = 0.0, p: float = 1.0, D: float = 1.0, a: float = 1.0, m: float = 1.0, t_end: float = 100.0
+    *,
+    q: float = 0.0,
+    p: float = 1.0,
+    D: Positive = 1.0,
+    a: Positive = 1.0,
+    m: Positive = 1.0,
+    t_end: float = 100.0,
 ) -> Problem:
     """Return the Morse oscillator.
 
@@ -50,8 +68,6 @@ def morse(
     problems.errors.InputError
         For values out of range.
     """
-    given.finite("morse", q=q, p=p, t_end=t_end)
-    given.positive("morse", D=D, a=a, m=m)
     values = {"D": D, "a": a, "m": m}
     return Problem(
         Hamiltonian(_energy, dof=1, parameters=_DEFAULT, name="morse"),
@@ -59,14 +75,6 @@ def morse(
         p0=[p],
         parameters=values,
         t_end=t_end,
-        name="morse",
-        title="the Morse oscillator",
-        arguments={"q": q, "p": p} | changed(morse, **values, t_end=t_end),
-        references=(
-            "P. M. Morse, Diatomic molecules according to the wave mechanics. II. Vibrational levels, "
-            "Physical Review 34 (1929) 57-64",
-        ),
-        notes="Separable, not polynomial; an exact solution for bound motion.",
     )
 
 

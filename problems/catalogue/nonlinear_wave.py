@@ -1,15 +1,31 @@
 """A Klein-Gordon equation with a cubic force on a periodic interval, discretised as `_waves` says."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.calls import at_least
+from problems.catalogue import _starts as starts
 from problems.catalogue import _waves as waves
+from problems.entry import Expected, entry
+from problems.picture import Lattice
 from problems.problem import Problem
-from problems.registry import changed
 
 
+@entry(
+    title="a nonlinear wave equation",
+    references=waves.REFERENCES,
+    notes="A polynomial energy of degree 4 in many unknowns; the explicit step is bounded by dx.",
+    shows=("n",),
+    picture=Lattice(span=30.0, points=300),
+    expected=Expected(h=0.02, energy=1e-15, default=2e-16, small={"n": 8}),
+)
 def nonlinear_wave(
-    *, n: int = 128, mass: float = 1.0, kappa: float = 1.0, amplitude: float = 1.0, t_end: float = 100.0
+    *,
+    n: Annotated[int, at_least(3)] = 128,
+    mass: float = 1.0,
+    kappa: float = 1.0,
+    amplitude: float = 1.0,
+    t_end: float = 100.0,
 ) -> Problem:
     """Return the nonlinear Klein-Gordon equation u_tt = u_xx - mass u - kappa u^3, discretised.
 
@@ -38,9 +54,7 @@ def nonlinear_wave(
     problems.errors.InputError
         For values out of range.
     """
-    given.whole("nonlinear_wave", 3, n=n)
-    given.size("nonlinear_wave", 2 * n, n=n)
-    given.finite("nonlinear_wave", mass=mass, kappa=kappa, amplitude=amplitude, t_end=t_end)
+    limits.check_problem("nonlinear_wave", 2 * n, n=n)
 
     def potential(u: Any, par: Any, m: Any) -> Any:
         square = u * u
@@ -48,20 +62,14 @@ def nonlinear_wave(
 
     return Problem(
         waves.hamiltonian(n, potential, "nonlinear_wave", mass=1.0, kappa=1.0),
-        q0=[given.nearest(lambda i=i: _sine(i, n, amplitude)) for i in range(n)],
+        q0=[starts.nearest(lambda i=i: _sine(i, n, amplitude)) for i in range(n)],
         p0=[0.0] * n,
         parameters={
-            "stiffness": given.nearest(lambda: _inverse_square_step(n)),
+            "stiffness": starts.nearest(lambda: _inverse_square_step(n)),
             "mass": mass,
             "kappa": kappa,
         },
         t_end=t_end,
-        name="nonlinear_wave",
-        title="a nonlinear wave equation",
-        arguments={"n": n}
-        | changed(nonlinear_wave, mass=mass, kappa=kappa, amplitude=amplitude, t_end=t_end),
-        references=waves.REFERENCES,
-        notes="A polynomial energy of degree 4 in many unknowns; the explicit step is bounded by dx.",
     )
 
 

@@ -9,10 +9,11 @@ Gabrielse, "Geonium theory", Reviews of Modern Physics 58 (1986) 233-311.
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.calls import Positive
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
@@ -29,10 +30,17 @@ def _turn(q: Any, p: Any) -> Any:
     return q[0] * p[1] - q[1] * p[0]
 
 
+@entry(
+    title="a Penning trap",
+    references=("L. S. Brown, G. Gabrielse, Geonium theory, Reviews of Modern Physics 58 (1986) 233-311",),
+    notes="Three widely spaced frequencies; not separable; polynomial of degree 4.",
+    picture=Plane(labels=("x", "y"), span=80.0, points=3000),
+    expected=Expected(h=0.2, energy=4e-15, default=7e-14),
+)
 def penning_trap(
     *,
-    omega_c: float = 5.0,
-    omega_z: float = 1.0,
+    omega_c: Positive = 5.0,
+    omega_z: Positive = 1.0,
     c4: float = 0.01,
     t_end: float = 500.0,
 ) -> Problem:
@@ -62,8 +70,6 @@ def penning_trap(
     problems.errors.InputError
         For values out of range.
     """
-    given.finite("penning_trap", c4=c4, t_end=t_end)
-    given.positive("penning_trap", omega_c=omega_c, omega_z=omega_z)
     if omega_c * omega_c <= 2 * omega_z * omega_z:
         raise InputError(
             f"omega_c={omega_c!r} of penning_trap does not hold the particle; "
@@ -82,11 +88,4 @@ def penning_trap(
         p0=[0.0, 0.1 + omega_c / 2, 0.0],
         parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
         t_end=t_end,
-        name="penning_trap",
-        title="a Penning trap",
-        arguments=changed(penning_trap, omega_c=omega_c, omega_z=omega_z, c4=c4, t_end=t_end),
-        references=(
-            "L. S. Brown, G. Gabrielse, Geonium theory, Reviews of Modern Physics 58 (1986) 233-311",
-        ),
-        notes="Three widely spaced frequencies; not separable; polynomial of degree 4.",
     )

@@ -6,10 +6,16 @@ E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
 
 from typing import Any
 
-from problems.catalogue import _given as given
+import numpy as np
+
+from problems.catalogue import _starts as starts
+from problems.entry import Expected, entry
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.poisson import Poisson
+
+AROUND = np.linspace(0.0, 2.0 * np.pi, 200)
+CIRCLE = np.column_stack([np.cos(AROUND), np.sin(AROUND)])  # both invariants' sphere, seen from y2
 
 
 def _energy(y: Any, par: Any) -> Any:
@@ -26,6 +32,17 @@ def _casimir(y: Any) -> Any:
     return (y[0] * y[0] + y[1] * y[1] + y[2] * y[2]) / 2
 
 
+@entry(
+    title="the free rigid body",
+    references=(
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section VII.5",
+    ),
+    notes="A Poisson system with a quadratic Casimir; a quartic energy on request.",
+    shows=("quartic",),
+    picture=Plane(places=(0, 2), labels=("y₁", "y₃"), outline=CIRCLE, span=40.0, points=600),
+    expected=Expected(h=0.2, energy=2e-16, default=3e-15, small={"quartic": 0.5}),
+)
 def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
     """Return the free rigid body in body axes, or one with a quartic energy.
 
@@ -54,7 +71,6 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
     problems.errors.InputError
         For values that are not finite.
     """
-    given.finite("rigid_body", quartic=quartic, t_end=t_end)
     system = Poisson(
         _energy,
         _structure,
@@ -65,17 +81,9 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
     )
     return Problem(
         system,
-        y0=[given.nearest(lambda: _start(0)), 0.0, given.nearest(lambda: _start(1))],
+        y0=[starts.nearest(lambda: _start(0)), 0.0, starts.nearest(lambda: _start(1))],
         parameters={"quartic": quartic},
         t_end=t_end,
-        name="rigid_body",
-        title="the free rigid body",
-        arguments={"quartic": quartic} | changed(rigid_body, t_end=t_end),
-        references=(
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section VII.5",
-        ),
-        notes="A Poisson system with a quadratic Casimir; a quartic energy on request.",
     )
 
 

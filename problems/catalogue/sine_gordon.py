@@ -1,14 +1,31 @@
 """The sine-Gordon equation on a periodic interval, discretised in space as `_waves` says."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.calls import Positive, at_least
+from problems.catalogue import _starts as starts
 from problems.catalogue import _waves as waves
+from problems.entry import Expected, entry
+from problems.picture import Lattice
 from problems.problem import Problem
-from problems.registry import changed
 
 
-def sine_gordon(*, n: int = 200, gamma: float = 1.5, length: float = 40.0, t_end: float = 100.0) -> Problem:
+@entry(
+    title="the sine-Gordon equation",
+    references=waves.REFERENCES,
+    notes="Many unknowns, trigonometric force; the explicit step is bounded by dx.",
+    shows=("n", "gamma"),
+    picture=Lattice(span=40.0, points=300),
+    expected=Expected(h=0.2, energy=5e-16, default=2e-16, small={"n": 8}),
+)
+def sine_gordon(
+    *,
+    n: Annotated[int, at_least(3)] = 200,
+    gamma: Positive = 1.5,
+    length: Positive = 40.0,
+    t_end: float = 100.0,
+) -> Problem:
     """Return the sine-Gordon equation u_tt = u_xx - sin u, discretised.
 
     From u = 0, u_t = (4/gamma) sech(x/gamma): a breather for gamma > 1, the double pole
@@ -37,21 +54,13 @@ def sine_gordon(*, n: int = 200, gamma: float = 1.5, length: float = 40.0, t_end
     problems.errors.InputError
         For values out of range.
     """
-    given.whole("sine_gordon", 3, n=n)
-    given.size("sine_gordon", 2 * n, n=n)
-    given.positive("sine_gordon", gamma=gamma, length=length)
-    given.finite("sine_gordon", t_end=t_end)
+    limits.check_problem("sine_gordon", 2 * n, n=n)
     return Problem(
         waves.hamiltonian(n, lambda u, par, m: 1 - m.cos(u), "sine_gordon"),
         q0=[0.0] * n,
-        p0=[given.nearest(lambda i=i: _hump(i, n, gamma, length)) for i in range(n)],
+        p0=[starts.nearest(lambda i=i: _hump(i, n, gamma, length)) for i in range(n)],
         parameters={"stiffness": (n / length) ** 2},
         t_end=t_end,
-        name="sine_gordon",
-        title="the sine-Gordon equation",
-        arguments={"n": n, "gamma": gamma} | changed(sine_gordon, length=length, t_end=t_end),
-        references=waves.REFERENCES,
-        notes="Many unknowns, trigonometric force; the explicit step is bounded by dx.",
     )
 
 

@@ -10,7 +10,7 @@ import pytest
 import integrators
 import problems
 from problems import emit
-from problems.catalogue import _given as given
+from problems.catalogue import _starts as starts
 from problems.catalogue import figure_eight, kepler, morse, pendulum, period_annulus, solar_system
 from problems.catalogue.henon_heiles import SADDLES, beyond_triangle, inside_triangle
 from problems.errors import InputError
@@ -235,9 +235,9 @@ def test_the_sine_gordon_start_is_a_breather():
 
 def test_random_starts_are_the_same_everywhere():
     # Python's own generator and sums only: these are the numbers on any machine.
-    draws = given.gaussians(1, 3)
-    assert draws == given.gaussians(1, 5)[:3]
-    many = np.array(given.gaussians(7, 20000))
+    draws = starts.gaussians(1, 3)
+    assert draws == starts.gaussians(1, 5)[:3]
+    many = np.array(starts.gaussians(7, 20000))
     assert abs(many.mean()) < 0.03
     assert many.var() == pytest.approx(1.0, abs=0.03)
     assert draws == [-0.22337666337421247, -0.07542454607227089, -2.7232449236759697]
