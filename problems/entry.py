@@ -68,7 +68,8 @@ def entry(
 
     What the function returns gets its name, prints as the call that made it, and
     says the rest. Its arguments are checked by their annotations before it runs
-    (`problems.calls.bound`); what else must hold, it checks itself.
+    (`problems.calls.bound`), and refused with an `InputError`; what else must hold, it
+    checks itself.
 
     Parameters
     ----------

@@ -3,8 +3,7 @@
     H(q, p) = |p - A(q)|^2/2 + phi(q),   unit mass and charge
 
 In the plane, with the growing field B = r (A = r/3 (-y, x)) and the repelling
-potential phi = 1/(100 r): H. Qin et al., "Why is Boris algorithm so good?",
-Physics of Plasmas 20 (2013) 084503.
+potential phi = 1/(100 r).
 """
 
 from typing import Any
@@ -66,7 +65,7 @@ def charged_particle(
     Raises
     ------
     problems.errors.InputError
-        For values that are not finite, or a start in the centre.
+        For a start in the centre.
     """
     if x == 0 and y == 0:
         raise InputError("x=0 and y=0 of charged_particle are the singular centre; start elsewhere.")

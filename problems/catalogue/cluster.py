@@ -52,11 +52,6 @@ def cluster(
     Problem
         State: positions body by body, then momenta. Parameters ``m``, ``eps``;
         invariants: energy, angular momentum (the linear momentum is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("cluster", 6 * n, n * (n - 1) // 2, n=n)
     random = Random(seed)

@@ -3,12 +3,9 @@
     H(q, p) = (p1^2 + p2^2)/2 + q2 p1 - q1 p2 - (1 - mu)/r1 - mu/r2
 
 with r1 the distance from (-mu, 0), r2 from (1 - mu, 0), and p = q' + (-q2, q1).
-The Jacobi integral is C = -2 H. V. Szebehely, Theory of Orbits (Academic Press
-1967). Periodic orbits around Earth and Moon of R. F. Arenstorf (1963): those of
-4 and 3 loops as in E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
-Differential Equations I, 2nd edition (Springer 1993), section II.0; that of 2
-loops, with another mass of the Moon, as in L. F. Shampine, M. K. Gordon,
-Computer Solution of Ordinary Differential Equations (Freeman 1975).
+The Jacobi integral is C = -2 H. Periodic orbits around Earth and Moon of R. F.
+Arenstorf (1963): those of 4 and 3 loops as in Hairer, Norsett and Wanner's book, that
+of 2 loops, with another mass of the Moon, as in Shampine and Gordon's.
 """
 
 from dataclasses import dataclass
@@ -91,11 +88,6 @@ def cr3bp(
     -------
     Problem
         State ``[q1, q2, p1, p2]``; parameter ``mu``; invariants: energy, Jacobi integral.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     orbit = ORBITS[loops]
     system = Hamiltonian(

@@ -2,9 +2,7 @@
 
     H(q, p) = |p|^2/(2 m) + D (1 - exp(-a (|q| - r0)))^2
 
-P. M. Morse, "Diatomic molecules according to the wave mechanics. II.
-Vibrational levels", Physical Review 34 (1929) 57-64. Here q is the place of one
-atom with respect to the other, and m their reduced mass.
+Here q is the place of one atom with respect to the other, and m their reduced mass.
 """
 
 from typing import Any
@@ -55,11 +53,6 @@ def diatomic(*, r: Positive = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: floa
     Problem
         State ``[q1, q2, p1, p2]`` of the relative motion; parameters ``D = 4``, ``a = 2``,
         ``r0 = 1``, ``m = 1``; invariants: energy, angular momentum.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     system = Hamiltonian(
         _energy,

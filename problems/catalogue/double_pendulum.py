@@ -6,8 +6,8 @@ With the angles q1, q2 from the vertical, d = q1 - q2 and M = m1 + m2,
         - M g l1 cos q1 - m2 g l2 cos q2
 
 which is p^T K(q)^-1 p/2 + V(q) with the mass matrix
-K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]. L. D. Landau, E. M.
-Lifshitz, Mechanics (Pergamon 1960), section 5, problem 1 has the Lagrangian.
+K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]; Landau and Lifshitz have the
+Lagrangian.
 """
 
 from typing import Any
@@ -71,11 +71,6 @@ def double_pendulum(
     -------
     Problem
         State ``[q1, q2, p1, p2]``; parameters as named; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite, masses or lengths that are not positive.
     """
     names = {"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 1.0}
     values = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}

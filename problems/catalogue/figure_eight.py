@@ -1,9 +1,4 @@
-"""Three equal masses that chase each other along a figure eight.
-
-A. Chenciner, R. Montgomery, "A remarkable periodic solution of the three-body
-problem in the case of equal masses", Annals of Mathematics 152 (2000) 881-901,
-with the start found by C. Simo.
-"""
+"""Three equal masses that chase each other along a figure eight, from the start found by C. Simo."""
 
 from problems.catalogue import _gravity as gravity
 from problems.entry import Expected, entry
@@ -43,11 +38,6 @@ def figure_eight(*, t_end: float | None = None) -> Problem:
     Problem
         State: positions in the plane body by body, then momenta. Invariants:
         energy, linear momentum (0), angular momentum (0).
-
-    Raises
-    ------
-    problems.errors.InputError
-        If ``t_end`` is not finite.
     """
     (x, y), (u, v) = POSITION, VELOCITY
     return Problem(

@@ -3,9 +3,7 @@
     H(q, p) = sum_{i=1..n} p_i^2/2 + sum_{i=0..n} V(q_{i+1} - q_i),   q_0 = q_{n+1} = 0
     V(r) = r^2/2 + alpha r^3/3 + beta r^4/4
 
-E. Fermi, J. Pasta, S. Ulam, "Studies of nonlinear problems", Los Alamos report
-LA-1940 (1955): n = 32, alpha = 1/4, the lowest mode. T. Dauxois, "Fermi, Pasta,
-Ulam, and a mysterious lady", Physics Today 61 (2008) 55-57.
+By default as in the report: n = 32, alpha = 1/4, the lowest mode.
 """
 
 import math
@@ -72,11 +70,6 @@ def fput(
     -------
     Problem
         State ``[q_1 .. q_n, p_1 .. p_n]``; parameters ``alpha``, ``beta``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("fput", 2 * n, n=n)
 

@@ -2,10 +2,8 @@
 
     H(q, p) = (p1^2 + p2^2)/2 + (q1^2 + q2^2)/2 + q1^2 q2 - q2^3/3
 
-M. Henon, C. Heiles, "The applicability of the third integral of motion: some
-numerical experiments", Astronomical Journal 69 (1964) 73-79. Cubic, so
-HBVM(k, s) keeps the energy exactly for k >= 3s/2. Below the energy 1/6 an orbit
-that starts in the triangle of the saddles never leaves it.
+Cubic, so HBVM(k, s) keeps the energy exactly for k >= 3s/2. Below the energy 1/6 an
+orbit that starts in the triangle of the saddles never leaves it.
 """
 
 import math
@@ -75,8 +73,7 @@ def henon_heiles(
     Raises
     ------
     problems.errors.InputError
-        If the potential at the start exceeds the energy, or for values that are
-        not finite.
+        If the potential at the start exceeds the energy.
     """
     momentum = [starts.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
     system = Hamiltonian(_energy, dof=2, name="henon_heiles")

@@ -2,9 +2,8 @@
 
     H(q, p) = |p|^2/2 - 1/|q|
 
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.2. Superintegrable: energy, angular momentum and the
-Laplace-Runge-Lenz vector are all kept, so every orbit closes.
+Superintegrable: energy, angular momentum and the Laplace-Runge-Lenz vector are all
+kept, so every orbit closes.
 """
 
 from decimal import Decimal, localcontext
@@ -70,11 +69,6 @@ def kepler(
     Problem
         State ``[q1, q2, p1, p2]``, from ``(1 - e, 0, 0, sqrt((1 + e)/(1 - e)))``;
         invariants: energy, angular momentum, the Laplace-Runge-Lenz vector.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     with localcontext(prec=60):
         fast = float(((1 + Decimal(e)) / (1 - Decimal(e))).sqrt())

@@ -2,10 +2,9 @@
 
     H(q, p) = sum_i |p_i|^2/(2 m) + sum_{i<j} 4 eps ((sigma/r)^12 - (sigma/r)^6)
 
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.4, table 4.1: eps/k_B = 119.8 K, sigma = 0.341 nm,
-m = 66.34e-27 kg, k_B = 1.380658e-23 J/K. Units here: nanometres, nanoseconds, and
-k_B times kelvin for the energy, so that the mass is m/k_B in K ns^2/nm^2.
+In the book's table: eps/k_B = 119.8 K, sigma = 0.341 nm, m = 66.34e-27 kg,
+k_B = 1.380658e-23 J/K. Units here: nanometres, nanoseconds, and k_B times kelvin for
+the energy, so that the mass is m/k_B in K ns^2/nm^2.
 """
 
 from fractions import Fraction
@@ -78,11 +77,6 @@ def lennard_jones(
         State: positions in the plane atom by atom, then momenta. Parameters
         ``m``, ``eps``, ``sigma``; invariants: energy, linear momentum (of the book's
         crystal only: of the others it is 0 but for rounding), angular momentum.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     atoms = 3 * rings * (rings + 1) + 1
     limits.check_problem("lennard_jones", 4 * atoms, atoms * (atoms - 1) // 2, rings=rings)

@@ -1,8 +1,4 @@
-"""Three species of Lotka and Volterra, a Poisson system.
-
-D. Cohen, E. Hairer, "Linear energy-preserving integrators for Poisson systems",
-BIT 51 (2011) 91-101.
-"""
+"""Three species of Lotka and Volterra, a Poisson system."""
 
 from typing import Any
 
@@ -56,11 +52,6 @@ def lotka_volterra(*, t_end: float = 100.0) -> Problem:
     Problem
         State ``[y1, y2, y3]``; parameters as named; invariants: energy, and the
         Casimir ``a b ln y1 - b ln y2 + ln y3``, which is one only if a b c = -1.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If ``t_end`` is not finite.
     """
     system = Poisson(
         _energy,

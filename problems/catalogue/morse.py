@@ -2,9 +2,7 @@
 
     H(q, p) = p^2/(2 m) + D (1 - exp(-a q))^2
 
-P. M. Morse, "Diatomic molecules according to the wave mechanics. II.
-Vibrational levels", Physical Review 34 (1929) 57-64. Here q is the distance of
-the atoms less its value at rest, and m their reduced mass.
+Here q is the distance of the atoms less its value at rest, and m their reduced mass.
 """
 
 from typing import Any
@@ -62,11 +60,6 @@ def morse(
     -------
     Problem
         State ``[q, p]``; parameters ``D``, ``a``, ``m``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     values = {"D": D, "a": a, "m": m}
     return Problem(

@@ -48,11 +48,6 @@ def nonlinear_wave(
     Problem
         State ``[u_0 .. u_{n-1}, u'_0 .. u'_{n-1}]``; parameters ``stiffness`` = 1/dx^2,
         ``mass``, ``kappa``; invariant: energy (that of the equation divided by dx).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("nonlinear_wave", 2 * n, n=n)
 

@@ -1,9 +1,8 @@
 """The outer Solar System: the Sun, Jupiter, Saturn, Uranus, Neptune and Pluto.
 
-Data of E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd
-edition (Springer 2006), section I.2.4, table 2.2: 5 September 1994, 0h00;
-distances in astronomical units, velocities in astronomical units per day,
-masses in solar masses, heliocentric. The Sun's mass contains the inner planets.
+Data of the book's table: 5 September 1994, 0h00; distances in astronomical units,
+velocities in astronomical units per day, masses in solar masses, heliocentric. The
+Sun's mass contains the inner planets.
 """
 
 from fractions import Fraction
@@ -78,11 +77,6 @@ def outer_solar_system(
         State: positions body by body (Sun first), then momenta. Invariants:
         energy, angular momentum, and in the heliocentric frame the linear
         momentum (in the other one it is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown unit or frame, or a span that is not finite.
     """
     return planetary(
         "outer_solar_system",

@@ -1,9 +1,6 @@
 """The mathematical pendulum, with its exact solution in elliptic functions.
 
-    H(q, p) = p^2/2 - cos q
-
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.1.
+H(q, p) = p^2/2 - cos q
 """
 
 from typing import Any
@@ -47,11 +44,6 @@ def pendulum(*, q: float = 0.0, p: float = 1.9, t_end: float = 1000.0) -> Proble
     -------
     Problem
         State ``[q, p]``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite.
     """
     return Problem(Hamiltonian(_energy, dof=1, name="pendulum"), q0=[q], p0=[p], t_end=t_end)
 

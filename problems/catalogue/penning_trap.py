@@ -3,8 +3,7 @@
     H(q, p) = |p - A(q)|^2/2 + phi(q),   unit mass and charge
 
 with B = omega_c and the quadrupole phi = omega_z^2/2 (z^2 - (x^2 + y^2)/2), plus an
-octupole c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2): L. S. Brown, G.
-Gabrielse, "Geonium theory", Reviews of Modern Physics 58 (1986) 233-311.
+octupole c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2).
 """
 
 from typing import Any
@@ -68,7 +67,7 @@ def penning_trap(
     Raises
     ------
     problems.errors.InputError
-        For values out of range.
+        For frequencies that do not hold the particle.
     """
     if omega_c * omega_c <= 2 * omega_z * omega_z:
         raise InputError(

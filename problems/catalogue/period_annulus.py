@@ -4,10 +4,8 @@
     A = p^2 (1/2 + c3 p + b3 p^2 + a3 p^3)     B = p^2 (c2 + b2 p + a2 p^2)
     C = 1/2 + c1 p + b1 p^2 + a1 p^3           D = c0 + b0 p + a0 p^2
 
-L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between
-Gauss-Legendre methods and Hamiltonian BVMs defined over Gauss points", section
-on the period annulus, with a2 = b1 = b3 = c1 = c2 = 1 and all other coefficients
-0: the periodic orbits around the origin end at a loop through the saddle P1.
+In the paper's section on the period annulus a2 = b1 = b3 = c1 = c2 = 1 and all other
+coefficients are 0: the periodic orbits around the origin end at a loop through the saddle P1.
 """
 
 from collections.abc import Sequence
@@ -78,11 +76,6 @@ def period_annulus(
         State ``[q, p]``; parameters ``a``, ``b``, ``c``; invariant: energy. The
         equilibria `P1`, `P2` and the energy of the loop `H_STAR` belong to the
         default coefficients.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite, or coefficients that are not four numbers.
     """
     default = {"a": (0.0, 0.0, 1.0, 0.0), "b": (0.0, 1.0, 0.0, 1.0), "c": (0.0, 1.0, 1.0, 0.0)}
     return Problem(

@@ -1,9 +1,4 @@
-"""The Pythagorean three-body problem.
-
-C. Burrau, Astronomische Nachrichten 195 (1913) 113-118; V. Szebehely, C. F.
-Peters, "Complete solution of a general problem of three bodies", Astronomical
-Journal 72 (1967) 876-883.
-"""
+"""The Pythagorean three-body problem."""
 
 from problems.catalogue import _gravity as gravity
 from problems.entry import Expected, entry
@@ -42,11 +37,6 @@ def pythagorean(*, t_end: float = 70.0) -> Problem:
     Problem
         State: positions in the plane body by body, then momenta. Invariants:
         energy, linear momentum (0), angular momentum (0).
-
-    Raises
-    ------
-    problems.errors.InputError
-        If ``t_end`` is not finite.
     """
     return Problem(
         gravity.hamiltonian((3.0, 4.0, 5.0), name="pythagorean", dimension=2),

@@ -1,8 +1,4 @@
-"""The free rigid body in body axes, a Poisson system.
-
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section VII.5.
-"""
+"""The free rigid body in body axes, a Poisson system."""
 
 from typing import Any
 
@@ -65,11 +61,6 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
     Problem
         State: angular momentum ``[y1, y2, y3]``; parameters ``inertia``, ``quartic``;
         invariants: energy, and the Casimir |y|^2/2.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite.
     """
     system = Poisson(
         _energy,

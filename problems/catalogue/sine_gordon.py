@@ -48,11 +48,6 @@ def sine_gordon(
     Problem
         State ``[u_0 .. u_{n-1}, u'_0 .. u'_{n-1}]``; parameter ``stiffness`` = 1/dx^2;
         invariant: energy (that of the equation divided by dx).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("sine_gordon", 2 * n, n=n)
     return Problem(

@@ -1,8 +1,7 @@
 """Sitnikov's problem: two equal primaries on ellipses, a planetoid on the axis between them.
 
-L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between Gauss-Legendre
-methods and Hamiltonian BVMs defined over Gauss points", section "Sitnikov's
-problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5, t in [0, 1500].
+In the paper's section "Sitnikov's problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5,
+t in [0, 1500].
 """
 
 from decimal import Decimal, localcontext
@@ -106,11 +105,6 @@ def sitnikov(
     Problem
         State ``[q1 q2 q3 p1 p2 p3]``, each x, y, z; invariants: energy, linear
         and angular momentum; guard: the planetoid's distance from the axis.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     system = Hamiltonian(
         _energy,

@@ -1,11 +1,9 @@
 """The Solar System: the Sun and eight planets, the Moon's mass with the Earth's.
 
-Ellipses at J2000.0 of E. M. Standish and J. G. Williams, "Keplerian elements for
-approximate positions of the major planets" (Jet Propulsion Laboratory), table 1,
-for 1800 to 2050, with respect to the mean ecliptic and equinox of J2000. Masses
-of the JPL ephemeris DE405 as in The Astronomical Almanac 2006, page K7. G is the
-square of the Gaussian gravitational constant. Each planet starts on its ellipse
-about the Sun, as if alone with it.
+Ellipses at J2000.0 of Standish and Williams' table for 1800 to 2050, with respect to
+the mean ecliptic and equinox of J2000. Masses of the JPL ephemeris DE405, as in the
+Almanac. G is the square of the Gaussian gravitational constant. Each planet starts on
+its ellipse about the Sun, as if alone with it.
 """
 
 from fractions import Fraction
@@ -84,11 +82,6 @@ def solar_system(*, unit: Unit = "year", frame: Frame = "barycentric", t_end: fl
         State: positions body by body (Sun first), then momenta. Invariants:
         energy, angular momentum, and in the heliocentric frame the linear
         momentum (in the other one it is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown unit or frame, or a span that is not finite.
     """
     positions, velocities = heliocentric()
     return planetary(

@@ -2,9 +2,8 @@
 
     H(q, p) = |p|^2/(2 m) + k (|q| - l0)^2/2 + m g q3
 
-P. Lynch, C. Houghton, "Pulsation and precession of the resonant swinging
-spring", Physica D 190 (2004) 38-62: with m = 1, g = pi^2, k = 4 pi^2 and the
-length 1 at rest (so l0 = 3/4) the spring oscillates twice as fast as it swings.
+In the paper: m = 1, g = pi^2, k = 4 pi^2 and the length 1 at rest (so l0 = 3/4), with
+which the spring oscillates twice as fast as it swings.
 """
 
 import math
@@ -73,11 +72,6 @@ def spring_pendulum(
     Problem
         State ``[q1, q2, q3, p1, p2, p3]``, q3 upwards from the support; parameters
         ``m``, ``k``, ``l0``, ``g``; invariants: energy, angular momentum about the vertical.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     system = Hamiltonian(
         _energy,

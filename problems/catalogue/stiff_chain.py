@@ -5,9 +5,7 @@
                      + (x_m + x_{2m})^4)
 
 with q = x: x_1..x_m the (scaled) positions of the stiff springs and x_{m+1}..x_{2m}
-their (scaled) lengths. L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992)
-334-348; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd
-edition (Springer 2006), section I.5.1: m = 3, omega = 50.
+their (scaled) lengths. In the book: m = 3, omega = 50.
 """
 
 from typing import Annotated, Any
@@ -55,11 +53,6 @@ def stiff_chain(
     Problem
         State ``[x_1 .. x_2m, y_1 .. y_2m]``, from x_1 = y_1 = y_{m+1} = 1, x_{m+1} = 1/omega
         and 0 elsewhere; parameter ``omega``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("stiff_chain", 4 * springs, springs=springs)
     k = springs

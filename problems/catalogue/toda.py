@@ -2,13 +2,9 @@
 
     H(q, p) = sum_{i=1..n} p_i^2/2 + sum_{i=1..n} exp(q_i - q_{i+1}),   q_{n+1} = q_1
 
-M. Toda, "Vibration of a chain with nonlinear interaction", Journal of the
-Physical Society of Japan 22 (1967) 431-436. Integrable: M. Henon, "Integrals of
-the Toda lattice", Physical Review B 9 (1974) 1921-1923; H. Flaschka, "The Toda
-lattice II. Existence of integrals", Physical Review B 9 (1974) 1924-1925. The
-integrals are the coefficients of the characteristic polynomial of the periodic
-Jacobi matrix L with the diagonal p_i and the squared off-diagonals
-exp(q_i - q_{i+1}).
+Integrable, as Henon and Flaschka found: the integrals are the coefficients of the
+characteristic polynomial of the periodic Jacobi matrix L with the diagonal p_i and the
+squared off-diagonals exp(q_i - q_{i+1}).
 """
 
 from typing import Annotated, Any
@@ -97,11 +93,6 @@ def toda(
         det(x - L) from x^{n-1} to 1, of which the first is minus the momentum and the
         second is half its square less H. (The constant 2 that the corners add to the
         last one is left out.)
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
     limits.check_problem("toda", 2 * n, n=n)
 
