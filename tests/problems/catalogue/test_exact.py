@@ -160,6 +160,19 @@ def test_the_figure_eight_and_arenstorfs_orbits_close():
         assert np.abs(found.y[-1] - problem.y0).max() <= tolerance, problem
 
 
+def test_the_pericentre_of_a_geodesic_advances_as_elliptic_integrals_say():
+    e, p = 0.6, 10.0
+    problem = problems.load("schwarzschild", e=e, p=p)
+    # Cutler, Kennefick and Poisson: the angle between two pericentres.
+    angle = 4 / mpmath.sqrt(1 - (6 - 2 * e) / p) * mpmath.ellipk(4 * e / (p - 6 + 2 * e))
+    times = 460.0 + np.arange(0.0, 8.5, 0.5)  # a revolution takes 464.4
+    y = integrators.integrate(problem, integrators.HBVM(k=16, s=8, h=0.5), times=times).y
+    outwards = y[:, 0] * y[:, 2] + y[:, 1] * y[:, 3]
+    turned = np.unwrap(np.arctan2(y[:, 1], y[:, 0]))
+    found = np.interp(0.0, outwards, turned - turned[0]) + math.atan2(y[0, 1], y[0, 0])
+    assert abs(math.remainder(found - float(angle), 2 * math.pi)) < 1e-6  # measured 1.8e-7, by interpolation
+
+
 def test_the_annulus_ends_at_a_loop_through_a_saddle():
     problem = problems.load("period_annulus")
     field = emit.numpy(problem.system, "field")
