@@ -140,7 +140,7 @@ def bound(
     return call
 
 
-def is_number(value: Any) -> bool:
+def _is_number(value: Any) -> bool:
     """Whether a value is a finite number that a double can hold."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
@@ -151,12 +151,12 @@ def is_number(value: Any) -> bool:
 
 
 _KINDS = {
-    float: Must("a finite number", is_number),
+    float: Must("a finite number", _is_number),
     int: Must("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
     str: Must("text", lambda value: isinstance(value, str)),
     Sequence[float]: Must(
         "a list of finite numbers",
-        lambda value: isinstance(value, list | tuple) and all(map(is_number, value)),
+        lambda value: isinstance(value, list | tuple) and all(map(_is_number, value)),
     ),
 }
 
@@ -181,7 +181,7 @@ def _allowed(name: str, key: str, value: Any, annotation: Any) -> Any:
 
 
 def _one_of(name: str, key: str, value: Any, known: tuple[Any, ...]) -> Any:
-    if any(value is word or (type(value) is type(word) and value == word) for word in known):
+    if any(type(value) is type(word) and value == word for word in known):
         return value
     if all(isinstance(word, str) for word in known):
         raise unknown(f"{key} of {name}", value, known)
