@@ -1,9 +1,10 @@
 """A problem: a system, a start, parameters and a span of time."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,12 +96,7 @@ class Problem:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
-        for key, text in {"name": name, "title": title, "notes": notes}.items():
-            if text is not None and not isinstance(text, str):
-                raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
-        if not isinstance(references, list | tuple):
-            raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
-        check_names("arguments", arguments)
+        words = _words(name, title, arguments, references, notes)
         state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
         span = _numbers("t0 and t_end", [t0, t_end], 2)
         if span[0] == span[1]:
@@ -118,16 +114,28 @@ class Problem:
             "par": _frozen(par),
             "t0": float(span[0]),
             "t_end": float(span[1]),
-            "name": name,
+            **words,
             "title": title or name or system.name,
-            "arguments": MappingProxyType(dict(arguments)),
             "times": None if grid is None else _frozen(grid),
-            "references": tuple(references),
-            "notes": notes,
             "_made_with": ", ".join([repr(system), *printed, f"t_end={t_end!r}"]),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
+
+    def entitled(
+        self, *, name: str, title: str, arguments: Mapping[str, Any], references: Sequence[str], notes: str
+    ) -> Self:
+        """Return the same problem under a name: what it prints as, and what reports say of it.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For words that are no text.
+        """
+        named = copy.copy(self)
+        for key, value in _words(name, title, arguments, references, notes).items():
+            object.__setattr__(named, key, value)
+        return named
 
     def __repr__(self) -> str:
         if self.name is None:
@@ -194,6 +202,23 @@ class Problem:
     def velocity(self, y: ArrayLike) -> Array | None:
         """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
         return invariants.velocity(self.system, self.par, y)
+
+
+def _words(name: Any, title: Any, arguments: Any, references: Any, notes: Any) -> dict[str, Any]:
+    """Return what a problem says of itself, or refuse it."""
+    for key, text in {"name": name, "title": title, "notes": notes}.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
+    if not isinstance(references, list | tuple):
+        raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
+    check_names("arguments", arguments)
+    return {
+        "name": name,
+        "title": title,
+        "arguments": MappingProxyType(dict(arguments)),
+        "references": tuple(references),
+        "notes": notes,
+    }
 
 
 def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:

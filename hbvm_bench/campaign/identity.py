@@ -41,7 +41,7 @@ BOOKKEEPING = frozenset(
         *("campaign.entries", "campaign.file", "campaign.grid", "campaign.identity", "campaign.spec"),
         *("campaign.sweep", "store.files", "store.records", "store.store"),
     )
-)
+) | {"problems.picture"}
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
@@ -163,7 +163,8 @@ def source_digest(method: MethodBase, case: Case) -> str:
     They are those of `MEASURES`, of the method and of the problem, and what these import, at
     their heads or anywhere below, of our packages and of the method's and the problem's own. So
     a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
-    nor any because of a report. Comments, docstrings and the layout do not count.
+    nor any because of a report. Comments, docstrings, the layout and
+    what a problem's decorator says do not count.
     """
     problem = problems.registry.factory(parse_spec(case.problem).name)
     return digest_of((*MEASURES, type(method).__module__, problem.__module__))
@@ -217,6 +218,8 @@ def _read(module: str, path: Path) -> tuple[str, list[str]]:
     for node in ast.walk(tree):
         if isinstance(body := getattr(node, "body", None), list):
             body[:] = [part for part in body if not _is_text(part)]
+        if isinstance(node, ast.FunctionDef):  # what a problem says of itself is words too
+            node.decorator_list = [part for part in node.decorator_list if not _is_entry(part)]
     made = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
     kept.put(key, json.dumps(made).encode())
     return made
@@ -231,6 +234,11 @@ def _rule() -> bytes:
 def _is_text(node: ast.AST) -> bool:
     """Whether a statement is a string alone: the docstring of what it stands in, or of what is before it."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+def _is_entry(node: ast.expr) -> bool:
+    """Whether a decorator is that of `problems.entry`."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "entry"
 
 
 def _imported(tree: ast.Module, package: str) -> set[str]:

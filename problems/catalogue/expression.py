@@ -7,13 +7,14 @@ else there is.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems.calls import Must
 from problems.catalogue._formula import COORDINATE, FUNCTIONS, NAME, Formula
-from problems.errors import InputError, unknown
+from problems.entry import Expected, entry
+from problems.errors import InputError, shown, unknown
+from problems.picture import Phase
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 MOST_FREEDOM = 100  # degrees of freedom; larger systems have sums, which text has not
@@ -69,12 +70,24 @@ def hamiltonian(
     return system
 
 
+@entry(
+    title=None,
+    references=("given by the user",),
+    notes="A formula of your own.",
+    shows=("H", "q0", "p0"),
+    picture=Phase(
+        span=12.0,
+        points=600,
+        arguments={"H": "p^2/2 + k*q^4/4", "q0": [1.0], "p0": [0.0], "parameters": "k=2"},
+    ),
+    expected=Expected(h=0.2, energy=2e-15, default=2e-15),
+)
 def expression(
     *,
-    H: str = "p^2/2 - cos(q)",
+    H: Annotated[str, Must('text, such as "p^2/2 - cos(q)"')] = "p^2/2 - cos(q)",
     q0: Sequence[float] = (0.0,),
     p0: Sequence[float] = (1.9,),
-    parameters: str = "",
+    parameters: Annotated[str, Must('text, such as "k=2, m=0.5"')] = "",
     t_end: float = 100.0,
 ) -> Problem:
     """Return a problem of your own, its Hamiltonian given as text.
@@ -104,24 +117,14 @@ def expression(
     problems.errors.InputError
         For anything that cannot be read.
     """
-    if not isinstance(H, str):
-        raise InputError(f'H={H!r} of expression must be text, such as "p^2/2 - cos(q)".')
     values = assignments(parameters)
     system = hamiltonian(H, parameters=values)
-    dof = system.dim // 2
-    return Problem(
-        system,
-        q0=given.numbers("expression", "q0", q0, dof),
-        p0=given.numbers("expression", "p0", p0, dof),
-        parameters=values,
-        t_end=t_end,
-        name="expression",
-        title=H,
-        arguments={"H": H, "q0": tuple(q0), "p0": tuple(p0)}
-        | changed(expression, parameters=parameters, t_end=t_end),
-        references=("given by the user",),
-        notes="A formula of your own.",
-    )
+    for key, start in {"q0": q0, "p0": p0}.items():
+        if len(start) != system.dof:
+            raise InputError(
+                f"{key}={shown(list(start))} of expression must be a list of {system.dof} finite numbers."
+            )
+    return Problem(system, q0=q0, p0=p0, parameters=values, t_end=t_end, title=H)
 
 
 def assignments(text: str) -> dict[str, float]:
@@ -132,8 +135,6 @@ def assignments(text: str) -> dict[str, float]:
     problems.errors.InputError
         For anything else.
     """
-    if not isinstance(text, str):
-        raise InputError(f'parameters={text!r} must be text, such as "k=2, m=0.5".')
     values: dict[str, float] = {}
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, sign, number = (piece.strip() for piece in part.partition("="))

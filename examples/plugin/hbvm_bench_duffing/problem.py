@@ -5,14 +5,24 @@ H(q, p) = p^2/2 - q^2/2 + q^4/4
 
 import math
 
-from problems import Hamiltonian, InputError, Problem
+from problems import Hamiltonian, Problem
+from problems.calls import Positive
+from problems.entry import entry
+from problems.picture import Phase
 
 
 def _energy(q, p):
     return p[0] ** 2 / 2 - q[0] ** 2 / 2 + q[0] ** 4 / 4
 
 
-def duffing(*, energy: float = 0.05, t_end: float = 200.0) -> Problem:
+@entry(
+    title="Duffing's double well",
+    references=("G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz (1918)",),
+    notes="An example from a package of its own.",
+    shows=("energy",),
+    picture=Phase(span=40.0),
+)
+def duffing(*, energy: Positive = 0.05, t_end: float = 200.0) -> Problem:
     """Return Duffing's oscillator, started at the top between its wells.
 
     Tests the passage near a saddle; the energy is a polynomial of degree 4.
@@ -29,16 +39,5 @@ def duffing(*, energy: float = 0.05, t_end: float = 200.0) -> Problem:
     problems.errors.InputError
         If the energy is not positive.
     """
-    if not isinstance(energy, int | float) or isinstance(energy, bool) or not 0 < energy < math.inf:
-        raise InputError(f"energy={energy!r} of duffing must be a positive number.")
-    return Problem(
-        Hamiltonian(_energy, dof=1, name="duffing"),
-        q0=[0.0],
-        p0=[math.sqrt(2 * energy)],
-        t_end=t_end,
-        name="duffing",
-        title="Duffing's double well",
-        arguments={"energy": energy, "t_end": t_end},
-        references=("G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz (1918)",),
-        notes="An example from a package of its own.",
-    )
+    system = Hamiltonian(_energy, dof=1, name="duffing")
+    return Problem(system, q0=[0.0], p0=[math.sqrt(2 * energy)], t_end=t_end)

@@ -12,6 +12,7 @@ import pytest
 from hbvm_bench.campaign import identity
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import BOOKKEEPING, MEASURES, resolve, sources
+from problems.catalogue import kepler
 
 OURS, PEER = "Gauss(s=2, h=0.5)", "IAS15()"
 LOADED = """
@@ -59,6 +60,7 @@ EDITED = {
     "problems/analysis/double_double.py": [True, True],
     "problems/catalogue/kepler.py": [True, True],
     "problems/catalogue/pendulum.py": [False, False],
+    "problems/picture.py": [False, False],
     "integrators/plugins/scipy/__init__.py": [False, False],
     "integrators/testing.py": [False, False],
     "hbvm_bench/measure/metric.py": [True, True],
@@ -110,6 +112,14 @@ def test_another_comment_docstring_or_layout_makes_no_case_stale(stale):
 
     assert b"Said otherwise" in reworded(Path(identity.__file__).read_bytes())
     assert stale(".py", reworded) == [False, False]
+
+
+def test_what_a_problem_says_of_itself_makes_no_case_stale(stale):
+    words = b'notes="Exact solution known'
+    assert words in Path(kepler.__file__).read_bytes()
+    assert stale("/kepler.py", lambda source: source.replace(words, b'notes="Otherwise')) == [False, False]
+    assert stale("/kepler.py", lambda source: source.replace(b"span=6.5", b"span=7.5")) == [False, False]
+    assert stale("/kepler.py", lambda source: source.replace(b"= 0.6", b"= 0.5")) == [True, True]
 
 
 def test_what_a_plugins_module_imports_of_its_own_package_belongs_to_it(tmp_path, monkeypatch):

@@ -11,7 +11,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.reference import collocation, trusted
 from hbvm_bench.reference import solutions as reference
 from problems import emit
-from problems.catalogue import kepler, molecules, pendulum
+from problems.catalogue import kepler, morse, pendulum
 from problems.errors import InputError
 from problems.trace.graph import reachable
 
@@ -128,7 +128,7 @@ def test_every_problem_of_the_catalogue_has_a_reference():
         ("kepler", kepler.exact_state),
         ("kepler_eccentric", kepler.exact_state),
         ("pendulum", pendulum.exact_state),
-        ("morse", molecules.exact_state),
+        ("morse", morse.exact_state),
     ],
 )
 def test_references_are_the_exact_solutions_where_there_are_any(stem, exact):
