@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from hbvm_bench.laws import Law
 from hbvm_bench.records import Compile, Counters, Result, Timing
 from hbvm_bench.reference import Reference
-from integrators.integrate import Solution
 from integrators.protocol import Status
+from integrators.solution import Solution
 from problems import emit
 from problems.problem import Problem
 

@@ -30,8 +30,8 @@ from hbvm_bench.metrics import evaluate, guard_violation
 from hbvm_bench.records import Result, TimingRound
 from hbvm_bench.solve import solve
 from hbvm_bench.store import NAME, atomic, encode_series
-from integrators.integrate import Solution
 from integrators.protocol import Program, Status
+from integrators.solution import Solution
 from problems.errors import InputError
 from problems.systems.base import System
 

@@ -1,15 +1,22 @@
-"""What all peers' programs and steppers share: the book-keeping around a library's own stepping."""
+"""Bases of integrators written in Python: the book-keeping around somebody's own steps.
+
+`FixedStep` is for a method with a fixed step: it says how it takes steps, and all the rest of
+`integrators.protocol` comes with it. `ProgramBase` and `StepperBase` are for methods that choose
+their steps; `FixedStepper` for libraries that hold the state of a fixed-step integration themselves.
+"""
 
 import math
 import threading
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeGuard, TypeVar
+from time import perf_counter
+from typing import Any, ClassVar, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
 from integrators.one_thread import one_thread
+from integrators.options import Step
 from integrators.protocol import (
     Array,
     MethodBase,
@@ -25,11 +32,15 @@ from integrators.times import plan
 from problems.errors import unknown
 from problems.problem import System
 
-Stepped = TypeVar("Stepped", bound="PeerStepper")
+STEPS_AT_ONCE = 1 << 14
+"""Steps of a `March` between two looks at Ctrl-C."""
 
 
-class PeerProgram:
-    """A peer compiled for one system; satisfies `integrators.protocol.Program`."""
+class ProgramBase:
+    """A method compiled for one system; satisfies `integrators.protocol.Program`.
+
+    A subclass implements `stepper`.
+    """
 
     compile_seconds: float = 0.0
     from_cache: bool | None = None
@@ -37,13 +48,8 @@ class PeerProgram:
     def __init__(self, system: System, method: MethodBase):
         self.system, self.method = system, method
 
-    def started(self, stepper: Stepped, par: Array) -> Stepped:
-        """Return a new stepper, which now knows what its checkpoints belong to."""
-        stepper.identity = Identity.of(repr(self.method), self.system, par)
-        return stepper
-
-    def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
-        """Return copies of a start's arguments, checked.
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "StepperBase":
+        """Return a stepper at ``t0``; see the protocol.
 
         Raises
         ------
@@ -51,12 +57,18 @@ class PeerProgram:
             For a state or time that is not finite, or a wrong shape.
         """
         values = check_parameters(par, self.system)
-        return check_state(y0, self.system.dim), values, check_start(t0)
+        stepper = self.stepper(check_state(y0, self.system.dim), values, check_start(t0))
+        stepper.identity = Identity.of(repr(self.method), self.system, values)
+        return stepper
+
+    def stepper(self, y: Array, par: Array, t: float) -> "StepperBase":
+        """Return a trajectory from a start that is checked, and its own."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """All that the continuation of a peer's stepper depends on."""
+    """All that the continuation of a stepper depends on."""
 
     t: float
     y: Array
@@ -66,8 +78,8 @@ class Checkpoint:
     identity: Identity
 
 
-class PeerStepper:
-    """A peer's trajectory; satisfies `integrators.protocol.Stepper`.
+class StepperBase:
+    """A trajectory; satisfies `integrators.protocol.Stepper`.
 
     A subclass states its ``samplings`` (the default first) and implements
     `_serve`, `_own_steps`, `_one`, `_save` and `_load`.
@@ -225,7 +237,7 @@ class PeerStepper:
         raise NotImplementedError
 
 
-class FixedStepper(PeerStepper):
+class FixedStepper(StepperBase):
     """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
 
     ``"side"`` (default)
@@ -339,3 +351,112 @@ class FixedStepper(PeerStepper):
     def _load_steps(self, steps: Any) -> None:
         """Take back what `_save_steps` returned."""
         raise NotImplementedError
+
+
+class March(Protocol):
+    """Takes ``n`` steps of length ``h`` from the time ``t``; ``y``, shape (dim,), is changed in place."""
+
+    def __call__(self, t: float, h: float, n: int, y: Array, par: Array, /) -> object: ...
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class FixedStep(MethodBase):
+    """Base of an integrator with a fixed step: a subclass says how it steps, all the rest is here.
+
+    A subclass is a frozen dataclass. It states ``order``, ``library``, ``family``,
+    ``citation`` and ``evaluations``, says in `accepts` which problems it takes, and returns
+    from `march` the function that takes steps. Samples beside the steps and at them,
+    checkpoints, counters, failures and turning round come with it;
+    `integrators.testing.check_method` checks them all.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0; the sign of time is that of the times asked for.
+
+    Attributes
+    ----------
+    evaluations : int or None
+        Evaluations of the field, or of the force, in a step.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a step that is not a finite number above 0.
+
+    Examples
+    --------
+    ``examples/integrator`` has Yoshida's composition of order 6 in forty lines.
+    """
+
+    h: Step
+
+    evaluations: ClassVar[int | None] = None
+
+    def march(self, system: System) -> March:
+        """Return the function that takes steps of ``system``, compiled if it shall be fast.
+
+        It must depend on nothing but its arguments: steps aside and checkpoints rely on that.
+        """
+        raise NotImplementedError
+
+    def compile(self, system: System) -> "FixedStepProgram":
+        """Compile what `march` returns."""
+        return FixedStepProgram(system, self)
+
+
+class FixedStepProgram(ProgramBase):
+    """A `FixedStep` method compiled for one system."""
+
+    def __init__(self, system: System, method: FixedStep):
+        super().__init__(system, method)
+        started = perf_counter()
+        self.march, self.h, self.evaluations = method.march(system), method.h, method.evaluations
+        # No step at all: what numba compiles at the first call belongs here.
+        self.march(0.0, method.h, 0, np.zeros(system.dim), system.pack())
+        self.compile_seconds = perf_counter() - started
+
+    def stepper(self, y: Array, par: Array, t: float) -> "MarchingStepper":
+        """Return a trajectory."""
+        return MarchingStepper(self, y, par, t)
+
+
+class MarchingStepper(FixedStepper):
+    """A trajectory of a `FixedStep` method."""
+
+    def __init__(self, program: FixedStepProgram, y: Array, par: Array, t: float):
+        super().__init__(y, t, program.h)
+        self._program, self._par, self._here = program, par, y.copy()
+        self._stats.evaluations = None if program.evaluations is None else 0
+
+    def _march(self, count: int) -> None:
+        end = self._n + count
+        for n in range(self._n, end, STEPS_AT_ONCE):
+            t = self._t0 + n * self._h
+            self._program.march(t, self._h, min(STEPS_AT_ONCE, end - n), self._here, self._par)
+        self._evaluated(count)
+
+    def _evaluated(self, steps: int) -> None:
+        if (each := self._program.evaluations) is not None:
+            self._stats.evaluations = (self._stats.evaluations or 0) + steps * each
+
+    def _state(self) -> Array:
+        return self._here.copy()
+
+    def _aside(self, part: float) -> Array:
+        y = self._here.copy()
+        self._program.march(self._time(), part, 1, y, self._par)
+        return y
+
+    def _shorten(self, part: float) -> None:
+        self._here = self._aside(part)
+        self._evaluated(1)
+
+    def _restart(self, t: float, y: Array, h: float) -> None:
+        self._here = y.copy()
+
+    def _save_steps(self) -> Array:
+        return self._here.copy()
+
+    def _load_steps(self, steps: Array) -> None:
+        self._here = steps.copy()

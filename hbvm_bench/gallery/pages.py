@@ -64,7 +64,7 @@ solution = integrators.integrate(problem, integrators.HBVM(k=4, s=2, h=0.1))
 ```
 
 `problems.VectorField(f, dim=...)` takes any first-order system, `problems.Poisson(H, B, dim=...)` a system
-y' = B(y) grad H(y). `examples/plugin` is a package that adds a problem and a method by entry points.
+y' = B(y) grad H(y). `examples/integrator` is a package that adds a problem and an integrator by entry points.
 
 """
 

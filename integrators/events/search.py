@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from integrators.events import roots
-from integrators.events.event import Event, Occurrences
+from integrators.events.event import Event
 from integrators.events.function import EventFunction
 from integrators.events.step import Step, Unresolved
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper, UserError
+from integrators.solution import Occurrences
 from problems import Problem
 from problems.errors import InputError
 

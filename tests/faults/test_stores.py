@@ -23,8 +23,8 @@ from hbvm_bench.metrics import evaluate
 from hbvm_bench.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.runner import is_kept
 from hbvm_bench.store import NAME_LENGTH, Index, Store, decode_series, encode_series, write_all
-from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 
 from .fault import Fault, is_met, sentence
 

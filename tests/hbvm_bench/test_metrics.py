@@ -12,8 +12,8 @@ from hbvm_bench.measure import largest_distance, measure
 from hbvm_bench.metrics import METRICS, TIMING_KEYS, evaluate, find
 from hbvm_bench.records import Compile, Timing, TimingRound
 from hbvm_bench.table import HEADLINE, RANKED_BY
-from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 from problems.errors import InputError
 
 

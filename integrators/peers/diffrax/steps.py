@@ -4,12 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from integrators.peers import load
 from integrators.peers.diffrax.methods import DiffraxMethod, Dopri8
-from integrators.peers.options import load
-from integrators.protocol import Array, Status, Stepper
-from integrators.stepping import FixedStepper, PeerProgram, PeerStepper
+from integrators.protocol import Array, Status
+from integrators.stepping import FixedStepper, ProgramBase, StepperBase
 from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.errors import InputError
 from problems.problem import System
@@ -18,7 +17,7 @@ CHUNK = 1 << 18
 """Fixed steps between two looks at Ctrl-C: so many that the 0.1 ms of a call into JAX is nothing."""
 
 
-class DiffraxProgram(PeerProgram):
+class DiffraxProgram(ProgramBase):
     """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
 
     Compiled code is kept while the process lives; ``from_cache`` says whether it was there.
@@ -41,17 +40,15 @@ class DiffraxProgram(PeerProgram):
         """Return the compiled solve for a direction of time, and whether it was there already."""
         return self.solve.made(self.system, type(self.method).__name__, sign, self.adaptive)
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
-        """Return a stepper at ``t0``; see the protocol."""
-        arguments = self.arguments(y0, par, t0)
-        kind = AdaptiveStepper if self.adaptive else DiffraxStepper
-        return self.started(kind(self, *arguments), arguments[1])
+    def stepper(self, y: Array, par: Array, t: float) -> StepperBase:
+        """Return a trajectory."""
+        return (AdaptiveStepper if self.adaptive else DiffraxStepper)(self, y, par, t)
 
 
 class _Direction:
     """The compiled solve for one direction of time; what it cost to compile is noted with the statistics."""
 
-    def __init__(self, stepper: PeerStepper, program: DiffraxProgram, sign: int):
+    def __init__(self, stepper: StepperBase, program: DiffraxProgram, sign: int):
         self.sign = sign
         self.solve, known = program.made(sign)
         if not known:
@@ -139,7 +136,7 @@ class DiffraxStepper(FixedStepper):
         self._way, self._states, self._inner = steps
 
 
-class AdaptiveStepper(PeerStepper):
+class AdaptiveStepper(StepperBase):
     """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
 
     ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
-from integrators.peers.options import load, number, whole_choice
+from integrators.options import Step
+from integrators.peers import load
 from integrators.peers.rebound.fixed import WHFAST, ReboundStepper, WHFast
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.protocol import Array
@@ -43,20 +44,12 @@ class WHFast512(ReboundMethod):
     correction is off. `WHFast.caveat` says where a problem is outside its domain.
     """
 
-    h: float
-    corrector: int = 0
+    h: Step
+    corrector: Literal[0, 17] = 0
 
+    order = 2  # in h, at a fixed perturbation
     citation = REBOUND + WHFAST
     family = "wisdom-holman"
-
-    def __post_init__(self) -> None:
-        number(self, "h")
-        whole_choice(self, "corrector", (0, 17))
-
-    @property
-    def order(self) -> int:
-        """Order of convergence in h at a fixed perturbation."""
-        return 2
 
     def refuses(self, system: System, par: Array) -> str | None:
         """Return why not: too many bodies, none, or a processor without AVX-512."""

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 from scipy.integrate._ivp import common
 
-from integrators.options import length, whole
+from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
+from problems.checks import checked
 from problems.errors import InputError
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
@@ -58,8 +59,8 @@ class _LineIntegral(OdeSolver):
         compiled = recognised(fun, np.size(y0), vectorized=vectorized) if real else None
         super().__init__(compiled or fun, t0, y0, t_bound, vectorized, support_complex=True)
         name = type(self).__name__
-        self.s, every = whole(name, "s", s), whole(name, "every", every)
-        k = None if k is None else whole(name, "k", k)
+        self.s, every = checked(name, "s", s, Stages), checked(name, "every", every, Count)
+        k = checked(name, "k", k, Stages | None)
         if k is not None and k < self.s:
             raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
         if interpolant not in ("step", "polynomial"):
@@ -69,7 +70,7 @@ class _LineIntegral(OdeSolver):
         if first_step is not None:
             first_step = common.validate_first_step(first_step, t0, t_bound)
         if h is not None:
-            h = length(name, h)
+            h = checked(name, "h", h, Step)
             if k is None:
                 raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
             if first_step is not None or self.max_step < np.inf:
