@@ -82,7 +82,7 @@ class Gauss(MethodBase):
             raise InputError(re.sub(r"\bHBVM\b", "Gauss", str(error))) from None
 
     @property
-    def order(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def order(self) -> int:
         """Order of convergence, 2s."""
         return 2 * self.s
 

@@ -172,7 +172,7 @@ class HBVM(MethodBase):
             )
 
     @property
-    def order(self) -> int | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def order(self) -> int | None:
         """Order of convergence, 2s; ``None`` where s is chosen."""
         return None if self.s is None else 2 * self.s
 

@@ -129,7 +129,7 @@ class LineIntegral(MethodBase):
             raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
 
     @property
-    def order(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def order(self) -> int:
         """Order of convergence, 2s."""
         return 2 * self.s
 

@@ -37,7 +37,7 @@ import inspect
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache
-from typing import Any, ClassVar, Protocol, get_type_hints, runtime_checkable
+from typing import Any, ClassVar, Protocol, cast, get_type_hints, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -285,7 +285,7 @@ class MethodBase(Called):
 
     __signature__ = _Signature()
 
-    order: ClassVar[Any] = None
+    order = cast("int | None", None)  # without an annotation, with which it would be an option
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""
 
     def __post_init__(self) -> None:

@@ -2,16 +2,14 @@
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from integrators.options import NotNegative, Share, Step
 from integrators.peers import UNTRACED
+from integrators.peers.diffrax.steps import DiffraxProgram
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-if TYPE_CHECKING:
-    from integrators.peers.diffrax.steps import DiffraxProgram
 
 NO_FMA = ("xla_cpu_max_isa=AVX ", "xla_cpu_max_isa=SSE4_2 ")
 """Settings of XLA_FLAGS, followed by a space, with which XLA has no instruction that fuses."""
@@ -59,10 +57,8 @@ class DiffraxMethod(MethodBase):
             "breaks the problem's symmetry; XLA_FLAGS=--xla_cpu_max_isa=AVX in the environment prevents it."
         )
 
-    def compile(self, system: System) -> "DiffraxProgram":
+    def compile(self, system: System) -> DiffraxProgram:
         """Have JAX compile the solve for ``system``."""
-        from integrators.peers.diffrax.steps import DiffraxProgram
-
         return DiffraxProgram(system, self)
 
 

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from integrators.peers import load
-from integrators.peers.diffrax.methods import DiffraxMethod, Dopri8
-from integrators.protocol import Array, Status
+from integrators.protocol import Array, MethodBase, Status
 from integrators.stepping import FixedStepper, ProgramBase, StepperBase
 from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.errors import InputError
@@ -21,18 +20,20 @@ class DiffraxProgram(ProgramBase):
     """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
 
     Compiled code is kept while the process lives; ``from_cache`` says whether it was there.
+    The method is one of `integrators.peers.diffrax.methods`, named as diffrax's solver.
     """
 
-    def __init__(self, system: System, method: DiffraxMethod):
+    method: Any
+
+    def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
-        reason = method.refuses(system)
+        reason = self.method.refuses(system)
         if reason is not None:
             raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
         load("diffrax", "diffrax", "jax")
         from integrators.peers.diffrax import solve
 
-        self.method, self.solve = method, solve
-        self.adaptive = isinstance(method, Dopri8) and method.h is None
+        self.solve, self.adaptive = solve, self.method.h is None
         made, self.from_cache = self.made(1)
         self.compile_seconds = 0.0 if self.from_cache else made.seconds
 
@@ -69,8 +70,7 @@ class DiffraxStepper(FixedStepper):
     samplings = (*FixedStepper.samplings, "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
-        h = float(program.method.h)  # pyright: ignore[reportAttributeAccessIssue]
-        super().__init__(y, t, h)
+        super().__init__(y, t, h := program.method.h)
         self._program, self._par = program, par
         self._restart(t, y, h)
         self._stats.evaluations = 0
@@ -148,7 +148,7 @@ class AdaptiveStepper(StepperBase):
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._program, self._par = program, par
-        self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)  # pyright: ignore[reportAttributeAccessIssue]
+        self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)
         self._stats.rejections = self._stats.evaluations = 0
         self._begin(1)
 

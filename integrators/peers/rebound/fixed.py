@@ -82,7 +82,18 @@ class _Permutation:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class WHFast(ReboundMethod):
+class FixedMethod(ReboundMethod):
+    """What REBOUND's methods of fixed step share."""
+
+    h: Step
+
+    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
+        """Return a trajectory."""
+        return ReboundStepper(program, layout, y, t, self.h)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WHFast(FixedMethod):
     """REBOUND's WHFast: the symplectic Wisdom-Holman splitting into Kepler orbits and a perturbation.
 
     Made for planets about one dominant body; `caveat` says where a problem is not that.
@@ -110,7 +121,6 @@ class WHFast(ReboundMethod):
     (``keep_unsynchronized``), so that samples do not change the trajectory.
     """
 
-    h: Step
     coordinates: Coordinates = "jacobi"
     corrector: Corrector = 0
     corrector2: bool = False
@@ -149,10 +159,6 @@ class WHFast(ReboundMethod):
         """Return which body is REBOUND's first, second, ..."""
         return list(range(n)) if self.body_order is None else list(self.body_order)
 
-    def compile(self, system: System) -> ReboundProgram:
-        """Prepare for ``system``; nothing of REBOUND's is compiled."""
-        return ReboundProgram(system, self)
-
     def caveat(self, problem: Problem) -> str | None:
         """Say why a problem is outside what WHFast was made for, although it runs."""
         system = problem.system
@@ -183,13 +189,9 @@ class WHFast(ReboundMethod):
         chosen.corrector, chosen.corrector2 = self.corrector, int(self.corrector2)
         chosen.safe_mode, chosen.keep_unsynchronized = 0, 1
 
-    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
-        """Return a trajectory."""
-        return ReboundStepper(program, layout, y, t, self.h)
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Leapfrog(ReboundMethod):
+class Leapfrog(FixedMethod):
     """REBOUND's leapfrog, drift-kick-drift, and its compositions of order 4, 6 and 8; symplectic.
 
     Parameters
@@ -200,24 +202,15 @@ class Leapfrog(ReboundMethod):
         Order of convergence; a step takes 1, 3, 9 or 17 force evaluations.
     """
 
-    h: Step
-    order: Literal[2, 4, 6, 8] = 2  # pyright: ignore[reportIncompatibleVariableOverride]
+    order: Literal[2, 4, 6, 8] = 2
 
     citation = REBOUND + LEAPFROG
     family = "splitting"
     to_end = "land"
 
-    def compile(self, system: System) -> ReboundProgram:
-        """Compile the forces of ``system``, unless REBOUND has them."""
-        return ReboundProgram(system, self)
-
     def set_up(self, simulation: Any) -> None:
         """Choose the leapfrog and its order."""
         choose(simulation, "leapfrog").order = self.order
-
-    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
-        """Return a trajectory."""
-        return ReboundStepper(program, layout, y, t, self.h)
 
 
 class ReboundStepper(FixedStepper):

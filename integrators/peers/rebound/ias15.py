@@ -12,7 +12,7 @@ from integrators.protocol import Array, Status
 from integrators.stepping import StepperBase
 from integrators.watchdog import CRAWL_STEPS
 from problems.errors import InputError
-from problems.problem import Problem, System
+from problems.problem import Problem
 
 Mode = Literal["prs23", "global", "individual", "aarseth85"]
 
@@ -81,10 +81,6 @@ class IAS15(ReboundMethod):
         super().__post_init__()
         if self.h is None and self.epsilon == 0.0:
             raise InputError("IAS15 with epsilon=0 takes fixed steps; give their length, h=...")
-
-    def compile(self, system: System) -> ReboundProgram:
-        """Compile the callbacks for ``system``."""
-        return ReboundProgram(system, self)
 
     def caveat(self, problem: Problem) -> str | None:
         """Say where the step criterion goes by particles that the problem does not have."""

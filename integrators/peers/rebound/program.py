@@ -57,6 +57,10 @@ class ReboundMethod(MethodBase):
             )
         return None
 
+    def compile(self, system: System) -> "ReboundProgram":
+        """Compile the callbacks, and the forces of ``system`` unless REBOUND has them."""
+        return ReboundProgram(system, self)
+
     def set_up(self, simulation: Any) -> None:
         """Choose REBOUND's integrator and its options; the name first, which resets the options."""
         raise NotImplementedError

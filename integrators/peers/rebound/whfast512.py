@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
-from integrators.options import Step
 from integrators.peers import load
-from integrators.peers.rebound.fixed import WHFAST, ReboundStepper, WHFast
-from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
+from integrators.peers.rebound.fixed import WHFAST, FixedMethod, ReboundStepper, WHFast
+from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, calls, choose
 from integrators.protocol import Array
 from problems.problem import Problem, System
 
@@ -25,7 +24,7 @@ ROOM = 64
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class WHFast512(ReboundMethod):
+class WHFast512(FixedMethod):
     """REBOUND's WHFast512: the Wisdom-Holman splitting in Jacobi coordinates, on AVX-512 registers.
 
     Parameters
@@ -44,7 +43,6 @@ class WHFast512(ReboundMethod):
     correction is off. `WHFast.caveat` says where a problem is outside its domain.
     """
 
-    h: Step
     corrector: Literal[0, 17] = 0
 
     order = 2  # in h, at a fixed perturbation
