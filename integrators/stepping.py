@@ -2,7 +2,7 @@
 
 `FixedStep` is for a method with a fixed step: it says how it takes steps, and all the rest of
 `integrators.protocol` comes with it. `ProgramBase` and `StepperBase` are for methods that choose
-their steps; `FixedStepper` for libraries that hold the state of a fixed-step integration themselves.
+their steps; `FixedStepper` also for libraries that hold the state of a fixed-step integration themselves.
 """
 
 import math
@@ -42,6 +42,7 @@ class ProgramBase:
     A subclass implements `stepper`.
     """
 
+    method: Any
     compile_seconds: float = 0.0
     from_cache: bool | None = None
 
@@ -248,15 +249,26 @@ class FixedStepper(StepperBase):
     ``"land"``
         The last step before each time is shortened onto it; steps count from there then.
 
-    A subclass implements `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
+    Its state is one array, which ``program.march``, a `March`, moves on. For a library that holds the
+    state itself a subclass has its own `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
     ``"land"``), `_restart`, `_save_steps` and `_load_steps`.
+
+    Parameters
+    ----------
+    program : ProgramBase
+        Its ``method`` has the step ``h``.
+    y, par, t
+        A start, checked, and the stepper's own.
     """
 
     samplings = ("side", "steps", "land")
 
-    def __init__(self, y: Array, t: float, h: float):
+    def __init__(self, program: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
-        self._t0, self._n, self._h = t, 0, h
+        self._program, self._par, self._here = program, par, y.copy()
+        self._t0, self._n, self._h = t, 0, program.method.h
+        if getattr(program.method, "evaluations", None) is not None:
+            self._stats.evaluations = 0
 
     def _time(self) -> float:
         return self._t0 + self._n * self._h
@@ -326,31 +338,42 @@ class FixedStepper(StepperBase):
 
     def _march(self, count: int) -> None:
         """Take ``count`` own steps."""
-        raise NotImplementedError
+        end = self._n + count
+        for n in range(self._n, end, STEPS_AT_ONCE):
+            t = self._t0 + n * self._h
+            self._program.march(t, self._h, min(STEPS_AT_ONCE, end - n), self._here, self._par)
+        self._evaluated(count)
+
+    def _evaluated(self, steps: int) -> None:
+        if (each := self._program.method.evaluations) is not None:
+            self._stats.evaluations = (self._stats.evaluations or 0) + steps * each
 
     def _state(self) -> Array:
         """Return a copy of the state at the last own step."""
-        raise NotImplementedError
+        return self._here.copy()
 
     def _aside(self, part: float) -> Array:
         """Return the state a throw-away step of length ``part`` after the last own step."""
-        raise NotImplementedError
+        y = self._here.copy()
+        self._program.march(self._time(), part, 1, y, self._par)
+        return y
 
     def _shorten(self, part: float) -> None:
         """Take one step of length ``part`` after the last own step."""
-        raise NotImplementedError
+        self._here = self._aside(part)
+        self._evaluated(1)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         """Begin anew at ``t`` with steps of ``h``."""
-        raise NotImplementedError
+        self._here = y.copy()
 
     def _save_steps(self) -> Any:
-        """Return a copy of the library's own state."""
-        raise NotImplementedError
+        """Return a copy of what the next steps depend on."""
+        return self._here.copy()
 
     def _load_steps(self, steps: Any) -> None:
         """Take back what `_save_steps` returned."""
-        raise NotImplementedError
+        self._here = steps.copy()
 
 
 class March(Protocol):
@@ -411,52 +434,11 @@ class FixedStepProgram(ProgramBase):
     def __init__(self, system: System, method: FixedStep):
         super().__init__(system, method)
         started = perf_counter()
-        self.march, self.h, self.evaluations = method.march(system), method.h, method.evaluations
+        self.march = method.march(system)
         # No step at all: what numba compiles at the first call belongs here.
         self.march(0.0, method.h, 0, np.zeros(system.dim), system.pack())
         self.compile_seconds = perf_counter() - started
 
-    def stepper(self, y: Array, par: Array, t: float) -> "MarchingStepper":
+    def stepper(self, y: Array, par: Array, t: float) -> FixedStepper:
         """Return a trajectory."""
-        return MarchingStepper(self, y, par, t)
-
-
-class MarchingStepper(FixedStepper):
-    """A trajectory of a `FixedStep` method."""
-
-    def __init__(self, program: FixedStepProgram, y: Array, par: Array, t: float):
-        super().__init__(y, t, program.h)
-        self._program, self._par, self._here = program, par, y.copy()
-        self._stats.evaluations = None if program.evaluations is None else 0
-
-    def _march(self, count: int) -> None:
-        end = self._n + count
-        for n in range(self._n, end, STEPS_AT_ONCE):
-            t = self._t0 + n * self._h
-            self._program.march(t, self._h, min(STEPS_AT_ONCE, end - n), self._here, self._par)
-        self._evaluated(count)
-
-    def _evaluated(self, steps: int) -> None:
-        if (each := self._program.evaluations) is not None:
-            self._stats.evaluations = (self._stats.evaluations or 0) + steps * each
-
-    def _state(self) -> Array:
-        return self._here.copy()
-
-    def _aside(self, part: float) -> Array:
-        y = self._here.copy()
-        self._program.march(self._time(), part, 1, y, self._par)
-        return y
-
-    def _shorten(self, part: float) -> None:
-        self._here = self._aside(part)
-        self._evaluated(1)
-
-    def _restart(self, t: float, y: Array, h: float) -> None:
-        self._here = y.copy()
-
-    def _save_steps(self) -> Array:
-        return self._here.copy()
-
-    def _load_steps(self, steps: Array) -> None:
-        self._here = steps.copy()
+        return FixedStepper(self, y, par, t)

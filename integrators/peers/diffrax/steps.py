@@ -23,8 +23,6 @@ class DiffraxProgram(ProgramBase):
     The method is one of `integrators.peers.diffrax.methods`, named as diffrax's solver.
     """
 
-    method: Any
-
     def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
         reason = self.method.refuses(system)
@@ -70,10 +68,8 @@ class DiffraxStepper(FixedStepper):
     samplings = (*FixedStepper.samplings, "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
-        super().__init__(y, t, h := program.method.h)
-        self._program, self._par = program, par
-        self._restart(t, y, h)
-        self._stats.evaluations = 0
+        super().__init__(program, y, par, t)
+        self._restart(t, y, self._h)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         self._way = _Direction(self, self._program, 1 if h > 0.0 else -1)
@@ -90,8 +86,7 @@ class DiffraxStepper(FixedStepper):
             t, y = end, np.asarray(found) if arrived else np.full(y.size, np.nan)
             states[i] = y
             self._stats.steps += int(accepted)
-            work = int(accepted) * self._program.method.evaluations
-            self._stats.evaluations = (self._stats.evaluations or 0) + work
+            self._evaluated(int(accepted))
             self._t0, self._n, self._states, self._inner = t, 0, y, None
             if not math.isfinite(y.sum()):
                 return grid[: i + 1], states[: i + 1]
@@ -116,7 +111,7 @@ class DiffraxStepper(FixedStepper):
         end = self._n + count
         for n in range(self._n, end, CHUNK):
             self._states, self._inner = self._solve(self._t0, self._h, n, min(n + CHUNK, end))
-        self._stats.evaluations = (self._stats.evaluations or 0) + count * self._program.method.evaluations
+        self._evaluated(count)
 
     def _state(self) -> Array:
         return self._states.copy()
@@ -126,7 +121,7 @@ class DiffraxStepper(FixedStepper):
 
     def _shorten(self, part: float) -> None:
         self._states, self._inner = self._solve(self._time(), part, 0, 1)
-        self._stats.evaluations = (self._stats.evaluations or 0) + self._program.method.evaluations
+        self._evaluated(1)
 
     def _save_steps(self) -> Any:
         # JAX's arrays are immutable.

@@ -89,7 +89,7 @@ class FixedMethod(ReboundMethod):
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
         """Return a trajectory."""
-        return ReboundStepper(program, layout, y, t, self.h)
+        return ReboundStepper(program, layout, y, t)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -216,11 +216,11 @@ class Leapfrog(FixedMethod):
 class ReboundStepper(FixedStepper):
     """A trajectory with fixed steps; see `integrators.stepping.FixedStepper` for the sampling."""
 
-    def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float, h: float):
-        super().__init__(y, t, h)
-        self._program, self._layout = program, layout
+    def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float):
+        super().__init__(program, y, layout.par, t)
+        self._layout = layout
         self._block, self._spare = (program.hooks.Block(layout.numbers) for _ in range(2))
-        self._restart(t, y, h)
+        self._restart(t, y, self._h)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         simulation = self._program.simulation(self._layout, t, y)

@@ -74,7 +74,7 @@ class WHFast512(FixedMethod):
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "Stepper512":
         """Return a trajectory."""
-        return Stepper512(program, layout, y, t, self.h)
+        return Stepper512(program, layout, y, t)
 
 
 class ScaledProgram(ReboundProgram):
