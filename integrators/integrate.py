@@ -86,7 +86,7 @@ def integrate(
                 "events are those of the method's own steps, which sample='land' changes; use 'side'."
             )
         found = search(problem, method, program, named(events), float(check_times(grid, problem.t0)[-1]))
-        if found.terminal:
+        if found.status is Status.EVENT:
             grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
     try:
         stepper = program.start(problem.y0, problem.par, problem.t0)
@@ -126,7 +126,7 @@ def _with_events(solution: Solution, found: "Found") -> Solution:
     solution = replace(solution, stats=stats, events=found.events)
     if found.status is Status.FINISHED or solution.status.failed:
         return solution
-    stop = found.t_stop if found.terminal else solution.t_stop
+    stop = found.t_stop if found.status is Status.EVENT else solution.t_stop
     return replace(solution, status=found.status, reason=found.reason, t_stop=stop, error=found.error)
 
 

@@ -16,6 +16,7 @@ from collections.abc import Callable
 
 from integrators.protocol import MethodBase
 from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit, refuses_other_checkpoints
+from integrators.testing.convergence import measured_order
 from integrators.testing.description import (
     accepts_gives_a_reason,
     describes_itself,
@@ -23,7 +24,6 @@ from integrators.testing.description import (
     refuses_unknown_options,
 )
 from integrators.testing.exercises import blow_up, pendulum, two_bodies
-from integrators.testing.order import measured_order
 from integrators.testing.trajectory import (
     ENERGY_BOUND,
     energy_stays_sane,

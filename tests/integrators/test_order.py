@@ -5,7 +5,7 @@ import pytest
 
 import integrators
 from integrators import HBVM, Gauss, testing
-from integrators.testing.order import PLATEAU
+from integrators.testing.convergence import PLATEAU
 
 E = 0.3
 SPAN = 4.0
