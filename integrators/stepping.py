@@ -7,9 +7,10 @@ their steps; `FixedStepper` also for libraries that hold the state of a fixed-st
 
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, ClassVar, Protocol, TypeGuard
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -409,7 +410,7 @@ class FixedStep(MethodBase):
 
     Examples
     --------
-    ``examples/integrator`` has Yoshida's composition of order 6 in forty lines.
+    ``examples/integrator`` has Yoshida's composition of order 6 in about forty lines.
     """
 
     h: Step
@@ -419,7 +420,8 @@ class FixedStep(MethodBase):
     def march(self, system: System) -> March:
         """Return the function that takes steps of ``system``, compiled if it shall be fast.
 
-        It must depend on nothing but its arguments: steps aside and checkpoints rely on that.
+        It must depend on nothing but its arguments: steps aside and checkpoints rely on that. It is
+        kept while ``system`` lives, and serves every ``h``.
         """
         raise NotImplementedError
 
@@ -428,15 +430,21 @@ class FixedStep(MethodBase):
         return FixedStepProgram(system, self)
 
 
+_marches: WeakKeyDictionary[System, dict[FixedStep, March]] = WeakKeyDictionary()
+
+
 class FixedStepProgram(ProgramBase):
     """A `FixedStep` method compiled for one system."""
 
     def __init__(self, system: System, method: FixedStep):
         super().__init__(system, method)
         started = perf_counter()
-        self.march = method.march(system)
+        known, key = _marches.setdefault(system, {}), replace(method, h=1.0)
+        self.from_cache = key in known
+        self.march = known[key] if self.from_cache else method.march(system)
         # No step at all: what numba compiles at the first call belongs here.
         self.march(0.0, method.h, 0, np.zeros(system.dim), system.pack())
+        known[key] = self.march
         self.compile_seconds = perf_counter() - started
 
     def stepper(self, y: Array, par: Array, t: float) -> FixedStepper:
