@@ -1,38 +1,16 @@
-"""Calls that a function does not take, and values that an annotation does not allow, told in one sentence."""
+"""Arguments that a function does not take, told in one sentence."""
 
 import dataclasses
 import functools
 import inspect
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, ParamSpec, Self, TypeVar, Union, get_args, get_origin
+from typing import Any, ParamSpec, Self, TypeVar
 
+from problems import checks
 from problems.errors import InputError, shown, unknown
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-
-@dataclass(frozen=True)
-class Must:
-    """What a value must be: as a message says it, and as it is tested.
-
-    It belongs to an annotation: ``Annotated[float, Must("a positive number", lambda x: x > 0)]``.
-    """
-
-    be: str
-    holds: Callable[[Any], bool] = lambda value: True
-
-
-Positive = Annotated[float, Must("a positive number", lambda x: x > 0)]
-"""A finite number above 0."""
-
-
-def at_least(least: int) -> Must:
-    """Require a whole number that is not smaller: ``Annotated[int, at_least(2)]``."""
-    return Must(f"a whole number of at least {least}", lambda n: n >= least)
 
 
 def check(
@@ -120,10 +98,7 @@ def bound(
     name : str
         What is called.
     signature : inspect.Signature
-        What it takes. ``float`` is a finite number, ``int`` a whole one, ``str`` a text,
-        ``Sequence[float]`` a list of finite numbers (returned as a tuple of floats),
-        ``Literal[...]`` one of some words or numbers; each may be ``| None``, and
-        ``Annotated`` with `Must`. Other annotations allow everything.
+        What it takes; `problems.checks.checked` says what annotations it knows.
     values, options
         What it is given by place and by name.
 
@@ -136,53 +111,7 @@ def bound(
     call = signature.bind(*values, **options)
     call.apply_defaults()
     for key, value in call.arguments.items():
-        call.arguments[key] = _allowed(name, key, value, signature.parameters[key].annotation)
+        found = checks.checked(name, key, value, signature.parameters[key].annotation)
+        # A call prints as it was made: e=0, not e=0.0.
+        call.arguments[key] = value if type(value) in (int, float) else found
     return call
-
-
-def _is_number(value: Any) -> bool:
-    """Whether a value is a finite number that a double can hold."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer that no double holds
-        return False
-
-
-_KINDS = {
-    float: Must("a finite number", _is_number),
-    int: Must("a whole number", lambda value: isinstance(value, int) and not isinstance(value, bool)),
-    str: Must("text", lambda value: isinstance(value, str)),
-    Sequence[float]: Must(
-        "a list of finite numbers",
-        lambda value: isinstance(value, list | tuple) and all(map(_is_number, value)),
-    ),
-}
-
-
-def _allowed(name: str, key: str, value: Any, annotation: Any) -> Any:
-    """Return an argument as the function gets it, or refuse it."""
-    if get_origin(annotation) in (Union, UnionType) and NoneType in get_args(annotation):
-        if value is None:
-            return None
-        others = [option for option in get_args(annotation) if option is not NoneType]
-        annotation = others[0] if len(others) == 1 else Any
-    if get_origin(annotation) is Literal:
-        return _one_of(name, key, value, get_args(annotation))
-    kind, *conditions = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
-    conditions = [must for must in conditions if isinstance(must, Must)]
-    if kind in _KINDS:
-        conditions.append(_KINDS[kind])
-    # The kind is tested first, and the narrowest condition is the one that is told.
-    if not all(must.holds(value) for must in reversed(conditions)):
-        raise InputError(f"{key}={shown(value)} of {name} must be {conditions[0].be}.")
-    return tuple(map(float, value)) if kind == Sequence[float] else value
-
-
-def _one_of(name: str, key: str, value: Any, known: tuple[Any, ...]) -> Any:
-    if any(type(value) is type(word) and value == word for word in known):
-        return value
-    if all(isinstance(word, str) for word in known):
-        raise unknown(f"{key} of {name}", value, known)
-    raise InputError(f"{key}={shown(value)} of {name} must be one of {', '.join(map(str, known))}.")

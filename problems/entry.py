@@ -89,7 +89,7 @@ def entry(
     Examples
     --------
     >>> from problems import Hamiltonian, Problem
-    >>> from problems.calls import Positive
+    >>> from problems.checks import Positive
     >>> @entry(title="a rotor", references=(), notes="Turns.")
     ... def rotor(*, p: Positive = 1.0, t_end: float = 10.0) -> Problem:
     ...     return Problem(Hamiltonian(lambda p: p[0] ** 2 / 2, dof=1), q0=[0.0], p0=[p], t_end=t_end)

@@ -75,7 +75,7 @@ decorator.
 
 ```python
 from problems import Hamiltonian, Problem
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import entry
 from problems.picture import Phase
 
@@ -96,7 +96,7 @@ def quartic(*, k: Positive = 1.0, q: float = 1.0, t_end: float = 100.0) -> Probl
     return Problem(system, q0=[q], p0=[0.0], parameters={"k": k}, t_end=t_end)
 ```
 
-A package names it under the entry point group `hbvm_bench.problems`, as `examples/plugin` does
+A package names it under the entry point group `hbvm_bench.problems`, as `examples/integrator` does
 (`quartic = "package.module:quartic"`); in this repository it is the file `problems/catalogue/quartic.py` and
 nothing else, with `expected=` for the tests.
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters, Law, Result, Timing
-from integrators.integrate import Solution
 from integrators.protocol import Status
+from integrators.solution import Solution
 from problems import emit
 from problems.problem import Problem
 

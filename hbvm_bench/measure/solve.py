@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.integrate import Solution
 from integrators.protocol import MethodBase, Program, Status
+from integrators.solution import Solution
 from problems.problem import Problem
 
 

@@ -32,8 +32,8 @@ from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, TimingRound
 from hbvm_bench.store.store import NAME, encode_series
-from integrators.integrate import Solution
 from integrators.protocol import Program, Status
+from integrators.solution import Solution
 from problems.errors import InputError
 from problems.systems.base import System
 

@@ -5,8 +5,8 @@ from random import Random
 from typing import Annotated
 
 from problems import limits
-from problems.calls import Positive, at_least
 from problems.catalogue import _gravity as gravity
+from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Orbits
 from problems.problem import Problem

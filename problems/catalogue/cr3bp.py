@@ -11,7 +11,7 @@ of 2 loops, with another mass of the Moon, as in Shampine and Gordon's.
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from problems.calls import Must
+from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.picture import Plane
 from problems.problem import Problem

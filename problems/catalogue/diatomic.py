@@ -7,7 +7,7 @@ Here q is the place of one atom with respect to the other, and m their reduced m
 
 from typing import Any
 
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
 from problems.problem import Problem

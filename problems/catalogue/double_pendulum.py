@@ -12,7 +12,7 @@ Lagrangian.
 
 from typing import Any
 
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
 from problems.problem import Problem

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
-from problems.calls import Must
 from problems.catalogue._formula import COORDINATE, FUNCTIONS, NAME, Formula
+from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.errors import InputError, shown, unknown
 from problems.picture import Phase

@@ -10,8 +10,8 @@ import math
 from typing import Annotated, Any, Literal
 
 from problems import limits
-from problems.calls import Positive, at_least
 from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Lattice
 from problems.problem import Problem

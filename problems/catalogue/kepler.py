@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.calls import Must
+from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.errors import InputError
 from problems.picture import Plane

@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import Annotated, Any
 
 from problems import limits
-from problems.calls import Positive, at_least
 from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Orbits
 from problems.problem import Problem

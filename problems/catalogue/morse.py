@@ -7,7 +7,7 @@ Here q is the distance of the atoms less its value at rest, and m their reduced 
 
 from typing import Any
 
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.errors import InputError
 from problems.picture import Phase

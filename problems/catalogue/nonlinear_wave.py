@@ -3,9 +3,9 @@
 from typing import Annotated, Any
 
 from problems import limits
-from problems.calls import at_least
 from problems.catalogue import _starts as starts
 from problems.catalogue import _waves as waves
+from problems.checks import at_least
 from problems.entry import Expected, entry
 from problems.picture import Lattice
 from problems.problem import Problem

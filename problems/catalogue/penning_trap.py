@@ -8,7 +8,7 @@ octupole c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2).
 
 from typing import Any
 
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.errors import InputError
 from problems.picture import Plane

@@ -11,7 +11,7 @@ coefficients are 0: the periodic orbits around the origin end at a loop through 
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from problems.calls import Must
+from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.picture import Phase
 from problems.problem import Problem

@@ -12,7 +12,7 @@ give E and L as in the second source.
 from decimal import Decimal, localcontext
 from typing import Annotated, Any
 
-from problems.calls import Must
+from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.errors import InputError, shown
 from problems.picture import Plane

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calls import Must, Positive
+from problems.checks import Must, Positive
 from problems.entry import Expected, entry
 from problems.picture import Curves
 from problems.problem import Problem

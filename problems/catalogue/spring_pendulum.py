@@ -9,7 +9,7 @@ which the spring oscillates twice as fast as it swings.
 import math
 from typing import Any
 
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
 from problems.problem import Problem

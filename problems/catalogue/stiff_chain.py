@@ -11,7 +11,7 @@ their (scaled) lengths. In the book: m = 3, omega = 50.
 from typing import Annotated, Any
 
 from problems import limits
-from problems.calls import Positive, at_least
+from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Curves
 from problems.problem import Problem

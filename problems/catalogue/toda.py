@@ -10,8 +10,8 @@ squared off-diagonals exp(q_i - q_{i+1}).
 from typing import Annotated, Any
 
 from problems import limits
-from problems.calls import Positive, at_least
 from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
 from problems.entry import Expected, entry
 from problems.picture import Lattice
 from problems.problem import Problem

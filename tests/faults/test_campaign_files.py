@@ -86,7 +86,7 @@ METHODS\nmethods = [{use = "HBVM(kk=3)"}]                    => HBVM(kk=3): unkn
 METHODS\nmethods = [{use = "HBVM(1,2)"}]                     => cannot read 'HBVM(1,2)': arguments are given
 METHODS\nmethods = [{use = "Gauss(h=0.1)"}]                  => Gauss(h=0.1): Gauss needs s; give a value as
 METHODS\nmethods = [{use = "HBVM(k=2000,s=2,h=0.1)"}]        => the limit is
-METHODS\nmethods = [{use = "HBVM(k=4,s=2,h=-1)"}]            => HBVM(k=4, s=2, h=-1): HBVM needs a finite
+METHODS\nmethods = [{use = "HBVM(k=4,s=2,h=-1)"}]            => HBVM(k=4, s=2, h=-1): h=-1 of HBVM must be
 METHODS\nmethods = [{use = "HBVM(k=4,s=2,h={h})"}]           => unknown value in HBVM(k=4,s=2,h={h}) 'h';
 METHODS\nmethods = [{use = "HBVM()"}, {use = "HBVM()"}]      => HBVM(tol=3e-16) on kepler(e=0.6) is given
 METHODS\nmethods = [{use = "HBVM()", settings = "best"}]     => unknown settings 'best'; known: as published,

@@ -24,8 +24,8 @@ from hbvm_bench.run.loop import is_kept
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.store.store import NAME_LENGTH, Index, Store, decode_series, encode_series
-from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 
 from .fault import Fault, is_met, sentence
 

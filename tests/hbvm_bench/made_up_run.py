@@ -12,8 +12,8 @@ from hbvm_bench.measure.metrics import evaluate, guard_violation
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index
-from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 
 HOSTILE = '<script>alert("1")</script> | `code` *bold* \\ [x](javascript:1) ' + "very long " * 50 + "\n# head"
 METHODS = (

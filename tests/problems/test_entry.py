@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from problems import Hamiltonian, InputError, Problem, UnknownNameError
-from problems.calls import Must, Positive, at_least
+from problems.checks import Must, Positive, at_least
 from problems.entry import entry
 
 Pair = Annotated[Sequence[float], Must("a list of 2 finite numbers", lambda values: len(values) == 2)]

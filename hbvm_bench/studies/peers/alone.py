@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from integrators.peers.options import load
+from integrators.peers import load
 from integrators.protocol import Array, MethodBase
 from problems import emit
 from problems.problem import Problem

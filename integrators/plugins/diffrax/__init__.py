@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from integrators.legendre import polynomials, tables
-from integrators.peers.options import load
+from integrators.peers import load
 from problems.errors import InputError
 
 load("diffrax", "diffrax", "equinox", "jax", "lineax", "optimistix")

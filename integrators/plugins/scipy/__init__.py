@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 
-from integrators.options import length, whole
+from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
+from problems.checks import checked
 from problems.errors import InputError
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
@@ -73,8 +74,8 @@ class HBVM(OdeSolver):
     h : float, optional
         Length of all steps but the last, > 0, whatever the tolerances; k is then to be given.
     every : int
-        Of a compiled field's steps every which is one for SciPy. A step of the kernel costs less
-        than SciPy's loop over them; states between them are still to be had by ``t_eval`` and
+        How many steps of the kernel SciPy sees as one, for compiled fields: SciPy's loop costs more
+        than such a step does. States between them are still to be had by ``t_eval`` and
         ``dense_output``, but an event that happens and is undone again within one is missed.
     interpolant : {"step", "polynomial"}
         How states between the steps (``t_eval``, ``dense_output``, ``events``) are made: by
@@ -103,15 +104,15 @@ class HBVM(OdeSolver):
         real = not np.iscomplexobj(y0)
         compiled = recognised(fun, np.size(y0), vectorized=vectorized) if real else None
         super().__init__(compiled or fun, t0, y0, t_bound, vectorized, support_complex=True)
-        self.s, every = whole(name, "s", s), whole(name, "every", every)
-        k = None if k is None else whole(name, "k", k)
+        self.s, every = checked(name, "s", s, Stages), checked(name, "every", every, Count)
+        k = checked(name, "k", k, Stages | None)
         if k is not None and k < self.s:
             raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
         if interpolant not in ("step", "polynomial"):
             raise InputError(f"interpolant must be 'step' or 'polynomial', not {interpolant!r}.")
         self._bound(max_step, first_step, rtol, atol)
         if h is not None:
-            h = length(name, h)
+            h = checked(name, "h", h, Step)
             if k is None:
                 raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
             if first_step is not None or self.max_step < np.inf:

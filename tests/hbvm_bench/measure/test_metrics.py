@@ -13,8 +13,8 @@ from hbvm_bench.measure.metrics import METRICS, TIMING_KEYS, evaluate, find
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.records import Compile, Timing, TimingRound
 from hbvm_bench.summaries.rows import HEADLINE, RANKED_BY
-from integrators.integrate import Solution
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 from problems.errors import InputError
 
 

@@ -6,7 +6,7 @@ H(q, p) = p^2/2 - q^2/2 + q^4/4
 import math
 
 from problems import Hamiltonian, Problem
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import entry
 from problems.picture import Phase
 
