@@ -162,5 +162,5 @@ def test_a_problem_that_is_not_separable_and_a_bad_step_are_refused_in_a_sentenc
     )
     with pytest.raises(problems.InputError, match=r"cannot integrate .*it needs H = sum of"):
         integrate(rotor, yoshida(h=0.1))
-    with pytest.raises(problems.InputError, match="h=-1 of Yoshida6 must be a step above 0"):
+    with pytest.raises(problems.InputError, match="h=-1 of Yoshida6 must be a finite step above 0"):
         yoshida(h=-1)

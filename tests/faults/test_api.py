@@ -28,27 +28,27 @@ HBVM(k=-4, s=2, h=.1)                                        | k=-4 of HBVM must
 HBVM(k=0, s=0, h=.1)                                         | k=0 of HBVM must be a whole number of at least
 HBVM(k=2000, s=2, h=.1)                                      | HBVM_BENCH_MAX_STAGES
 HBVM(k=huge, s=2, h=.1)                                      | HBVM_BENCH_MAX_STAGES
-HBVM(k=4, s=2, h='0.1')                                      | h='0.1' of HBVM must be a finite number, a ste
-HBVM(k=4, s=2, h=nan)                                        | h=nan of HBVM must be a finite number, a step
-HBVM(k=4, s=2, h=inf)                                        | h=inf of HBVM must be a finite number, a step
-HBVM(k=4, s=2, h=-.1)                                        | h=-0.1 of HBVM must be a step above 0; the sig
-HBVM(k=4, s=2, h=0)                                          | h=0 of HBVM must be a step above 0; the sign o
-HBVM(k=4, s=2, h=True)                                       | h=True of HBVM must be a finite number, a step
-HBVM(k=4, s=2, h=huge)                                       | h=about 1e400 of HBVM must be a finite number,
-HBVM(k=4, s=2, h=[.1])                                       | h=[0.1] of HBVM must be a finite number, a ste
-HBVM(k=4, s=2, h=np.array([.1, .2]))                         | h=array([0.1, 0.2]) of HBVM must be a finite n
-HBVM(k=4, s=2, h=np.array([.1]))                             | h=array([0.1]) of HBVM must be a finite number
-HBVM(k=4, s=2, h=1j)                                         | h=1j of HBVM must be a finite number, a step a
+HBVM(k=4, s=2, h='0.1')                                      | h='0.1' of HBVM must be a finite step above 0;
+HBVM(k=4, s=2, h=nan)                                        | h=nan of HBVM must be a finite step above 0; t
+HBVM(k=4, s=2, h=inf)                                        | h=inf of HBVM must be a finite step above 0; t
+HBVM(k=4, s=2, h=-.1)                                        | h=-0.1 of HBVM must be a finite step above 0;
+HBVM(k=4, s=2, h=0)                                          | h=0 of HBVM must be a finite step above 0; the
+HBVM(k=4, s=2, h=True)                                       | h=True of HBVM must be a finite step above 0;
+HBVM(k=4, s=2, h=huge)                                       | h=about 1e400 of HBVM must be a finite step ab
+HBVM(k=4, s=2, h=[.1])                                       | h=[0.1] of HBVM must be a finite step above 0;
+HBVM(k=4, s=2, h=np.array([.1, .2]))                         | h=array([0.1, 0.2]) of HBVM must be a finite s
+HBVM(k=4, s=2, h=np.array([.1]))                             | h=array([0.1]) of HBVM must be a finite step a
+HBVM(k=4, s=2, h=1j)                                         | h=1j of HBVM must be a finite step above 0; th
 HBVM(k=4, h=.1)                                              | HBVM needs k and s, or neither of them; give
 HBVM(h=.1)                                                   | HBVM needs k and s with a fixed step, h=0.1;
 HBVM(tol=0)                                                  | tol=0 of HBVM must be a tolerance from 2.2e-16
 HBVM(tol=1)                                                  | tol=1 of HBVM must be a tolerance from 2.2e-16
 HBVM(tol=-1e-9)                                              | tol=-1e-09 of HBVM must be a tolerance from 2.
 HBVM(tol=1e-17)                                              | tol=1e-17 of HBVM must be a tolerance from 2.2
-HBVM(tol='1e-9')                                             | tol='1e-9' of HBVM must be a finite number, a
-HBVM(tol=nan)                                                | tol=nan of HBVM must be a finite number, a tol
-HBVM(tol=huge)                                               | tol=about 1e400 of HBVM must be a finite numbe
-HBVM(tol=[1e-9])                                             | tol=[1e-09] of HBVM must be a finite number, a
+HBVM(tol='1e-9')                                             | tol='1e-9' of HBVM must be a tolerance from 2.
+HBVM(tol=nan)                                                | tol=nan of HBVM must be a tolerance from 2.2e-
+HBVM(tol=huge)                                               | tol=about 1e400 of HBVM must be a tolerance fr
+HBVM(tol=[1e-9])                                             | tol=[1e-09] of HBVM must be a tolerance from 2
 HBVM(k=1, s=1, tol=1e-9)                                     | HBVM needs k > 1 with a tolerance: one stage
 HBVM(solver='newtn')                                         | unknown solver of HBVM 'newtn'; did you mean '
 HBVM(solver=None)                                            | unknown solver of HBVM None; known: auto, blen
@@ -77,12 +77,12 @@ LineIntegral(k=400, s=2, h=.1, invariants=['energy'])        | HBVM_BENCH_MAX_ST
 """
 
 PEERS = r"""
-Taylor(tol=0)                                                | tol=0 of Taylor must be a finite number, 0 < t
-Taylor(tol=-1)                                               | tol=-1 of Taylor must be a finite number, 0 <
-Taylor(tol='a')                                              | tol='a' of Taylor must be a finite number, 0 <
-Taylor(tol=None)                                             | tol=None of Taylor must be a finite number, 0
-Taylor(tol=nan)                                              | tol=nan of Taylor must be a finite number, 0 <
-Taylor(tol=huge)                                             | tol=about 1e400 of Taylor must be a finite num
+Taylor(tol=0)                                                | tol=0 of Taylor must be a number between 0 and
+Taylor(tol=-1)                                               | tol=-1 of Taylor must be a number between 0 an
+Taylor(tol='a')                                              | tol='a' of Taylor must be a number between 0 a
+Taylor(tol=None)                                             | tol=None of Taylor must be a number between 0
+Taylor(tol=nan)                                              | tol=nan of Taylor must be a number between 0 a
+Taylor(tol=huge)                                             | tol=about 1e400 of Taylor must be a number bet
 Taylor(tol=1e-15, compact_mode='yes')                        | compact_mode='yes' of Taylor must be True or F
 Taylor(tol=1e-15, compact_mode=None)                         | compact_mode=None of Taylor must be True or Fa
 Taylor(high_accuracy=2)                                      | high_accuracy=2 of Taylor must be True or Fals
@@ -90,21 +90,21 @@ Taylor(fast_math=np.array([1,0]))                            | fast_math=array([
 Taylor(fast_math=[])                                         | fast_math=[] of Taylor must be True or False.
 Taylor(toll=1)                                               | unknown option of Taylor 'toll'; did you mean
 Taylor(1e-15)                                                | Taylor takes its options by name, not 1e-15;
-IAS15(epsilon=-1)                                            | epsilon=-1 of IAS15 must be a finite number, 0
-IAS15(epsilon='x')                                           | epsilon='x' of IAS15 must be a finite number,
-IAS15(epsilon=nan)                                           | epsilon=nan of IAS15 must be a finite number,
+IAS15(epsilon=-1)                                            | epsilon=-1 of IAS15 must be a finite number of
+IAS15(epsilon='x')                                           | epsilon='x' of IAS15 must be a finite number o
+IAS15(epsilon=nan)                                           | epsilon=nan of IAS15 must be a finite number o
 IAS15(mode='globl')                                          | unknown mode of IAS15 'globl'; did you mean
 IAS15(mode=1)                                                | unknown mode of IAS15 1; known: aarseth85,
 IAS15(mode=np.array(['global','prs23']))                     | unknown mode of IAS15 array(['global',
-IAS15(min_dt=-1)                                             | min_dt=-1 of IAS15 must be a finite number, 0
-IAS15(min_dt=inf)                                            | min_dt=inf of IAS15 must be a finite number, 0
-IAS15(h=-1)                                                  | h=-1 of IAS15 must be a step above 0; the sign
-IAS15(h='a')                                                 | h='a' of IAS15 must be a finite number, a step
-IAS15(h=huge)                                                | h=about 1e400 of IAS15 must be a finite number
+IAS15(min_dt=-1)                                             | min_dt=-1 of IAS15 must be a finite number of
+IAS15(min_dt=inf)                                            | min_dt=inf of IAS15 must be a finite number of
+IAS15(h=-1)                                                  | h=-1 of IAS15 must be a finite step above 0; t
+IAS15(h='a')                                                 | h='a' of IAS15 must be a finite step above 0;
+IAS15(h=huge)                                                | h=about 1e400 of IAS15 must be a finite step a
 IAS15(epsilom=1)                                             | unknown option of IAS15 'epsilom'; did you
 WHFast()                                                     | WHFast needs h; give a value as in
-WHFast(h=0)                                                  | h=0 of WHFast must be a step above 0; the sign
-WHFast(h=nan)                                                | h=nan of WHFast must be a finite number, a ste
+WHFast(h=0)                                                  | h=0 of WHFast must be a finite step above 0; t
+WHFast(h=nan)                                                | h=nan of WHFast must be a finite step above 0;
 WHFast(h=.1, coordinates='jakobi')                           | unknown coordinates of WHFast 'jakobi'; did
 WHFast(h=.1, coordinates=None)                               | unknown coordinates of WHFast None; known:
 WHFast(h=.1, corrector=4)                                    | corrector=4 of WHFast must be one of 0, 3, 5,
@@ -121,33 +121,33 @@ WHFast(h=.1, body_order='abc')                               | body_order='abc' 
 WHFast(h=.1, body_order=[0.5, 1])                            | body_order=[0.5, 1] of WHFast must be a list t
 WHFast(h=.1, body_order=[])                                  | body_order=[] of WHFast must be a list that na
 WHFast(h=.1, body_order=[1, 2])                              | body_order=[1, 2] of WHFast must be a list tha
-WHFast512(h='a')                                             | h='a' of WHFast512 must be a finite number, a
+WHFast512(h='a')                                             | h='a' of WHFast512 must be a finite step above
 WHFast512(h=.1, corrector=1)                                 | corrector=1 of WHFast512 must be one of 0, 17.
 WHFast512(h=.1, corrector=-3)                                | corrector=-3 of WHFast512 must be one of 0, 17
 Leapfrog(h=.1, order=3)                                      | order=3 of Leapfrog must be one of 2, 4, 6, 8.
 Leapfrog(h=.1, order='2')                                    | order='2' of Leapfrog must be one of 2, 4, 6,
 Leapfrog(h=.1, order=None)                                   | order=None of Leapfrog must be one of 2, 4, 6,
-Leapfrog(h=None)                                             | h=None of Leapfrog must be a finite number, a
+Leapfrog(h=None)                                             | h=None of Leapfrog must be a finite step above
 Leapfrog()                                                   | Leapfrog needs h; give a value as in
-LeapfrogMidpoint(h=nan)                                      | h=nan of LeapfrogMidpoint must be a finite num
-ReversibleHeun(h=-.1)                                        | h=-0.1 of ReversibleHeun must be a step above
-SemiImplicitEuler(h='1')                                     | h='1' of SemiImplicitEuler must be a finite nu
+LeapfrogMidpoint(h=nan)                                      | h=nan of LeapfrogMidpoint must be a finite ste
+ReversibleHeun(h=-.1)                                        | h=-0.1 of ReversibleHeun must be a finite step
+SemiImplicitEuler(h='1')                                     | h='1' of SemiImplicitEuler must be a finite st
 DOP853()                                                     | DOP853 needs rtol, atol; give a value as in
 DOP853(rtol=1e-9)                                            | DOP853 needs atol; give a value as in
-DOP853(rtol=0, atol=0)                                       | rtol=0 of DOP853 must be a finite number, 0 <
-DOP853(rtol=-1, atol=1)                                      | rtol=-1 of DOP853 must be a finite number, 0 <
-DOP853(rtol='a', atol=1e-9)                                  | rtol='a' of DOP853 must be a finite number, 0
-DOP853(rtol=1e-9, atol=nan)                                  | atol=nan of DOP853 must be a finite number, 0
+DOP853(rtol=0, atol=0)                                       | rtol=0 of DOP853 must be a number between 0 an
+DOP853(rtol=-1, atol=1)                                      | rtol=-1 of DOP853 must be a number between 0 a
+DOP853(rtol='a', atol=1e-9)                                  | rtol='a' of DOP853 must be a number between 0
+DOP853(rtol=1e-9, atol=nan)                                  | atol=nan of DOP853 must be a finite number of
 DOP853(rtol=1e-9, atol=[1e-9,1e-9])                          | atol=[1e-09, 1e-09] of DOP853 must be a finite
 DOP853(rtol=1e-20, atol=1e-9)                                | rtol=1e-20 is below what SciPy attains (100
-DOP853(rtol=inf, atol=1e-9)                                  | rtol=inf of DOP853 must be a finite number, 0
-Radau(rtol=1e-9, atol=None)                                  | atol=None of Radau must be a finite number, 0
+DOP853(rtol=inf, atol=1e-9)                                  | rtol=inf of DOP853 must be a number between 0
+Radau(rtol=1e-9, atol=None)                                  | atol=None of Radau must be a finite number of
 Radau(rtol=1e-9, atol=1e-9, max_step=1)                      | unknown option of Radau 'max_step'; known:
 Dopri8()                                                     | Dopri8 needs either h, as in Dopri8(h=0.1),
 Dopri8(h=.1, rtol=1e-9)                                      | Dopri8 needs either h, as in Dopri8(h=0.1),
 Dopri8(rtol=1e-9)                                            | Dopri8 needs either h, as in Dopri8(h=0.1),
-Dopri8(h='a')                                                | h='a' of Dopri8 must be a finite number, a ste
-Dopri8(rtol=2, atol=huge)                                    | rtol=2 of Dopri8 must be a finite number, 0 <
+Dopri8(h='a')                                                | h='a' of Dopri8 must be a finite step above 0;
+Dopri8(rtol=2, atol=huge)                                    | rtol=2 of Dopri8 must be a number between 0 an
 """
 
 CALLS = r"""

@@ -21,7 +21,7 @@ from problems.errors import InputError, UnknownNameError
     "make", [lambda h: HBVM(k=4, s=2, h=h), lambda h: Gauss(s=2, h=h)], ids=["HBVM", "Gauss"]
 )
 def test_a_step_that_is_not_positive_and_finite_is_refused_by_name_and_value(make, h):
-    with pytest.raises(InputError, match=r"h=.* must be a (finite number, a )?step above 0"):
+    with pytest.raises(InputError, match=r"h=.* must be a finite step above 0"):
         make(h)
 
 

@@ -309,8 +309,8 @@ def free(**options: Any) -> Hamiltonian:
         (lambda: load("sitnikof"), "unknown problem 'sitnikof'; did you mean 'sitnikov'"),
         (lambda: load("sitnikov", ee=1), "unknown argument of sitnikov 'ee'; did you mean 'e'"),
         (lambda: load("sitnikov", e=1.5), "e=1.5 of sitnikov must be an eccentricity"),
-        (lambda: load("sitnikov", e="a"), "e='a' of sitnikov must be a finite number"),
-        (lambda: load("sitnikov", d=-1.0), "must be positive"),
+        (lambda: load("sitnikov", e="a"), "e='a' of sitnikov must be an eccentricity"),
+        (lambda: load("sitnikov", d=-1.0), "must be a positive number"),
         (lambda: Hamiltonian(vector, dof=0), "dof=0 must be a whole number"),
         (lambda: Hamiltonian(3, dof=1), "H must be a function, not 3"),  # type: ignore[arg-type]
         (lambda: free(parameters={"a b": 1.0}), "the parameter name 'a b' must be an identifier"),

@@ -18,7 +18,7 @@ NAMES = ["energy"]
         ({"k": 4, "s": 4, "h": 0.1}, "needs k > s, not k=4, s=4: .* correction is identically 0; raise k"),
         ({"k": 3, "s": 4, "h": 0.1}, "needs k > s"),
         ({"k": 8, "s": 4}, "needs a step h, or a tolerance"),
-        ({"k": 8, "s": 4, "h": -0.1}, "h=-0.1 of LineIntegral must be a step above 0"),
+        ({"k": 8, "s": 4, "h": -0.1}, "h=-0.1 of LineIntegral must be a finite step above 0"),
         ({"k": 8, "s": 0, "h": 0.1}, "s=0 of LineIntegral must be a whole number of at least 1"),
         ({"k": 8, "s": 4, "tol": 1e-17}, "tol=1e-17 .* from 2.2e-16 to below 1: .* rounding"),
         ({"k": 8, "s": 4, "tol": float("nan")}, "tol=nan of"),
