@@ -66,7 +66,7 @@ PROBLEMS\nproblems = [{use = "kepler(e={e})"}]               => unknown value in
 PROBLEMS\nproblems = [{use = "kepler()", sweep = {e = [0.1]}}] => kepler(): the sweep gives values of 'e',
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = []}}] => Expected `array` of length >= 1, at
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = 3}}] => Expected `array`, got `int`, at
-PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = ["a"]}}] => e='a' of kepler must be an eccentricity, 0 <= e
+PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = ["a"]}}] => e='a' of kepler must be an eccentr
 PROBLEMS\nproblems = [{use = "kepler(e={e*2})", sweep = {e = ["a"]}}] => kepler(e={e*2}): {e*2} multiplies
 PROBLEMS\nproblems = [{use = "kepler(e={e+2})", sweep = {e = [0.1]}}] => kepler(e={e+2}): the sweep gives
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = [nan]}}] => cannot read 'kepler(e=nan)': a value

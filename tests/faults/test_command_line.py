@@ -99,7 +99,7 @@ run -p "kepler()" -m "HBVM(k=4,s=2,h='a')"                 | HBVM(k=4, s=2, h='a
 run -p "kepler()" -m "HBVM(k=4,s=2,h=[0.1])"               | HBVM(k=4, s=2, h=(0.1,)): h=(0.1,) of HBVM must
 run -p "kepler()" -m "HBVM(k=4,s=2,h={})"                  | cannot read 'HBVM(k=4,s=2,h={})': a value is a
 run -p "kepler()" -m "HBVM(k=[[[[[[[[[[4]]]]]]]]]],s=2,h=0.1)" | cannot read
-run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): h=-1 of WHFast must be a finite step
+run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): h=-1 of WHFast must be a finite
 run -p "kepler()" -m "sys.exit()"                          | cannot read 'sys.exit()': the name must be one
 run -p "expression(H='p^2/2 +')" -m "IAS15()"              | cannot read the formula 'p^2/2 +': this is not
 run -p "expression(H='q^10000000000')" -m "HBVM(k=4,s=2,h=0.1)" | cannot read the formula 'q^10000000000':
