@@ -12,7 +12,7 @@ from problems.errors import InputError
 
 GUEST = """
 from problems import Hamiltonian, Problem
-from problems.calls import Positive
+from problems.checks import Positive
 from problems.entry import entry
 
 
