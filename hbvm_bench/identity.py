@@ -23,7 +23,7 @@ import problems.registry
 from hbvm_bench import reference
 from hbvm_bench.campaign import Case, Checks
 from hbvm_bench.spec import Spec, parse_spec
-from integrators.kernel import store as kept
+from integrators.kernel.native import store as kept
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem

@@ -13,7 +13,7 @@ SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
 
 SHORTEST = 2.0**-48
-"""Of the time: a shorter step cannot be told from none; as in `integrators.kernel.control`."""
+"""Of the time: a shorter step cannot be told from none; as in `integrators.kernel.step.control`."""
 
 
 def whole(method: str, name: str, value: Any) -> int:

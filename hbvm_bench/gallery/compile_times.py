@@ -7,7 +7,7 @@ from typing import Any
 
 from hbvm_bench import machine
 from hbvm_bench.identity import make_problem
-from integrators.kernel import field
+from integrators.kernel.native import field
 from problems import emit
 from problems.problem import Problem
 

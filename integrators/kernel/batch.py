@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel import engine, layout
+from integrators.kernel import layout
+from integrators.kernel.context import Context
+from integrators.kernel.native import engine
 from integrators.kernel.stepper import failure
-from integrators.kernel.workspace import Context
 from integrators.options import whole
 from integrators.pace import Pace
 from integrators.protocol import Array, Status, UserError, check_batch, check_times

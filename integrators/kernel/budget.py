@@ -15,8 +15,9 @@ from time import perf_counter
 import numpy as np
 
 import problems
-from integrators.kernel import layout, native
-from integrators.kernel.field import assembly
+from integrators.kernel import layout
+from integrators.kernel.native import binary as native
+from integrators.kernel.native.field import assembly
 from integrators.kernel.program import HBVMProgram
 from problems import emit
 from problems.problem import Problem

@@ -112,7 +112,7 @@ PARTIAL = 78
 IMPLICIT_STEPS = 87
 SWITCHES = 88
 
-# Steps of varying length; see `integrators.kernel.adaptive.steps`.
+# Steps of varying length; see `integrators.kernel.step.vary`.
 TIME_LOW = 90  # double: what T0 lacks
 ALLOWED_ERROR = 91  # double: the estimated local error of a step, relative, at most
 ALLOWED_DEFECT = 92  # double: the same of the quadrature; infinite: any
@@ -140,7 +140,9 @@ RECURRENCE = (
     111  # by which each mode follows from the two before: pairs a, b for P_{j+1} = a x P_j - b P_{j-1}
 )
 
-FUSED = 112  # address of whole sweeps, void(context, count, tested); 0: none, see `integrators.kernel.fused`
+FUSED = (
+    112  # address of whole sweeps, void(context, count, tested); 0: none, see `integrators.kernel.step.fused`
+)
 LEAST_SLOPE = 114  # double: of a block's field beside the largest in its group, where errors are estimated
 CHANGE = 113  # double: the largest change of the last fused sweep
 

@@ -5,14 +5,16 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel import engine, layout, native, tables
-from integrators.kernel import field as fields
+from integrators.kernel import layout, tables
 from integrators.kernel.batch import Batch, prepare_batch
-from integrators.kernel.foreign import field_of
+from integrators.kernel.context import Context, Shape
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
 from integrators.kernel.implicit.workspace import solver as implicit_solver
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import engine
+from integrators.kernel.native import field as fields
+from integrators.kernel.native.foreign import field_of
 from integrators.kernel.stepper import HBVMStepper
-from integrators.kernel.workspace import Context, Shape
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from integrators.times import Counts
 from problems import emit

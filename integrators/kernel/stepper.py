@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
-from integrators.kernel import engine, layout
+from integrators.kernel import layout
+from integrators.kernel.context import Integers
 from integrators.kernel.implicit.workspace import Workspace, report, solver
-from integrators.kernel.workspace import Integers
+from integrators.kernel.native import engine
 from integrators.one_thread import one_thread
 from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_state, check_times

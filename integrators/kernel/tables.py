@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.kernel import layout as at
-from integrators.kernel import native, store
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 from problems.analysis.double_double import DD
 
 Array = NDArray[np.float64]

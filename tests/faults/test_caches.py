@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from integrators.kernel import native, store
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 from problems.emit import cache
 
 from .fault import Fault, is_met
@@ -20,7 +21,7 @@ OBTAIN = textwrap.dedent(
     """
     import os, sys, time
     from pathlib import Path
-    from integrators.kernel import native
+    from integrators.kernel.native import binary as native
 
     def make():
         log = os.open(sys.argv[1], os.O_WRONLY | os.O_APPEND | os.O_CREAT)

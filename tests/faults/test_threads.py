@@ -11,7 +11,8 @@ import pytest
 
 import problems
 from integrators import HBVM, LineIntegral, registry
-from integrators.kernel import engine, foreign, layout, program
+from integrators.kernel import layout, program
+from integrators.kernel.native import engine, foreign
 from integrators.protocol import Status
 from tests.faults.fault import Fault, is_met
 
@@ -167,7 +168,7 @@ def test_a_stepper_at_work_is_refused_to_another_thread(method):
 FORK = """
 import os, threading, time, problems
 from integrators import HBVM
-from integrators.kernel import native
+from integrators.kernel.native import binary as native
 
 started = threading.Event()
 

@@ -6,8 +6,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel import native, store
 from integrators.kernel.implicit.layout import BLENDED
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 from integrators.kernel.tables import Constants, constants
 
 Array = NDArray[np.float64]

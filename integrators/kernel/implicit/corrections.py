@@ -25,8 +25,8 @@ from integrators.kernel.implicit.jacobian import factorize, linearize, resolve
 from integrators.kernel.implicit.linear import factor, solve
 from integrators.kernel.implicit.stages import project, set_velocities, swap_stages
 from integrators.kernel.line.views import compiled
-from integrators.kernel.memory import get_float, get_int
-from integrators.kernel.products import evaluate, offset
+from integrators.kernel.simd.memory import get_float, get_int
+from integrators.kernel.step.sweep import evaluate, offset
 
 # Which Jacobian a correction takes: the one at hand, one at the mean of the stages, one at each stage.
 KEPT, MEAN, EACH = range(3)

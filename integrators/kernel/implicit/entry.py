@@ -3,12 +3,12 @@
 from numba import types
 
 from integrators.kernel import layout as at
-from integrators.kernel import native
 from integrators.kernel.implicit import layout as of
 from integrators.kernel.implicit.layout import Memory
 from integrators.kernel.implicit.newton import solve_step
 from integrators.kernel.line.views import compiled, integers, numbers, table
-from integrators.kernel.memory import get_int
+from integrators.kernel.native import binary as native
+from integrators.kernel.simd.memory import get_int
 
 
 @compiled

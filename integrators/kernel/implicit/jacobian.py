@@ -5,7 +5,7 @@ from integrators.kernel.implicit import layout as of
 from integrators.kernel.implicit.external import ask
 from integrators.kernel.implicit.linear import factor, solve
 from integrators.kernel.line.views import address, compiled
-from integrators.kernel.memory import call_field, get_float, get_int, put_float
+from integrators.kernel.simd.memory import call_field, get_float, get_int, put_float
 
 STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
 SMALL = 1e-5  # of the largest component: no difference is taken over less

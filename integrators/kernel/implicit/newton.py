@@ -16,8 +16,8 @@ from integrators.kernel.implicit.stages import (
     take_sizes,
 )  # fmt: skip
 from integrators.kernel.line.views import compiled
-from integrators.kernel.memory import get_float, get_int, put_float, put_int
-from integrators.kernel.step import FARTHEST, prepare, start_elsewhere
+from integrators.kernel.simd.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.step.begin import FARTHEST, prepare, start_elsewhere
 
 MOST_CORRECTIONS = 40
 MOST_BLENDED = 250
@@ -43,7 +43,7 @@ def iterate(ctx, m, method, source, factors, which):
     """Correct gamma, by the Jacobian that ``which`` tells, until the stages do not change.
 
     What ends the iteration is the change of the stages, relative to their blocks, as
-    in `integrators.kernel.solve`. Return DONE, DIVERGED, or NOT_FINITE if the start is
+    in `integrators.kernel.step.iterate`. Return DONE, DIVERGED, or NOT_FINITE if the start is
     one at which the field or its Jacobian is not finite.
     """
     most = MOST_BLENDED if method == of.BLENDED else MOST_CORRECTIONS

@@ -6,9 +6,9 @@ h |J| eps, which the corrections take out of gamma.
 """
 
 from integrators.kernel import layout as at
-from integrators.kernel.lanes import fma
 from integrators.kernel.line.views import address, compiled
-from integrators.kernel.memory import (
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
     get,
     get_float,
     get_int,
@@ -19,7 +19,7 @@ from integrators.kernel.memory import (
     splat8,
     spread,
 )
-from integrators.kernel.products import change, multiply, offset
+from integrators.kernel.step.sweep import change, multiply, offset
 
 LOW = 3  # columns of a stage table that hold the low parts of the first ones
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component

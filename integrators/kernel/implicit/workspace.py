@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel import field as fields
-from integrators.kernel import layout, native, store
+from integrators.kernel import layout
+from integrators.kernel.context import Shape
 from integrators.kernel.implicit import layout as of
 from integrators.kernel.implicit.constants import Method, method, solver_of
 from integrators.kernel.implicit.factors import Factors
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import field as fields
+from integrators.kernel.native import store
 from integrators.kernel.tables import aligned, packed
-from integrators.kernel.workspace import Shape
 from problems import emit
 from problems.calculus.jacobian import Jacobian, jacobian
 from problems.errors import InputError
@@ -26,13 +28,7 @@ LARGEST_DENSE = 64  # rows up to which the factors are dense and in the solver's
 LARGEST_WHOLE = 128  # rows up to which there is a matrix with a Jacobian for each stage
 
 # The modules whose code is in the solver: an edit of any of them makes another one.
-SOURCES = (
-    *("lanes", "memory", "layout", "products", "step", "native", "line/views"),
-    *(
-        f"implicit/{name}"
-        for name in ("layout", "external", "linear", "stages", "jacobian", "corrections", "newton", "entry")
-    ),
-)
+SOURCES = ("simd", "native", "layout", "step", "line", "implicit")
 
 
 @lru_cache(maxsize=1)

@@ -2,12 +2,12 @@
 
 from numba import types
 
-from integrators.kernel import native
 from integrators.kernel.line import layout as at
 from integrators.kernel.line.sample import sample
 from integrators.kernel.line.solve import commit, end, evaluate_at, solve
 from integrators.kernel.line.varying import first_length, vary, walk
 from integrators.kernel.line.views import address, call, compiled, integers, memory, numbers, table
+from integrators.kernel.native import binary as native
 
 
 @compiled

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.kernel import field as fields
-from integrators.kernel import native
-from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
 from integrators.kernel.line.dependence import independent
 from integrators.kernel.line.stepper import LineStepper
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import engine_line as engine
+from integrators.kernel.native import field as fields
 from integrators.kernel.program import blocks
 from integrators.legendre import tables
 from integrators.protocol import Array, check_parameters, check_start, check_state

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
-from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
+from integrators.kernel.native import engine_line as engine
 from integrators.one_thread import one_thread
 from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
@@ -247,7 +247,7 @@ class LineStepper:
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = np.inf, present: bool = False
     ) -> Samples:
-        """Take own steps of varying length; as `integrators.kernel.adaptive.stepper.AdaptiveStepper.walk`."""
+        """Take own steps of varying length; as `integrators.kernel.stepper_own.AdaptiveStepper.walk`."""
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
         outcome, steps, crawl = at.BUDGET, 0, ""

@@ -2,7 +2,11 @@
 
 from math import log
 
-from integrators.kernel.control import (
+from integrators.kernel.line import layout as at
+from integrators.kernel.line.sample import sample
+from integrators.kernel.line.solve import commit, end, slope, solve
+from integrators.kernel.line.views import compiled, two_sum
+from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
     INFINITY,
@@ -14,10 +18,6 @@ from integrators.kernel.control import (
     bounded,
     log_factor,
 )
-from integrators.kernel.line import layout as at
-from integrators.kernel.line.sample import sample
-from integrators.kernel.line.solve import commit, end, slope, solve
-from integrators.kernel.line.views import compiled, two_sum
 
 GROW = 4.0  # of the length from one step to the next, at most
 # Iterations to aim at, at most: with a contraction h w, a unit of time costs least at h w = 1/e, which

@@ -8,7 +8,8 @@ import textwrap
 
 import pytest
 
-from integrators.kernel import store, tables
+from integrators.kernel import tables
+from integrators.kernel.native import store
 
 # A system of its own for each constant; prints whether numba was needed, and a result.
 SCRIPT = textwrap.dedent(

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import problems
-from integrators.kernel import field, layout
+from integrators.kernel import layout
+from integrators.kernel.native import field
 from integrators.kernel.program import HBVMProgram
 
 CASES = [

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from integrators.kernel import field, native
-from integrators.kernel.lanes import fma, select
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import field
+from integrators.kernel.simd.lanes import fma, select
 from problems.analysis import double_double
 
 any_double = st.floats(width=64)

@@ -6,7 +6,9 @@ from numba.core.errors import TypingError
 
 import problems
 from integrators import legendre
-from integrators.kernel import field, layout, native, tables
+from integrators.kernel import layout, tables
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import field
 from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField, emit

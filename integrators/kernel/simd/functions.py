@@ -18,7 +18,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel.lanes import Lanes, llvm_call, register, vector
+from integrators.kernel.simd.lanes import Lanes, llvm_call, register, vector
 
 INTEGER = ir.IntType(64)
 # Adding 1.5 * 2^52 leaves the nearest whole number in the lowest bits.

@@ -3,12 +3,12 @@
 from numba import types
 
 from integrators.kernel import layout as at
-from integrators.kernel import native
-from integrators.kernel.adaptive.estimate import first_length
-from integrators.kernel.adaptive.steps import vary, walk
-from integrators.kernel.loops import reset
-from integrators.kernel.memory import get_float, put_float, put_int
-from integrators.kernel.products import compiled
+from integrators.kernel.native import binary as native
+from integrators.kernel.simd.memory import get_float, put_float, put_int
+from integrators.kernel.step.advance import reset
+from integrators.kernel.step.estimate import first_length
+from integrators.kernel.step.sweep import compiled
+from integrators.kernel.step.vary import vary, walk
 
 # What `entry` can do; `engine` has the same numbers.
 RESET, VARY, WALK = range(3)
@@ -25,7 +25,7 @@ def entry(what, ctx, side, between, count, times, first, out, budget):
         none; go to ``count`` times; take up to ``budget`` steps, none beyond times[0], which
         are then in ``times``.
     ctx, side, between, count, times, first, out, budget
-        As in `integrators.kernel.loops.advance`.
+        As in `integrators.kernel.step.advance.advance`.
     """
     if what == RESET:
         reset(ctx, out)

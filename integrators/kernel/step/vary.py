@@ -6,9 +6,18 @@ Where the fixed-point iteration allows much less than the errors do, the implici
 from math import log
 
 from integrators.kernel import layout as at
-from integrators.kernel.adaptive.estimate import estimate, estimate_implicit, log_decay
-from integrators.kernel.adaptive.kinks import kink
-from integrators.kernel.control import (
+from integrators.kernel.line.views import two_sum
+from integrators.kernel.simd.memory import get_float, get_int, put_float, put_int
+from integrators.kernel.step.advance import sample
+from integrators.kernel.step.begin import (
+    FARTHEST,
+    prepare,
+    set_step,
+    start_elsewhere,
+    start_plain,
+    take_sizes,
+)
+from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
     INFINITY,
@@ -20,11 +29,9 @@ from integrators.kernel.control import (
     bounded,
     log_factor,
 )
-from integrators.kernel.line.views import two_sum
-from integrators.kernel.loops import sample
-from integrators.kernel.memory import get_float, get_int, put_float, put_int
-from integrators.kernel.products import compiled, evaluate
-from integrators.kernel.solve import (
+from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
+from integrators.kernel.step.finish import commit, update, write
+from integrators.kernel.step.iterate import (
     ROUNDING,
     close,
     rewind,
@@ -33,8 +40,8 @@ from integrators.kernel.solve import (
     sweep,
     sweep_tested,
 )
-from integrators.kernel.step import FARTHEST, prepare, set_step, start_elsewhere, start_plain, take_sizes
-from integrators.kernel.update import commit, update, write
+from integrators.kernel.step.kinks import kink
+from integrators.kernel.step.sweep import compiled, evaluate
 
 GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
@@ -289,7 +296,7 @@ def dimension(ctx):
 
 @compiled
 def vary(ctx, side, between, count, times, first, out, budget):
-    """Take steps to the samples' times and make the samples; see `integrators.kernel.loops.advance`."""
+    """Take steps to the samples' times and make the samples; see `step.advance.advance`."""
     dim = dimension(ctx)
     for i in range(first, count):
         put_int(ctx, at.MADE, i)

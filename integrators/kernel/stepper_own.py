@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.kernel import layout
-from integrators.kernel.adaptive import engine
+from integrators.kernel.native import engine_own as engine
 from integrators.kernel.stepper import WORDS, Checkpoint, HBVMStepper
 from integrators.one_thread import one_thread
 from integrators.options import SHORTEST
@@ -18,7 +18,7 @@ from integrators.watchdog import Crawl
 from problems.errors import unknown
 
 if TYPE_CHECKING:
-    from integrators.kernel.adaptive.program import AdaptiveProgram
+    from integrators.kernel.program_own import AdaptiveProgram
 
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
@@ -118,7 +118,7 @@ class AdaptiveStepper(HBVMStepper):
         return stop
 
     def _is_at(self, t: float) -> bool:
-        """Whether a breakpoint is reached; as `integrators.kernel.adaptive.steps.remaining`."""
+        """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
         reals = self._context.reals
         rest = (t - self.t) - float(reals[layout.TIME_LOW])
         return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(float(reals[layout.LENGTH_BEHIND])))

@@ -6,8 +6,8 @@ formed; the state is a compensated pair whose error enters the stages.
 """
 
 from integrators.kernel import layout as at
-from integrators.kernel.lanes import fma
-from integrators.kernel.memory import (
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
     get,
     get_float,
     get_int,
@@ -20,7 +20,7 @@ from integrators.kernel.memory import (
     splat8,
     spread,
 )  # fmt: skip
-from integrators.kernel.products import compiled, multiply, offset, product, project, through
+from integrators.kernel.step.sweep import compiled, multiply, offset, product, project, through
 
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good

@@ -13,7 +13,7 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, signature
 from numba.extending import models, register_model
 
-from integrators.kernel.lanes import (
+from integrators.kernel.simd.lanes import (
     ALIGNMENT,
     DOUBLE,
     Lanes,

@@ -7,7 +7,7 @@ lane in the order written: nothing is contracted or reordered, because the
 symmetry of a problem may hang on the last bit. The one fused operation,
 `fma`, is explicit and meant for the linear algebra, not for vector fields.
 
-A vector field reads and writes them through the views of `integrators.kernel.lane_views`.
+A vector field reads and writes them through the views of `integrators.kernel.simd.views`.
 """
 
 import math

@@ -4,22 +4,12 @@ import ctypes
 from functools import lru_cache
 from typing import Any
 
-from integrators.kernel import native, store
-from integrators.kernel.foreign import raise_error
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
+from integrators.kernel.native.foreign import raise_error
 
-# The modules whose code is in the kernel: an edit of any of them makes another kernel.
-SOURCES = (
-    "lanes",
-    "memory",
-    "layout",
-    "products",
-    "step",
-    "solve",
-    "update",
-    "loops",
-    "native",
-    "implicit/external",
-)
+# Whose code is in the kernel: an edit of any of them makes another kernel.
+SOURCES = ("simd", "native", "layout", "step")
 
 # What the entry can do; `loops` has the same numbers.
 ADVANCE, ADVANCE_BATCH, RESET = range(3)
@@ -29,7 +19,7 @@ def kernel() -> native.Native:
     """Return the kernel, ``int64(int64, ... eleven in all)``, compiled, loaded, or loaded before."""
 
     def make() -> tuple[str, bytes]:
-        from integrators.kernel import loops  # imports numba
+        from integrators.kernel.step import advance as loops  # imports numba
 
         return " ", loops.build()
 

@@ -6,8 +6,8 @@ sum whose rounding error is kept.
 """
 
 from integrators.kernel import layout as at
-from integrators.kernel.lanes import fma
-from integrators.kernel.memory import (
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
     get,
     get_float,
     get_int,
@@ -19,7 +19,7 @@ from integrators.kernel.memory import (
     swap,
     total,
 )  # fmt: skip
-from integrators.kernel.products import compiled, offset, project
+from integrators.kernel.step.sweep import compiled, offset, project
 
 
 @compiled

@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import signature
 
-from integrators.kernel.lanes import ALIGNMENT, DOUBLE, Lanes, intrinsic, llvm_call, splat, vector
+from integrators.kernel.simd.lanes import ALIGNMENT, DOUBLE, Lanes, intrinsic, llvm_call, splat, vector
 
 WIDTH = 8
 INTEGER = ir.IntType(64)
@@ -287,7 +287,7 @@ total = _reduce(lambda builder, x, y: builder.fadd(x, y))
 
 @intrinsic
 def call_sweeps(typing, function, ctx, count, tested):
-    """Call the fused sweeps at address ``function``; see `integrators.kernel.fused`."""
+    """Call the fused sweeps at address ``function``; see `integrators.kernel.step.fused`."""
 
     def generate(context, builder, sig, args):
         kind = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)

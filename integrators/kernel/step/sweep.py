@@ -11,8 +11,8 @@ from typing import Any, cast
 import numba
 
 from integrators.kernel import layout as at
-from integrators.kernel.lanes import fma
-from integrators.kernel.memory import (
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
     call_field,
     columns,
     combine,

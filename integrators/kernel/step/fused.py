@@ -12,9 +12,9 @@ from typing import Any
 from llvmlite import ir
 
 from integrators.kernel import layout as at
-from integrators.kernel import native
-from integrators.kernel.lanes import ALIGNMENT, DOUBLE, llvm_call, splat, vector
-from integrators.kernel.memory import INTEGER, WIDTH, Chains, larger_of, largest_of
+from integrators.kernel.native import binary as native
+from integrators.kernel.simd.lanes import ALIGNMENT, DOUBLE, llvm_call, splat, vector
+from integrators.kernel.simd.memory import INTEGER, WIDTH, Chains, larger_of, largest_of
 
 SWEEP = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
 

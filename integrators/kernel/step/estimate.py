@@ -3,11 +3,21 @@
 from math import log
 
 from integrators.kernel import layout as at
-from integrators.kernel.control import INFINITY, NOTHING, TINY
-from integrators.kernel.lanes import fma
-from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8, sums, total
-from integrators.kernel.products import compiled, evaluate, offset
-from integrators.kernel.step import prepare, set_step, start_plain
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
+    get,
+    get_float,
+    get_int,
+    put,
+    put_float,
+    put_int,
+    splat8,
+    sums,
+    total,
+)
+from integrators.kernel.step.begin import prepare, set_step, start_plain
+from integrators.kernel.step.control import INFINITY, NOTHING, TINY
+from integrators.kernel.step.sweep import compiled, evaluate, offset
 
 UNSEEN = (
     1e-13  # part of a block that rounding may account for in a step that the fixed-point iteration solves

@@ -1,9 +1,9 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
 from integrators.kernel import layout as at
-from integrators.kernel.adaptive.estimate import NARROWEST, block_size, coefficient
-from integrators.kernel.memory import call_field, get_float, get_int, put_float, put_int, total
-from integrators.kernel.products import compiled
+from integrators.kernel.simd.memory import call_field, get_float, get_int, put_float, put_int, total
+from integrators.kernel.step.estimate import NARROWEST, block_size, coefficient
+from integrators.kernel.step.sweep import compiled
 
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
 

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.caveats import sees_kinks
-from integrators.kernel import layout, native, tables
-from integrators.kernel.adaptive import engine
-from integrators.kernel.adaptive.stepper import AdaptiveStepper
+from integrators.kernel import layout, tables
+from integrators.kernel.context import Context
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import engine_own as engine
 from integrators.kernel.program import HBVMProgram
+from integrators.kernel.stepper_own import AdaptiveStepper
 from integrators.kernel.tables import aligned
-from integrators.kernel.workspace import Context
 from integrators.legendre import legendre
 from integrators.protocol import check_parameters, check_start, check_state
 from problems.problem import System
@@ -20,7 +21,7 @@ from problems.problem import System
 FIRST_RATE = 0.01
 
 MARGIN = 0.82
-"""Part of the length allowed that steps aim at, besides `integrators.kernel.control.SAFETY`.
+"""Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
 much as one that is taken: with 1 a fifth of the steps are rejected and all problems of the

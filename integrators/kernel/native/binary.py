@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import llvmlite
 import llvmlite.binding as llvm
 
-from integrators.kernel import store
+from integrators.kernel.native import store
 
 ENTRY = "hbvm_entry"
 
@@ -79,10 +79,12 @@ def platform() -> str:
 
 @lru_cache(maxsize=32)
 def sources(*modules: str) -> str:
-    """Return the digest of modules of this package: an edit voids what was compiled from them."""
+    """Return the digest of modules and folders of the kernel: an edit voids what was compiled from them."""
     digest = hashlib.sha256()
     for name in modules:
-        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+        place = Path(__file__).parents[1] / name
+        for file in sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]:
+            digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

@@ -8,7 +8,8 @@ it on lanes, it runs on one stage after another behind the same signature.
 
 from typing import Any
 
-from integrators.kernel import native, store
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 from problems import emit
 from problems.systems.base import System
 
@@ -18,7 +19,7 @@ Arguments = list[tuple[Any, str]]
 FUSED_ROWS = 4
 """Components of a stage up to which whole sweeps are compiled with the field."""
 
-SOURCES = ("lanes", "lane_views", "lane_functions", "native", "field")
+SOURCES = ("simd", "native")
 
 
 def compile_field(system: System, what: str, lanes: int) -> native.Native:
@@ -57,11 +58,11 @@ def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> native.N
         Components of a stage.
     """
     source = emit.source(system, what, "numba")
-    modules = native.sources(*SOURCES, "memory", "layout", "fused")
+    modules = native.sources(*SOURCES, "layout", "step/fused")
     name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
 
     def make() -> tuple[str, bytes]:
-        from integrators.kernel import fused
+        from integrators.kernel.step import fused
 
         function, arguments = on_lanes(emit.numba(system, what).py_func, lanes)
         code = native.build(function, arguments, around=lambda inner: fused.sweeps(inner, lanes, rows))
@@ -115,9 +116,9 @@ def build_one_by_one(function: Any, lanes: int) -> bytes:
 
 def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
     """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `native.build`."""
-    from integrators.kernel import lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
-    from integrators.kernel.lane_views import Rows, Strided
-    from integrators.kernel.lanes import Lanes
+    from integrators.kernel.simd import functions as lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
+    from integrators.kernel.simd.lanes import Lanes
+    from integrators.kernel.simd.views import Rows, Strided
 
     stages = Rows(lanes)
     arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (Strided(1), "ptr"), (stages, "ptr")]
@@ -127,7 +128,7 @@ def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
 def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
     from numba import types
 
-    from integrators.kernel.lane_views import strided
+    from integrators.kernel.simd.views import strided
 
     scalar = _jit(function)
 

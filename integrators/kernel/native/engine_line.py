@@ -4,15 +4,11 @@ import ctypes
 from functools import lru_cache
 from typing import Any
 
-from integrators.kernel import native, store
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 
 # The modules whose code is in the kernel: an edit of any of them makes another kernel.
-SOURCES = (
-    "native",
-    "products",
-    "control",
-    *(f"line/{name}" for name in ("layout", "views", "invariants", "solve", "sample", "varying", "loops")),
-)
+SOURCES = ("simd", "native", "step", "line")
 
 
 def kernel() -> native.Native:

@@ -3,11 +3,9 @@
 from numba import types
 
 from integrators.kernel import layout as at
-from integrators.kernel import native
-from integrators.kernel.memory import get, get_float, get_int, put, put_float, put_int, splat8
-from integrators.kernel.products import compiled
-from integrators.kernel.solve import begin, close, reconsider, rewind, settle_part, solve, sweep, sweep_tested
-from integrators.kernel.step import (
+from integrators.kernel.native import binary as native
+from integrators.kernel.simd.memory import get, get_float, get_int, put, put_float, put_int, splat8
+from integrators.kernel.step.begin import (
     FARTHEST,
     prepare,
     set_factors,
@@ -16,7 +14,18 @@ from integrators.kernel.step import (
     start_plain,
     take_sizes,
 )
-from integrators.kernel.update import commit, interpolate, read, update, write
+from integrators.kernel.step.finish import commit, interpolate, read, update, write
+from integrators.kernel.step.iterate import (
+    begin,
+    close,
+    reconsider,
+    rewind,
+    settle_part,
+    solve,
+    sweep,
+    sweep_tested,
+)
+from integrators.kernel.step.sweep import compiled
 
 
 @compiled

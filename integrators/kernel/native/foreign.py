@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from integrators.kernel import native
-from integrators.kernel.field import ONE_BY_ONE, compile_field
+from integrators.kernel.native import binary as native
+from integrators.kernel.native.field import ONE_BY_ONE, compile_field
 from integrators.protocol import UserError
 from problems.systems.base import System
 from problems.systems.untraced import Foreign

@@ -2,9 +2,9 @@
 
 from integrators.kernel import layout as at
 from integrators.kernel.implicit.external import call_solver
-from integrators.kernel.memory import call_sweeps, get_float, get_int, put_float, put_int
-from integrators.kernel.products import change, compiled, evaluate, product, product_tested
-from integrators.kernel.step import prepare, start, start_plain, take_sizes
+from integrators.kernel.simd.memory import call_sweeps, get_float, get_int, put_float, put_int
+from integrators.kernel.step.begin import prepare, start, start_plain, take_sizes
+from integrators.kernel.step.sweep import change, compiled, evaluate, product, product_tested
 
 MAX_ITERATIONS = 200
 STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
