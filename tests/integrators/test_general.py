@@ -14,7 +14,7 @@ import pytest
 import integrators
 import problems
 from integrators import HBVM, Gauss, integrate
-from integrators.kernel.stepper_own import AdaptiveStepper
+from integrators.kernel.stepper import AdaptiveStepper
 from integrators.protocol import Status
 from problems import Foreign, Hamiltonian, Problem, VectorField
 

@@ -2,28 +2,45 @@
 
 import threading
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
-from integrators.kernel.line import layout as at
-from integrators.kernel.native import engine_line as engine
+from integrators.kernel.context import BUDGET, DENSE, DONE, LAND, NOT_FINITE, SIDE, UNDERFLOW
+from integrators.kernel.line.memory import ADVANCE, NOT_KEPT, RESET, VARY, WALK, Trajectory
+from integrators.kernel.native import engine
 from integrators.one_thread import one_thread
 from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from integrators.times import Counts, plan
 from integrators.watchdog import Crawl
 from problems.errors import unknown
-
-if TYPE_CHECKING:
-    from integrators.kernel.line.program import LineProgram
+from problems.problem import System
 
 CHUNK = 1 << 12  # steps between two looks at Ctrl-C, at most
 
-STATE = ("y", "e", "previous", "reference", "active", "real")
-NUMBERS = (at.N, at.ACCEPTED)
+# What a checkpoint holds.
+STATE = ("y", "e", "previous", "reference", "active")
+WORDS = (
+    "t0", "low", "n", "h", "length", "next", "length_after", "behind", "ahead", "limit", "accepted",
+    "change", "defect",
+)  # fmt: skip
+PLACES = [Trajectory.slots[name].place for name in WORDS]
+
+
+class Program(Protocol):
+    """What a stepper asks of its program; see `integrators.kernel.line.program`."""
+
+    system: System
+    h: float | None
+    tol: float | None
+    components: list[str]
+
+    @property
+    def description(self) -> str: ...
+    def memory(self, y: Array, par: Array, t0: float) -> Trajectory: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +49,7 @@ class Checkpoint:
 
     identity: Identity
     arrays: tuple[Array, ...]
-    numbers: tuple[int, ...]
+    words: Counts
     status: Status
     reason: str
 
@@ -56,36 +73,31 @@ class LineStepper:
         keep the invariants.
     """
 
-    def __init__(self, program: "LineProgram", y: Array, par: Array, t0: float):
-        self._entry = engine.entry()
+    def __init__(self, program: Program, y: Array, par: Array, t0: float):
         self._at_work = threading.RLock()
         self._program = program
-        sizes, self._m = program.memory(y, par, t0)
-        self._words = np.array([*sizes, *(array.ctypes.data for array in self._m.values())], dtype=np.int64)
-        self._real, self._count = self._m["real"], self._m["count"]
-        self._real[at.T0] = t0
+        self._m = program.memory(y, par, t0)
         if program.tol is None:
             assert program.h is not None
-            self._real[at.H] = program.h
+            self._m.h = program.h
         else:
-            self._real[at.TOLERANCE] = program.tol
-            self._real[at.NEXT] = program.h or 0.0
-            self._real[at.LIMIT] = np.inf
+            self._m.tolerance = program.tol
+            self._m.next = program.h or 0.0
+            self._m.limit = np.inf
         self._status, self._reason = Status.RUNNING, ""
         self._pace = Pace(CHUNK, y.size)
-        self._call(at.RESET)
+        self._call(RESET)
 
     @property
     def t(self) -> float:
         """Time of the last own step."""
-        real = self._real
-        return float(real[at.T0] + (real[at.LOW] if self._varying else self._count[at.N] * real[at.H]))
+        return float(self._m.t0 + (self._m.low if self._varying else self._m.n * self._m.h))
 
     @property
     @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
-        return self._m["y"].copy()
+        return self._m.y.copy()
 
     @property
     def status(self) -> Status:
@@ -106,16 +118,16 @@ class LineStepper:
         than rounding accounts for (k is then too small), and ``"left_out"``, the names
         of those that follow from others.
         """
-        count = self._count.tolist()
-        extra: dict[str, Any] = {"partial_steps": count[at.PARTIAL], "restarts": count[at.RESTARTS]}
+        m = self._m
+        extra: dict[str, Any] = {"partial_steps": m.partial, "restarts": m.restarts}
         if names := self._program.components:
-            extra["lost"] = count[at.LOST]
-            extra["left_out"] = [n for n, on in zip(names, self._m["active"], strict=True) if not on]
+            extra["lost"] = m.lost
+            extra["left_out"] = [n for n, on in zip(names, m.active, strict=True) if not on]
         return Stats(
-            steps=count[at.STEPS],
-            rejections=count[at.REJECTIONS],
-            evaluations=count[at.EVALUATIONS],
-            iterations=count[at.ITERATIONS],
+            steps=m.steps,
+            rejections=m.rejections,
+            evaluations=m.evaluations,
+            iterations=m.iterations,
             solver="fixed point",
             extra=extra,
         )
@@ -135,10 +147,10 @@ class LineStepper:
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
         if self._varying:
-            return self.walk(np.inf if self._real[at.NEXT] > 0.0 else -np.inf, limit=count)
-        targets = self._count[at.N] + np.arange(1, count + 1)
-        times = self._real[at.T0] + targets * self._real[at.H]
-        return self._run(at.SIDE, times, targets, np.zeros(count))
+            return self.walk(np.inf if self._m.next > 0.0 else -np.inf, limit=count)
+        targets = self._m.n + np.arange(1, count + 1)
+        times = np.asarray(self._m.t0 + targets * self._m.h, dtype=np.float64)
+        return self._run(SIDE, times, targets, np.zeros(count))
 
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
@@ -147,14 +159,14 @@ class LineStepper:
             raise unknown("sampling", sample, SAMPLINGS)
         grid = check_times(times, self.t)
         if self._status.failed:
-            return Samples(grid[:0], np.empty((0, self._m["y"].size)), self._status, self._reason)
-        between = {"land": at.LAND, "dense": at.DENSE}.get(sample or "side", at.SIDE)
+            return Samples(grid[:0], np.empty((0, self._m.y.size)), self._status, self._reason)
+        between = {"land": LAND, "dense": DENSE}.get(sample or "side", SIDE)
         if self._varying:
             if sample == "steps":
                 return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
             self._face(float(grid[-1]))
             return self._run(between, grid)
-        t0, n, h = self._real[at.T0], int(self._count[at.N]), float(self._real[at.H])
+        t0, n, h = self._m.t0, self._m.n, self._m.h
         turn = (grid[-1] - self.t) * h < 0.0
         if turn:  # steps are counted from here
             t0, n, h = self.t, 0, -h
@@ -174,8 +186,8 @@ class LineStepper:
         """Return a copy of all that the continuation depends on."""
         return Checkpoint(
             self._identity,
-            tuple(self._m[name].copy() for name in STATE),
-            tuple(int(self._count[i]) for i in NUMBERS),
+            tuple(getattr(self._m, name).copy() for name in STATE),
+            self._m.words[PLACES],
             self._status,
             self._reason,
         )
@@ -192,54 +204,47 @@ class LineStepper:
         """
         self._identity.check(checkpoint, Checkpoint)
         for name, array in zip(STATE, checkpoint.arrays, strict=True):
-            self._m[name][:] = array
-        for i, number in zip(NUMBERS, checkpoint.numbers, strict=True):
-            self._count[i] = number
-        self._count[at.SOLVED] = 0
+            getattr(self._m, name)[:] = array
+        self._m.words[PLACES] = checkpoint.words
+        self._m.solved = 0
         self._status, self._reason = checkpoint.status, checkpoint.reason
 
     @property
     def _identity(self) -> Identity:
-        return Identity.of(self._program.description, self._program.system, self._m["par"])
+        return Identity.of(self._program.description, self._program.system, self._m.par)
 
     def _face(self, end: float) -> None:
         """Turn steps of varying length towards a time."""
-        if (end - self.t) * self._real[at.NEXT] < 0.0:
+        if (end - self.t) * self._m.next < 0.0:
             self._turn()
 
     def _turn(self) -> None:
         """Reverse the direction, here."""
-        real, count = self._real, self._count
-        count[at.SOLVED] = 0
+        self._m.solved = 0
         if self._varying:
-            count[at.ACCEPTED] = 0
-            real[at.NEXT] = -real[at.NEXT]
+            self._m.accepted = 0
+            self._m.next = -self._m.next
         else:
-            real[at.T0], count[at.N], real[at.H] = self.t, 0, -real[at.H]
+            self._m.t0, self._m.n, self._m.h = self.t, 0, -self._m.h
 
     def _run(
         self, between: int, times: Array, targets: Counts | None = None, parts: Array | None = None
     ) -> Samples:
         """Make the samples, in chunks so that Ctrl-C is heard between them."""
-        out = np.empty((times.size, self._m["y"].size))
-        what = at.VARY if targets is None else at.ADVANCE
-        outcome, made, crawl = at.BUDGET, 0, ""
+        out = np.empty((times.size, self._m.y.size))
+        what = VARY if targets is None else ADVANCE
+        outcome, made, crawl = BUDGET, 0, ""
         watch = Crawl(self.t, float(times[-1]))
-        while outcome == at.BUDGET and not crawl:
-            before = int(self._count[at.STEPS])
+        while outcome == BUDGET and not crawl:
+            before = self._m.steps
             with self._pace:
                 outcome = self._call(what, between, times, targets, parts, made, out, self._pace.steps)
-            made = int(self._count[at.MADE])
-            if outcome == at.BUDGET and self._varying:
-                crawl = watch.sees(self.t, int(self._count[at.STEPS]) - before)
-        if (
-            outcome not in (at.DONE, at.BUDGET)
-            and between == at.SIDE
-            and targets is not None
-            and parts is not None
-        ):
+            made = self._m.made
+            if outcome == BUDGET and self._varying:
+                crawl = watch.sees(self.t, self._m.steps - before)
+        if outcome not in (DONE, BUDGET) and between == SIDE and targets is not None and parts is not None:
             # Near a singularity a part of the step that failed may have a solution, far from the trajectory.
-            inside = (targets[:made] == self._count[at.N]) & (parts[:made] != 0.0)
+            inside = (targets[:made] == self._m.n) & (parts[:made] != 0.0)
             made -= int(inside.sum())
         return self._samples(times[:made], out[:made], outcome, crawl)
 
@@ -250,30 +255,30 @@ class LineStepper:
         """Take own steps of varying length; as `integrators.kernel.stepper_own.AdaptiveStepper.walk`."""
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
-        outcome, steps, crawl = at.BUDGET, 0, ""
+        outcome, steps, crawl = BUDGET, 0, ""
         watch = Crawl(self.t, end)
-        while outcome == at.BUDGET and (limit is None or steps < limit) and not crawl:
+        while outcome == BUDGET and (limit is None or steps < limit) and not crawl:
             n = self._pace.steps if limit is None else min(limit - steps, self._pace.steps)
             if longest < np.inf:
                 n = 1
-                self._real[at.NEXT] = np.clip(self._real[at.NEXT], -longest, longest)
-            times, out = np.empty(n), np.empty((n, self._m["y"].size))
+                self._m.next = np.clip(self._m.next, -longest, longest)
+            times, out = np.full(n, end), np.empty((n, self._m.y.size))
             with self._pace:
-                outcome = self._call(at.WALK, at.SIDE, times, None, None, 0, out, n, end)
-            made = int(self._count[at.MADE])
+                outcome = self._call(WALK, SIDE, times, None, None, 0, out, n)
+            made = self._m.made
             steps += made
             pieces.append((times[:made], out[:made]))
-            if outcome == at.BUDGET and limit is None:
+            if outcome == BUDGET and limit is None:
                 crawl = watch.sees(self.t, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return self._samples(t, y, at.DONE if outcome == at.BUDGET else outcome, crawl)
+        return self._samples(t, y, DONE if outcome == BUDGET else outcome, crawl)
 
     def _samples(self, t: Array, y: Array, outcome: int, crawl: str) -> Samples:
         status = Status.FINISHED
         if crawl:
             status, self._reason = Status.STALLED, crawl
             self._status = status
-        elif outcome != at.DONE:
+        elif outcome != DONE:
             status, self._reason = self._failure(outcome)
             self._status = status
         return Samples(t, y, status, self._reason)
@@ -281,38 +286,37 @@ class LineStepper:
     def _call(
         self,
         what: int,
-        between: int = at.SIDE,
+        between: int = SIDE,
         times: Array | None = None,
         targets: Counts | None = None,
         parts: Array | None = None,
         made: int = 0,
         out: Array | None = None,
         budget: int = 0,
-        end: float = 0.0,
     ) -> int:
         arrays = [None if a is None else np.ascontiguousarray(a) for a in (times, targets, parts, out)]
         t, n, p, y = (0 if a is None else a.ctypes.data for a in arrays)
         size = 0 if times is None else times.size
-        return self._entry(what, self._words.ctypes.data, between, size, t, n, p, made, y, budget, end)
+        return engine.line(what, self._m.address, between, size, t, n, p, made, y, budget)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""
-        t, real = self.t, self._real
-        if outcome == at.NOT_FINITE:
+        t = self.t
+        if outcome == NOT_FINITE:
             return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
-        if outcome == at.UNDERFLOW:
+        if outcome == UNDERFLOW:
             return Status.STEP_UNDERFLOW, (
                 f"no step from t = {t!r} is short enough for tol={self._program.tol!r}; "
                 "the solution may end or be singular here."
             )
-        if outcome == at.NOT_KEPT:
-            name = self._program.components[int(self._count[at.CULPRIT])]
+        if outcome == NOT_KEPT:
+            name = self._program.components[self._m.culprit]
             return Status.NOT_INVARIANT, (
                 f"{name} is not an invariant: in the step from t = {t!r} the terms of its rate of change "
-                f"do not cancel, but leave {float(real[at.DEFECT]):.1e} of their size; leave it out."
+                f"do not cancel, but leave {self._m.defect:.1e} of their size; leave it out."
             )
         return Status.NONLINEAR_DIVERGENCE, (
             f"the fixed-point iteration did not converge in the step from t = {t!r}, "
-            f"h = {float(real[at.H])!r} (last relative change {float(real[at.CHANGE]):.1e}); "
+            f"h = {self._m.h!r} (last relative change {self._m.change:.1e}); "
             "take a smaller h."
         )

@@ -136,8 +136,8 @@ def build(
 
     Parameters
     ----------
-    function : numba dispatcher
-        Must allocate nothing and raise nothing.
+    function : compiled function
+        Of `integrators.kernel.native.jit`.
     arguments : sequence of (numba type, LLVM type)
         The C function takes the LLVM types. A vector is passed by the address
         of its lanes, since its place in a call depends on the processor.
@@ -169,18 +169,18 @@ def _compiled(
     emit: Callable[[Any, Any], Made],
     around: Callable[[str], str] | None = None,
 ) -> Made:
+    from integrators.kernel.native import jit  # imports numba
+
     with lock:
-        kinds = tuple(kind for kind, _ in arguments)
-        function.compile(kinds)
-        inner = function.overloads[kinds].fndesc.llvm_func_name
-        module = llvm.parse_assembly(function.inspect_llvm(kinds))
+        module, inner = jit.module(function, tuple(kind for kind, _ in arguments))
         entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
         module.link_in(llvm.parse_assembly(entry))
         for value in [*module.functions, *module.global_variables]:
             if not value.is_declaration and value.name != ENTRY:
                 value.linkage = "internal"
         machine = _machine()
-        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+        options = llvm.create_pipeline_tuning_options(speed_level=3)
+        builder = llvm.create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)
         return emit(machine, module)
 

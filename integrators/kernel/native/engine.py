@@ -1,41 +1,60 @@
-"""The compiled kernel in this process, called with addresses."""
+"""Compiled entries in this process, called with integers and addresses."""
 
 import ctypes
-from functools import lru_cache
+from functools import cached_property
+from importlib import import_module
 from typing import Any
 
-from integrators.kernel.native import binary as native
-from integrators.kernel.native import store
+from integrators.kernel.native import binary, store
 from integrators.kernel.native.foreign import raise_error
 
-# Whose code is in the kernel: an edit of any of them makes another kernel.
-SOURCES = ("simd", "native", "layout", "step")
 
-# What the entry can do; `loops` has the same numbers.
-ADVANCE, ADVANCE_BATCH, RESET = range(3)
+class Engine:
+    """The function ``entry`` of a module: compiled, loaded, or loaded before, when it is first needed.
 
-
-def kernel() -> native.Native:
-    """Return the kernel, ``int64(int64, ... eleven in all)``, compiled, loaded, or loaded before."""
-
-    def make() -> tuple[str, bytes]:
-        from integrators.kernel.step import advance as loops  # imports numba
-
-        return " ", loops.build()
-
-    return native.obtain(store.key("kernel", native.sources(*SOURCES)), make)
-
-
-@lru_cache(maxsize=1)
-def _function() -> Any:
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 11)(kernel().address)
-
-
-def call(what: int, *arguments: int) -> int:
-    """Call the kernel; missing arguments are 0. The interpreter's lock is released meanwhile.
-
-    What a field in Python raised is raised here, as a `UserError`; the memory holds what was made before.
+    Parameters
+    ----------
+    module : str
+        Its full name; it is imported, and numba with it, only to be compiled.
+    arguments : int
+        Integers that it takes.
+    *sources : str
+        Folders and modules of the kernel whose code is in it: an edit of any makes another one.
     """
-    outcome = _function()(what, *arguments, *[0] * (10 - len(arguments)))
-    raise_error()
-    return outcome
+
+    def __init__(self, module: str, arguments: int, *sources: str):
+        self._module, self._arguments, self._sources = module, arguments, sources
+
+    def code(self) -> binary.Native:
+        """Return the machine code."""
+
+        def make() -> tuple[str, bytes]:
+            from numba import types
+
+            entry = import_module(self._module).entry
+            return " ", binary.build(entry, [(types.int64, "i64")] * self._arguments, "i64")
+
+        return binary.obtain(store.key(self._module, binary.sources(*self._sources)), make)
+
+    @cached_property
+    def _function(self) -> Any:
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * self._arguments)(self.code().address)
+
+    def __call__(self, *arguments: int) -> int:
+        """Call it; missing arguments are 0. The interpreter's lock is released meanwhile.
+
+        What a field in Python raised is raised here, as a `UserError`; the memory holds what was made before.
+        """
+        outcome = self._function(*arguments, *[0] * (self._arguments - len(arguments)))
+        raise_error()
+        return outcome
+
+
+STEPS = ("simd", "native", "context", "tables", "step")
+
+kernel = Engine("integrators.kernel.step.entry", 11, *STEPS)
+implicit = Engine("integrators.kernel.implicit.entry", 3, *STEPS, "implicit")
+line = Engine("integrators.kernel.line.loops", 10, *STEPS, "line")
+
+# What `kernel` can do; see `integrators.kernel.step.entry`.
+RESET, ADVANCE, ADVANCE_BATCH, WALK = range(4)

@@ -1,28 +1,24 @@
 """A traced vector field, compiled once behind ``void(t, stages, par, values)``.
 
-The four arguments are addresses: the times of LANES stages, the stages (rows of
-LANES doubles), the parameters, and room for the field's values, laid out like
+The four arguments are addresses: the times of 8 or 16 stages, the stages (rows of
+as many doubles), the parameters, and room for the field's values, laid out like
 the stages. The user's code runs on all stages at once. Where numba cannot type
 it on lanes, it runs on one stage after another behind the same signature.
 """
 
 from typing import Any
 
-from integrators.kernel.native import binary as native
-from integrators.kernel.native import store
+from integrators.kernel.native import binary, store
 from problems import emit
 from problems.systems.base import System
 
 ON_LANES, ONE_BY_ONE = "L", "S"
 Arguments = list[tuple[Any, str]]
 
-FUSED_ROWS = 4
-"""Components of a stage up to which whole sweeps are compiled with the field."""
-
 SOURCES = ("simd", "native")
 
 
-def compile_field(system: System, what: str, lanes: int) -> native.Native:
+def compile_field(system: System, what: str, lanes: int) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
@@ -40,35 +36,8 @@ def compile_field(system: System, what: str, lanes: int) -> native.Native:
         Its note is `ON_LANES` or `ONE_BY_ONE`.
     """
     source = emit.source(system, what, "numba")
-    name = store.key("field", source.text, str(lanes), native.sources(*SOURCES))
-    return native.obtain(name, lambda: build(emit.numba(system, what).py_func, lanes))
-
-
-def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> native.Native:
-    """Compile ``void(context, count, tested)``, or load it: for a field on lanes, and factors in the matrix.
-
-    It does ``count`` sweeps. If ``tested`` is not 0, OTHER_Q then holds the stages before
-    the last one, and CHANGE the largest change relative to the size of its block.
-
-    Parameters
-    ----------
-    system, what, lanes
-        As for `compile_field`; ``lanes`` are all stages.
-    rows : int
-        Components of a stage.
-    """
-    source = emit.source(system, what, "numba")
-    modules = native.sources(*SOURCES, "layout", "step/fused")
-    name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
-
-    def make() -> tuple[str, bytes]:
-        from integrators.kernel.step import fused
-
-        function, arguments = on_lanes(emit.numba(system, what).py_func, lanes)
-        code = native.build(function, arguments, around=lambda inner: fused.sweeps(inner, lanes, rows))
-        return ON_LANES, code
-
-    return native.obtain(name, make)
+    name = store.key("field", source.text, str(lanes), binary.sources(*SOURCES))
+    return binary.obtain(name, lambda: build(emit.numba(system, what).py_func, lanes))
 
 
 def build(function: Any, lanes: int) -> tuple[str, bytes]:
@@ -99,38 +68,40 @@ def assembly(system: System, what: str, lanes: int) -> str:
 
     function = emit.numba(system, what).py_func
     try:
-        return native.assembly(*on_lanes(function, lanes))
+        return binary.assembly(*on_lanes(function, lanes))
     except NumbaError:
-        return native.assembly(*_one_by_one(function, lanes))
+        return binary.assembly(*_one_by_one(function, lanes))
 
 
 def build_on_lanes(function: Any, lanes: int) -> bytes:
     """Compile ``function(t, y, par, out)`` with t and y[i] as lanes."""
-    return native.build(*on_lanes(function, lanes))
+    return binary.build(*on_lanes(function, lanes))
 
 
 def build_one_by_one(function: Any, lanes: int) -> bytes:
     """Compile a loop over stages that calls ``function`` with scalars."""
-    return native.build(*_one_by_one(function, lanes))
+    return binary.build(*_one_by_one(function, lanes))
 
 
 def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
-    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `native.build`."""
-    from integrators.kernel.simd import functions as lane_functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
+    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `binary.build`."""
+    from integrators.kernel.native.jit import compiled
+    from integrators.kernel.simd import functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.simd.lanes import Lanes
-    from integrators.kernel.simd.views import Rows, Strided
+    from integrators.kernel.simd.views import DOUBLES, Rows
 
     stages = Rows(lanes)
-    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (Strided(1), "ptr"), (stages, "ptr")]
-    return _jit(function), arguments
+    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (DOUBLES, "ptr"), (stages, "ptr")]
+    return compiled(function), arguments
 
 
 def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
     from numba import types
 
+    from integrators.kernel.native.jit import compiled
     from integrators.kernel.simd.views import strided
 
-    scalar = _jit(function)
+    scalar = compiled(function)
 
     def loop(t, stages, par, values):
         for stage in range(lanes):
@@ -139,11 +110,4 @@ def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:
                 time, strided(stages + 8 * stage, lanes), strided(par, 1), strided(values + 8 * stage, lanes)
             )
 
-    return _jit(loop), [(types.int64, "i64")] * 4
-
-
-def _jit(function: Any) -> Any:
-    import numba
-
-    njit: Any = numba.njit
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return compiled(loop), [(types.int64, "i64")] * 4

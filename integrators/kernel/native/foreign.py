@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from integrators.kernel.native import binary as native
+from integrators.kernel.native import binary
 from integrators.kernel.native.field import ONE_BY_ONE, compile_field
 from integrators.protocol import UserError
 from problems.systems.base import System
@@ -29,7 +29,7 @@ class _Raised(threading.local):
 _raised = _Raised()
 
 
-def field_of(system: System, what: str, lanes: int) -> native.Native:
+def field_of(system: System, what: str, lanes: int) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises
@@ -42,12 +42,12 @@ def field_of(system: System, what: str, lanes: int) -> native.Native:
     if not isinstance(system, Foreign) or what != "field":
         return compile_field(system, what, lanes)
     started = perf_counter()
-    with native.lock:  # two of them would leave one thread with the address of what the other throws away
+    with binary.lock:  # two of them would leave one thread with the address of what the other throws away
         known = lanes in system.native
         if not known:
             system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
         address, _ = system.native[lanes]
-    return native.Native(address, ONE_BY_ONE, known, perf_counter() - started)
+    return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
 
 
 def raise_error() -> None:

@@ -18,9 +18,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel.simd.lanes import Lanes, llvm_call, register, vector
+from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
+from integrators.kernel.simd.lanes import Lanes, register
 
-INTEGER = ir.IntType(64)
 # Adding 1.5 * 2^52 leaves the nearest whole number in the lowest bits.
 SHIFT = 6755399441055744.0
 SHIFT_BITS = 0x4338000000000000

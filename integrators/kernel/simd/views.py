@@ -1,8 +1,11 @@
-"""Views of memory for vector fields: structure-of-arrays rows of lanes, and strided numbers.
+"""Views of memory: rows of lanes, and numbers one after another or with gaps.
 
-A vector field is called with `Rows`, the view ``y[i] -> Lanes`` of
-structure-of-arrays memory, and `Strided`, the view ``par[i] -> float`` that
-also serves one stage at a time where a field cannot run on lanes.
+Views are addresses and nothing else: nothing is reference-counted, bounds-checked or
+wrapped; the one who calls is trusted.
+
+``rows[i]``, of `Rows`, is a `Lanes`: what a vector field is called with. ``x[i]``, of
+`Numbers`, is one number, and ``x + n`` the view from number n on: the arrays of a
+trajectory, the parameters, and one stage at a time where a field cannot run on lanes.
 """
 
 import operator
@@ -13,16 +16,14 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, signature
 from numba.extending import models, register_model
 
+from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
 from integrators.kernel.simd.lanes import (
-    ALIGNMENT,
-    DOUBLE,
     Lanes,
     arguments_for,
     infer_global,
     intrinsic,
     lower_builtin,
     spread_to,
-    vector,
 )
 
 
@@ -34,26 +35,39 @@ class Rows(types.Type):
         super().__init__(name=f"Rows({count})")
 
 
-class Strided(types.Type):
-    """Memory with K doubles from one item to the next: ``view[i]`` is a float."""
+class Numbers(types.Type):
+    """Memory with a number every ``stride`` words: ``view[i]`` is a double, or an integer."""
 
-    def __init__(self, stride: int):
-        self.stride = stride
-        super().__init__(name=f"Strided({stride})")
+    def __init__(self, stride: int = 1, of: Any = types.float64):
+        self.stride, self.of = stride, of
+        super().__init__(name=f"Numbers({stride}, {of})")
+
+
+DOUBLES = Numbers()
+INTEGERS = Numbers(of=types.int64)
 
 
 @register_model(Rows)
-@register_model(Strided)
-class _PointerModel(models.PrimitiveModel):
+class _RowsModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any):
         super().__init__(manager, kind, DOUBLE.as_pointer())
+
+
+@register_model(Numbers)
+class _NumbersModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, _item(kind).as_pointer())
+
+
+def _item(view: Any) -> Any:
+    return DOUBLE if view.of == types.float64 else INTEGER
 
 
 def _aligned(stride: int) -> int:
     return min(ALIGNMENT, 8 * stride)
 
 
-def _element(builder: Any, pointer: Any, index: Any, stride: int, kind: Any) -> Any:
+def element(builder: Any, pointer: Any, index: Any, stride: int, kind: Any) -> Any:
     """Return the address of item ``index`` as a pointer to ``kind``."""
     if stride != 1:
         index = builder.mul(index, ir.Constant(index.type, stride))
@@ -68,7 +82,7 @@ class _GetItem(AbstractTemplate):
             return None
         if isinstance(view, Rows):
             return signature(Lanes(view.count), view, types.intp)
-        return signature(types.float64, view, types.intp) if isinstance(view, Strided) else None
+        return signature(view.of, view, types.intp) if isinstance(view, Numbers) else None
 
 
 @infer_global(operator.setitem)
@@ -79,15 +93,24 @@ class _SetItem(AbstractTemplate):
             return None
         if isinstance(view, Rows) and isinstance(value, Lanes | types.Number):
             return signature(types.none, view, types.intp, *arguments_for([value]))
-        if isinstance(view, Strided) and isinstance(value, types.Number):
-            return signature(types.none, view, types.intp, types.float64)
+        if isinstance(view, Numbers) and isinstance(value, types.Number):
+            return signature(types.none, view, types.intp, view.of)
+        return None
+
+
+@infer_global(operator.add)
+class _Shift(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        view, count = args
+        if isinstance(view, Numbers) and isinstance(count, types.Integer):
+            return signature(view, view, types.intp)
         return None
 
 
 @lower_builtin(operator.getitem, Rows, types.Integer)
 def _get_row(context, builder, sig, args):
     count = sig.args[0].count
-    return builder.load(_element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+    return builder.load(element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
 
 
 @lower_builtin(operator.setitem, Rows, types.Integer, Lanes)
@@ -95,34 +118,51 @@ def _get_row(context, builder, sig, args):
 def _set_row(context, builder, sig, args):
     count = sig.args[0].count
     (value,) = spread_to(builder, sig.args[2:], args[2:], count)
-    builder.store(value, _element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+    builder.store(value, element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
 
 
-@lower_builtin(operator.getitem, Strided, types.Integer)
-def _get_scalar(context, builder, sig, args):
-    return builder.load(_element(builder, args[0], args[1], sig.args[0].stride, DOUBLE))
+@lower_builtin(operator.getitem, Numbers, types.Integer)
+def _get_number(context, builder, sig, args):
+    view = sig.args[0]
+    return builder.load(element(builder, args[0], args[1], view.stride, _item(view)))
 
 
-@lower_builtin(operator.setitem, Strided, types.Integer, types.Float)
-def _set_scalar(context, builder, sig, args):
-    builder.store(args[2], _element(builder, args[0], args[1], sig.args[0].stride, DOUBLE))
+@lower_builtin(operator.setitem, Numbers, types.Integer, types.Number)
+def _set_number(context, builder, sig, args):
+    view = sig.args[0]
+    builder.store(args[2], element(builder, args[0], args[1], view.stride, _item(view)))
 
 
-def _view(kind: Any) -> Any:
-    """Make the conversion of an address (intp) to a view of type ``kind(width)``."""
+@lower_builtin(operator.add, Numbers, types.Integer)
+def _shifted(context, builder, sig, args):
+    view = sig.args[0]
+    return element(builder, args[0], args[1], view.stride, _item(view))
 
-    @intrinsic(prefer_literal=True)
-    def view(typing, address, width):
-        if not isinstance(width, types.IntegerLiteral):
-            return None
 
+@intrinsic(prefer_literal=True)
+def strided(typing, address, stride):
+    """Return the doubles at an address (intp) that are ``stride`` (a literal) words apart."""
+    if not isinstance(stride, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, sig, args):
+        return builder.inttoptr(args[0], DOUBLE.as_pointer())
+
+    return signature(Numbers(stride.literal_value), types.intp, stride), generate
+
+
+def _view(kind: Numbers) -> Any:
+    @intrinsic
+    def view(typing, address):
         def generate(context, builder, sig, args):
-            return builder.inttoptr(args[0], DOUBLE.as_pointer())
+            return builder.inttoptr(args[0], _item(kind).as_pointer())
 
-        return signature(kind(width.literal_value), types.intp, width), generate
+        return signature(kind, types.intp), generate
 
     return view
 
 
-rows = _view(Rows)
-strided = _view(Strided)
+doubles = _view(DOUBLES)
+"""``doubles(address)``: the doubles there."""
+integers = _view(INTEGERS)
+"""``integers(address)``: the integers there."""

@@ -2,7 +2,7 @@
 
 from math import exp, log
 
-from integrators.kernel.step.sweep import compiled
+from integrators.kernel.native.jit import compiled
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)

@@ -3,24 +3,68 @@
 In a small system a sweep waits for its own results: the stages are stored and loaded
 by the field, its values are stored and loaded by the product. Compiled together, one
 after another, sweeps keep stages and values in registers. The operations and their order are those
-of `products.evaluate`, `products.product8` and `products.product16`, hence the bits
-are (``tests/integrators/kernel/test_fused.py``).
+of `sweep.evaluate`, `sweep.product8` and `sweep.product16`, hence the bits
+are (``tests/integrators/kernel/step/test_fused.py``).
 """
 
 from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel import layout as at
-from integrators.kernel.native import binary as native
-from integrators.kernel.simd.lanes import ALIGNMENT, DOUBLE, llvm_call, splat, vector
-from integrators.kernel.simd.memory import INTEGER, WIDTH, Chains, larger_of, largest_of
+from integrators.kernel.context import Context
+from integrators.kernel.native import binary, field, store
+from integrators.kernel.native.memory import Slot
+from integrators.kernel.simd.emit import (
+    ALIGNMENT,
+    DOUBLE,
+    INTEGER,
+    WIDTH,
+    Chains,
+    indices,
+    larger_of,
+    largest_of,
+    llvm_call,
+    splat,
+    vector,
+)
+from problems import emit
+from problems.systems.base import System
 
 SWEEP = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
 
 
+ROWS = 4
+"""Components of a stage up to which whole sweeps are compiled with the field."""
+
+
+def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> binary.Native:
+    """Compile ``void(context, count, tested)``, or load it: for a field on lanes, and factors in the matrix.
+
+    It does ``count`` sweeps. If ``tested`` is not 0, `Context.old_stages` then holds the stages before
+    the last one, and `Context.change` the largest change relative to the size of its block.
+
+    Parameters
+    ----------
+    system, what, lanes
+        As for `field.compile_field`; ``lanes`` are all stages.
+    rows : int
+        Components of a stage.
+    """
+    source = emit.source(system, what, "numba")
+    modules = binary.sources(*field.SOURCES, "context", "step/fused")
+    name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
+
+    def make() -> tuple[str, bytes]:
+        function, arguments = field.on_lanes(emit.numba(system, what).py_func, lanes)
+        return field.ON_LANES, binary.build(
+            function, arguments, around=lambda inner: sweeps(inner, lanes, rows)
+        )
+
+    return binary.obtain(name, make)
+
+
 def sweeps(inner: str, lanes: int, rows: int) -> str:
-    """Return LLVM's text of what `field.compile_sweeps` promises, around the compiled field ``inner``."""
+    """Return LLVM's text of what `compile_sweeps` promises, around the compiled field ``inner``."""
     module = ir.Module()
     pointer = DOUBLE.as_pointer()
     whole, eight = vector(lanes), vector(WIDTH)
@@ -28,17 +72,17 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
         ir.IntType(32), [pointer.as_pointer(), pointer.as_pointer(), whole, pointer, pointer, pointer]
     )
     field = ir.Function(module, status, inner)
-    sweep = ir.Function(module, SWEEP, native.ENTRY)
+    sweep = ir.Function(module, SWEEP, binary.ENTRY)
     context, count, tested = sweep.args
     sweep.attributes.alignstack = ALIGNMENT
     b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
-    def slot(number: int) -> Any:
-        return b.gep(words, [ir.Constant(INTEGER, number)])
+    def word(slot: Slot) -> Any:
+        return b.gep(words, [ir.Constant(INTEGER, slot.place)])
 
-    def array(number: int) -> Any:
-        return b.inttoptr(b.load(slot(number)), pointer)
+    def array(slot: Slot) -> Any:
+        return b.inttoptr(b.load(word(slot)), pointer)
 
     def place(base: Any, index: int, kind: Any) -> Any:
         return b.bitcast(b.gep(base, [ir.Constant(INTEGER, index)]), kind.as_pointer())
@@ -51,23 +95,21 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
 
     def lane(value: Any, j: int) -> Any:
         """Return lane j in eight lanes."""
-        chosen = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [j] * WIDTH)
-        return b.shuffle_vector(value, ir.Constant(value.type, ir.Undefined), chosen)
+        return b.shuffle_vector(value, ir.Constant(value.type, ir.Undefined), indices(*[j] * WIDTH))
 
     def joined(halves: list[Any]) -> Any:
         if len(halves) == 1:
             return halves[0]
-        order = ir.Constant(ir.VectorType(ir.IntType(32), lanes), list(range(lanes)))
-        return b.shuffle_vector(*halves, order)
+        return b.shuffle_vector(*halves, indices(*range(lanes)))
 
     room = ir.ArrayType(whole, rows)
     stages, values = b.alloca(room), b.alloca(room)
     stages.align = values.align = ALIGNMENT
     result, exception = b.alloca(pointer), b.alloca(pointer)
-    q, other, f = array(at.Q), array(at.OTHER_Q), array(at.F)
-    par = array(at.PAR)
-    times = get(array(at.TIMES), 0, whole)
-    state, base, scale = array(at.ROW_STATE), array(at.BASE), array(at.STRICT)
+    q, other, f = array(Context.stages), array(Context.old_stages), array(Context.values)
+    par = array(Context.par)
+    times = get(array(Context.times), 0, whole)
+    state, base, scale = array(Context.row_state), array(Context.base), array(Context.strict)
     parts = range(lanes // WIDTH)
     starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
     states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
@@ -84,7 +126,7 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     b.call(field, [result, exception, times, at_stages, par, at_values])
     found = [get(at_values, lanes * d, whole) for d in range(rows)]
     # Column by column, for few of them to be in registers at a time; loaded anew by every sweep.
-    matrix = b.inttoptr(b.load_atomic(slot(at.MATRIX), "monotonic", 8), pointer)
+    matrix = b.inttoptr(b.load_atomic(word(Context.matrix), "monotonic", 8), pointer)
     sums = {(d, part): Chains(b, lanes, starts[d][part]) for d in range(rows) for part in parts}
     for j in range(lanes):
         columns = [get(matrix, lanes * WIDTH * part + WIDTH * j, eight) for part in parts]
@@ -111,13 +153,11 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
             put(old[d], other, lanes * d)
             size = splat(b, get(scale, d, DOUBLE), WIDTH)
             for part in parts:
-                chosen = ir.Constant(
-                    ir.VectorType(ir.IntType(32), WIDTH), list(range(WIDTH * part, WIDTH * (part + 1)))
-                )
+                chosen = indices(*range(WIDTH * part, WIDTH * (part + 1)))
                 moved = b.fsub(
                     b.shuffle_vector(new[d], new[d], chosen), b.shuffle_vector(old[d], old[d], chosen)
                 )
                 top = larger_of(b, top, b.fmul(llvm_call(b, "fabs", moved), size))
-        b.store(largest_of(b, top), b.bitcast(slot(at.CHANGE), pointer))
+        b.store(largest_of(b, top), b.bitcast(word(Context.change), pointer))
     b.ret_void()
     return str(module)

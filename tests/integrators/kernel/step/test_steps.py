@@ -6,9 +6,8 @@ from numba.core.errors import TypingError
 
 import problems
 from integrators import legendre
-from integrators.kernel import layout, tables
-from integrators.kernel.native import binary as native
-from integrators.kernel.native import field
+from integrators.kernel import tables
+from integrators.kernel.native import binary, field
 from integrators.kernel.program import HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField, emit
@@ -131,12 +130,12 @@ def test_idle_lanes_and_routes_change_only_rounding(chain, monkeypatch, k, s, fo
     expected, _ = steps_of(chain, k, s, 0.25, 3, form)
     tables.constants.cache_clear()
     for lanes in (8, 16):
-        for route in (layout.WIDE, layout.THROUGH):
+        for route in (tables.WIDE, tables.THROUGH):
             monkeypatch.setattr(tables, "lanes_for", lambda k, lanes=lanes: lanes)
             monkeypatch.setattr(tables, "route_for", lambda k, s, lanes, route=route: route)
             tables.constants.cache_clear()
             found, stepper = steps_of(chain, k, s, 0.25, 3, form)
-            assert stepper._context.words[layout.ROUTE] == route
+            assert stepper._context.route == route
             assert np.abs(found - expected).max() < 4e-16, (lanes, route)  # measured 1.7e-16
     tables.constants.cache_clear()
 
@@ -196,8 +195,8 @@ def test_a_field_that_cannot_run_on_lanes_runs_stage_by_stage(chain, driven, mon
     def refuse(function, lanes):
         raise TypingError("not on lanes")
 
-    kernel = {name: code for name, code in native._loaded.items() if code.note == " "}
-    monkeypatch.setattr(native, "_loaded", kernel)
+    kernel = {name: code for name, code in binary._loaded.items() if code.note == " "}
+    monkeypatch.setattr(binary, "_loaded", kernel)
     monkeypatch.setattr(field, "build_on_lanes", refuse)
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path))
     for problem, (states, stepper) in zip(problems, expected, strict=True):

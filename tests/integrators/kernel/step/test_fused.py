@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import problems
-from integrators.kernel import layout
-from integrators.kernel.native import field
 from integrators.kernel.program import HBVMProgram
+from integrators.kernel.step import fused as whole
 
 CASES = [
     ("kepler", {"k": 8, "s": 8, "h": 0.2}),
@@ -29,10 +28,10 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     problem = problems.load(name)
     times = np.arange(1, 60) * (0.7 * settings["h"])  # partial steps as well
     program = HBVMProgram(problem.system, **settings)
-    assert program.context().words[layout.FUSED] != 0
+    assert program.context().fused != 0
     fused = run(problem, settings, times)
-    monkeypatch.setattr(field, "FUSED_ROWS", 0)
-    assert HBVMProgram(problem.system, **settings).context().words[layout.FUSED] == 0
+    monkeypatch.setattr(whole, "ROWS", 0)
+    assert HBVMProgram(problem.system, **settings).context().fused == 0
     alone = run(problem, settings, times)
     assert fused[0].tobytes() == alone[0].tobytes()
     assert fused[1] == alone[1]
@@ -40,7 +39,7 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
 
 def test_larger_systems_wider_methods_and_other_masses_are_not_fused():
     def fused(problem, **settings):
-        return HBVMProgram(problem.system, **settings).context().words[layout.FUSED] != 0
+        return HBVMProgram(problem.system, **settings).context().fused != 0
 
     assert not fused(problems.load("outer_solar_system"), k=8, s=8, h=1.0)
     assert not fused(problems.load("kepler"), k=20, s=8, h=0.1)
@@ -54,7 +53,7 @@ def test_a_step_is_solved_with_the_last_change_still_visible_and_its_effect_remo
     changes = []
     for n in range(1, 40):
         stepper.advance([0.2 * n])
-        changes.append(stepper._context.reals[layout.LAST])
+        changes.append(stepper._context.last)
     assert max(changes) > 1e-16  # measured 6.8e-14: without the prediction it would have gone on
     energy = problem.errors(stepper.y[None])["energy"].max()
     assert energy < 5e-15  # measured 1.2e-15
