@@ -258,9 +258,8 @@ class Context(Memory):
         self.row_factor[:] = 1.0
         self.kick_factor.reshape(-1, 8)[:, :4] = 1.0
 
-    @property
-    def y(self) -> Numbers:
-        """A copy of the state, as (q, p) or y; shape (dim,)."""
+    def read(self) -> Numbers:
+        """Return a copy of the state, as (q, p) or y; shape (dim,)."""
         state, rows = self.state, self.shape.rows
         if not self.shape.second:
             return state[:rows].copy()

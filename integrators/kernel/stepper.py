@@ -42,19 +42,6 @@ FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is 
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
 
-# What a checkpoint holds besides the state and its error; the values matter to the next start.
-WORDS = (
-    "h", "t0", "n", "length", "solved", "age", "free",
-    "implicit", "slow", "held", "left",
-)  # fmt: skip
-ARRAYS = ("values", "strict", "floored")
-# What a checkpoint holds besides that of steps of one length.
-MORE_WORDS = (
-    "time_low", "next_length", "length_after", "length_behind",
-    "error_behind", "error_ahead", "defect_behind", "defect_ahead",
-    "length_limit", "log_rate", "kinks", "kink_end", "doubt_end",
-)  # fmt: skip
-
 
 class Program(Protocol):
     """What a stepper asks of its program; see `integrators.kernel.program`."""
@@ -85,20 +72,17 @@ class VaryingProgram(Program, Protocol):
     breakpoints: Array
 
 
-def _places(names: tuple[str, ...]) -> list[int]:
-    return [Context.slots[name].place for name in names]
-
-
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """All that the continuation of an `HBVMStepper` depends on."""
+    """All that the continuation of a stepper depends on."""
 
     identity: Identity
     words: Counts
     state: Array
-    e: Array
+    e: Array  # what the state has lost to rounding
     arrays: tuple[Array, ...]
     implicit: tuple[Any, ...] | None
+    taken: int  # steps since the trajectory's start
     status: Status
     reason: str
 
@@ -124,7 +108,13 @@ class HBVMStepper:
         keep the energy.
     """
 
-    _kind: ClassVar[type[Checkpoint]] = Checkpoint
+    # What a checkpoint holds besides the state and its error; the values matter to the next start.
+    _words: ClassVar[tuple[str, ...]] = (
+        "h", "t0", "n", "length", "solved", "age", "free", "implicit", "slow", "held", "left",
+    )  # fmt: skip
+    _arrays: ClassVar[tuple[str, ...]] = ("values", "strict", "floored")
+    _state: ClassVar[tuple[str, str]] = ("state", "error")
+    _engine: ClassVar[engine.Engine] = engine.kernel
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
@@ -132,23 +122,34 @@ class HBVMStepper:
     def __init__(self, program: Program, y: Array, par: Array, t0: float):
         self._at_work = threading.RLock()
         self._program = program
-        self._context = program.context()
-        self._side = program.context(side=True)
+        self._implicit: tuple[Workspace, Workspace] | None = None
+        self._dim, self._pace = y.size, Pace(CHUNK, y.size)
+        self._status, self._reason = Status.RUNNING, ""
+        self._context, self._side = self._memories(y, par, t0)
+        self._begin(y, t0)
+
+    def _memories(self, y: Array, par: Array, t0: float) -> tuple[Any, Any]:
+        """Return the memory of the trajectory, and that of partial steps."""
+        program = self._program
+        self._context, self._side = program.context(), program.context(side=True)
         for context in (self._context, self._side):
             program.load(context, par)
-        self._dim, self._pace = y.size, Pace(CHUNK, y.size)
-        self._begin(y, t0)
-        self._implicit: tuple[Workspace, Workspace] | None = None
         self._context.strategy = program.solver.strategy
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
-        self._status, self._reason = Status.RUNNING, ""
+        return self._context, self._side
 
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
+        ctx = self._context
+        self._uncounted = ctx.steps  # steps that are not of this trajectory
+        ctx.t0 = t0
+        self._first_length(t0)
+        self._engine(engine.RESET, ctx.address, *[0] * 7, y.ctypes.data)
+
+    def _first_length(self, t0: float) -> None:
+        """Set the length of the first step from t0."""
         self._context.h = self._program.h
-        self._context.t0 = t0
-        engine.kernel(engine.RESET, self._context.address, *[0] * 7, y.ctypes.data)
 
     @one_thread
     def single(self, y: ArrayLike, t0: float, t: float) -> Samples:
@@ -178,7 +179,7 @@ class HBVMStepper:
     @one_thread
     def y(self) -> Array:
         """A copy of the state at the last own step."""
-        return self._context.y
+        return self._context.read()
 
     @property
     def status(self) -> Status:
@@ -303,24 +304,34 @@ class HBVMStepper:
         ctx = self._context
         ctx.t0, ctx.n = t0, 0
         self._set_step(-ctx.h)
-        if ctx.solved:
-            ctx.solved, ctx.length = 0, 0.0
+        self._forget()
+
+    def _forget(self) -> None:
+        """Forget the step ahead, and what is known of it."""
+        if self._context.solved:
+            self._context.solved, self._context.length = 0, 0.0
 
     def _set_step(self, h: float) -> None:
         self._context.point(self._program.scaled(h))
         self._context.set_factors(h)
 
+    @property
+    def _places(self) -> list[int]:
+        """Words of a checkpoint."""
+        return [self._context.slots[name].place for name in self._words]
+
     @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
-        context = self._context
+        state, error, *arrays = (getattr(self._context, name).copy() for name in self._state + self._arrays)
         return Checkpoint(
             self._identity,
-            context.words[_places(WORDS)],
-            context.state.copy(),
-            context.error.copy(),
-            tuple(getattr(context, name).copy() for name in ARRAYS),
+            self._context.words[self._places],
+            state,
+            error,
+            tuple(arrays),
             None if self._implicit is None else self._implicit[0].save(),
+            self._taken,
             self._status,
             self._reason,
         )
@@ -335,17 +346,21 @@ class HBVMStepper:
             If the checkpoint is that of another method, of other options, another system or
             other parameters; the stepper stays where it is.
         """
-        self._identity.check(checkpoint, self._kind)
-        context = self._context
-        context.words[_places(WORDS)] = checkpoint.words
-        self._set_step(context.h)
-        context.state[:] = checkpoint.state
-        context.error[:] = checkpoint.e
-        for name, array in zip(ARRAYS, checkpoint.arrays, strict=True):
-            getattr(context, name)[:] = array
+        self._identity.check(checkpoint, Checkpoint)
+        self._context.words[self._places] = checkpoint.words
+        self._set_step(self._context.h)
+        kept = (checkpoint.state, checkpoint.e, *checkpoint.arrays)
+        for name, array in zip(self._state + self._arrays, kept, strict=True):
+            getattr(self._context, name)[:] = array
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
+        self._uncounted = self._context.steps - checkpoint.taken
         self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
+
+    @property
+    def _taken(self) -> int:
+        """Steps from the trajectory's start to the present; the counters keep counting after a `restore`."""
+        return self._context.steps - self._uncounted
 
     @property
     def _identity(self) -> Identity:
@@ -356,46 +371,56 @@ class HBVMStepper:
             raise KeyboardInterrupt
 
     def _run(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
-        """Run the kernel over the samples, in chunks so that Ctrl-C is heard between them."""
-        context = self._context
+        """Make the samples, in chunks so that Ctrl-C is heard between them."""
         out = np.empty((times.size, self._dim))
-        arrays = [np.ascontiguousarray(array) for array in (times, targets, parts)]
+        times, parts = np.ascontiguousarray(times), np.ascontiguousarray(parts)
+        targets = np.ascontiguousarray(targets)
         outcome, made = BUDGET, 0
         while outcome == BUDGET:
-            if context.wanted:
-                self._take_implicit()
-            try:
-                with self._pace:
-                    outcome = engine.kernel(
-                        engine.ADVANCE, context.address, self._side.address, between, times.size,
-                        *(array.ctypes.data for array in arrays), made, out.ctypes.data, self._pace.steps,
-                    )  # fmt: skip
-            except UserError as raised:
-                outcome, self.error = NOT_FINITE, raised.error
-            made = context.made
-            self._heed_stop()
-            for workspace in self._implicit or ():
-                workspace.raise_what_is_no_failure()
-        status = Status.FINISHED
-        if outcome != DONE:
-            status, self._reason = self._failure(outcome)
-            self._status = status
-        return Samples(times[:made], out[:made], status, self._reason)
+            outcome = self._call(
+                engine.ADVANCE, between, times, out, made, self._pace.steps,
+                targets.ctypes.data, parts.ctypes.data,
+            )  # fmt: skip
+            made = self._context.made
+        return self._samples(times[:made], out[:made], outcome)
+
+    def _call(
+        self, what: int, between: int, times: Array, out: Array, made: int, budget: int,
+        targets: int = 0, parts: int = 0,
+    ) -> int:  # fmt: skip
+        """Call the kernel once; put the implicit solver to work where it is wanted."""
+        if self._wants_solver:
+            self._take_implicit()
+        try:
+            with self._pace:
+                outcome = self._engine(
+                    what, self._context.address, self._side.address, between, times.size,
+                    times.ctypes.data, targets, parts, made, out.ctypes.data, budget,
+                )  # fmt: skip
+        except UserError as raised:
+            outcome, self.error = NOT_FINITE, raised.error
+        self._heed_stop()
+        for workspace in self._implicit or ():
+            workspace.raise_what_is_no_failure()
+        return outcome
+
+    @property
+    def _wants_solver(self) -> bool:
+        """Whether the kernel has come back for the implicit solver."""
+        return self._context.wanted != 0
+
+    def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None" = None) -> Samples:
+        if why is None and outcome != DONE:
+            why = self._failure(outcome)
+        if why is not None:
+            self._status, self._reason = why
+        return Samples(t, y, Status.FINISHED if why is None else why[0], self._reason)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""
         if self.error is not None:
             return Status.USER_ERROR, f"{UserError(self.error)} in the step from t = {self.t!r}."
         return failure(outcome, self._context, self.t, self._solver)
-
-
-@dataclass(frozen=True, eq=False)
-class AdaptiveCheckpoint(Checkpoint):
-    """All that the continuation of an `AdaptiveStepper` depends on."""
-
-    ahead: tuple[Array, Array]
-    places: Array  # of kinks
-    taken: int  # steps since the trajectory's start
 
 
 class AdaptiveStepper(HBVMStepper):
@@ -408,15 +433,17 @@ class AdaptiveStepper(HBVMStepper):
     """
 
     _program: VaryingProgram
-    _kind = AdaptiveCheckpoint
+    _words = (
+        *HBVMStepper._words,
+        "time_low", "next_length", "length_after", "length_behind",
+        "error_behind", "error_ahead", "defect_behind", "defect_ahead",
+        "length_limit", "log_rate", "kinks", "kink_end", "doubt_end",
+    )  # fmt: skip
+    _arrays = (*HBVMStepper._arrays, "next_state", "next_error", "kink_places")
 
-    def _begin(self, y: Array, t0: float) -> None:
-        """Put the trajectory at its start."""
-        ctx = self._context
-        self._uncounted = self._context.steps  # steps that are not of this trajectory
-        ctx.t0 = ctx.doubt_end = t0
-        ctx.next_length = self._program.first or 0.0
-        engine.kernel(engine.RESET, ctx.address, *[0] * 7, y.ctypes.data)
+    def _first_length(self, t0: float) -> None:
+        self._context.next_length = self._program.first or 0.0
+        self._context.doubt_end = t0
 
     @property
     def t(self) -> float:
@@ -436,13 +463,6 @@ class AdaptiveStepper(HBVMStepper):
             kept = context.kink_places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return replace(stats, rejections=context.rejections, extra=extra)
-
-    @one_thread
-    def step(self) -> Status:
-        """Take one step; after a failure, do nothing."""
-        if not self._status.failed:
-            self.take(1)
-        return self._status
 
     @one_thread
     def take(self, count: int) -> Samples:
@@ -468,7 +488,9 @@ class AdaptiveStepper(HBVMStepper):
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
         ctx, points = self._context, self._program.breakpoints
         ahead = ctx.next_length > 0.0
-        points = points[[not self._is_at(point) for point in points.tolist()]] if points.size else points
+        if not points.size:
+            return math.inf if ahead else -math.inf
+        points = points[[not self._is_at(point) for point in points.tolist()]]
         found = points[points > self.t] if ahead else points[points < self.t][::-1]
         stop = float(found[0]) if found.size else math.inf if ahead else -math.inf
         ctx.stop = stop
@@ -490,33 +512,6 @@ class AdaptiveStepper(HBVMStepper):
         ctx.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
         ctx.solved = ctx.age = 0
 
-    @one_thread
-    def checkpoint(self) -> AdaptiveCheckpoint:
-        """Return a copy of all that the continuation depends on."""
-        context = self._context
-        base = vars(super().checkpoint())
-        base["words"] = context.words[_places(WORDS + MORE_WORDS)]
-        ahead = (context.next_state.copy(), context.next_error.copy())
-        return AdaptiveCheckpoint(**base, ahead=ahead, places=context.kink_places.copy(), taken=self._taken)
-
-    @one_thread
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; as `HBVMStepper.restore`."""
-        self._identity.check(checkpoint, self._kind)
-        own = len(WORDS)
-        super().restore(replace(checkpoint, words=checkpoint.words[:own]))
-        assert isinstance(checkpoint, AdaptiveCheckpoint)
-        context = self._context
-        context.words[_places(MORE_WORDS)] = checkpoint.words[own:]
-        context.next_state[:], context.next_error[:] = checkpoint.ahead
-        context.kink_places[:] = checkpoint.places
-        self._uncounted = context.steps - checkpoint.taken
-
-    @property
-    def _taken(self) -> int:
-        """Steps from the trajectory's start to the present; the counters keep counting after a `restore`."""
-        return self._context.steps - self._uncounted
-
     def _set_step(self, h: float) -> None:
         self._context.set_factors(h)
 
@@ -532,8 +527,7 @@ class AdaptiveStepper(HBVMStepper):
         if not np.sign(end - self.t) * ctx.next_length < 0.0:
             return
         ctx.next_length *= -1.0
-        if ctx.solved:
-            ctx.solved, ctx.length = 0, 0.0
+        self._forget()
 
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
@@ -580,7 +574,7 @@ class AdaptiveStepper(HBVMStepper):
     def _ended(self, watch: Crawl, steps: int) -> "Ended | None":
         """Return why the run is over after ``steps`` steps that the kernel took, if it is."""
         most = self._program.max_steps
-        if most is not None and self._taken >= most and not self._context.wanted:
+        if most is not None and self._taken >= most and not self._wants_solver:
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
             )
@@ -630,33 +624,6 @@ class AdaptiveStepper(HBVMStepper):
                 why = self._ended(watch, made)
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return self._samples(t, y, DONE if outcome == BUDGET else outcome, why)
-
-    def _call(self, what: int, between: int, times: Array, out: Array, made: int, budget: int) -> int:
-        """Call the kernel once; put the implicit solver to work where it is wanted."""
-        if self._context.wanted:
-            self._take_implicit()
-        try:
-            with self._pace:
-                outcome = engine.kernel(
-                    what, self._context.address, self._side.address, between, times.size,
-                    times.ctypes.data, 0, 0, made, out.ctypes.data, budget,
-                )  # fmt: skip
-        except UserError as raised:
-            outcome, self.error = NOT_FINITE, raised.error
-        self._heed_stop()
-        for workspace in self._implicit or ():
-            workspace.raise_what_is_no_failure()
-        return outcome
-
-    def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None") -> Samples:
-        status = Status.FINISHED
-        if why is not None:
-            status, self._reason = why
-            self._status = status
-        elif outcome != DONE:
-            status, self._reason = self._failure(outcome)
-            self._status = status
-        return Samples(t, y, status, self._reason)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""

@@ -1,11 +1,12 @@
 """What Python calls: the steps of a trajectory and the states asked for."""
 
 from integrators.kernel.context import BUDGET, DONE, LAND, SIDE
-from integrators.kernel.line.memory import INVARIANTS, RESET, VARY, WALK, Trajectory
+from integrators.kernel.line.memory import INVARIANTS, Trajectory
 from integrators.kernel.line.sample import sample
 from integrators.kernel.line.solve import commit, end, evaluate_at, solve
 from integrators.kernel.line.varying import first_length, vary, walk
 from integrators.kernel.native.attributes import address, view
+from integrators.kernel.native.engine import RESET, WALK
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_field
 from integrators.kernel.simd.views import doubles, integers
@@ -57,20 +58,22 @@ def reset(m):
     m.time[0] = m.t0
     if m.mode == INVARIANTS:
         call_field(m.values, m.time, address(m.y), m.par, address(m.reference))
-    if m.tolerance > 0.0 and m.next == 0.0:
+    if m.tolerance > 0.0 and m.next_length == 0.0:
         evaluate_at(m, m.t0, m.y, 0)
-        m.next = first_length(m)
+        m.next_length = first_length(m)
     return DONE
 
 
 @compiled
-def entry(what, place, between, count, times, targets, parts, made, out, budget):
-    """Do what is asked, with the trajectory at an address."""
+def entry(what, place, side, between, count, times, targets, parts, made, out, budget):
+    """Do what is asked, with the trajectory at an address; see `integrators.kernel.step.entry`."""
     m, t, y = trajectory(place), doubles(times), doubles(out)
     if what == RESET:
+        for d in range(m.dim):
+            m.y[d] = y[d]
         return reset(m)
     if what == WALK:
         return walk(m, t, y, budget)
-    if what == VARY:
+    if m.tolerance > 0.0:
         return vary(m, between, count, t, made, y, budget)
     return advance(m, between, count, t, integers(targets), doubles(parts), made, y, budget)

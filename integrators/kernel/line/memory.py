@@ -1,5 +1,8 @@
 """The memory of a trajectory of a line integral method, by name."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table
 
 # Which equations the coefficients satisfy.
@@ -8,15 +11,12 @@ INVARIANTS, POISSON = range(2)
 # How a call ended, besides `integrators.kernel.context`: a quantity to be kept is no invariant.
 NOT_KEPT = 7
 
-# What the entry can do.
-RESET, ADVANCE, VARY, WALK = range(4)
-
 
 class Trajectory(Memory):
     """A trajectory: the method, the system, the state, and room for the solution of a step.
 
     Steps of one length h: the time is t0 + n h. Steps of varying length, which have a
-    tolerance: the time is t0 + low.
+    tolerance: the time is t0 + time_low.
     """
 
     # --- of the method and the system ---
@@ -55,17 +55,17 @@ class Trajectory(Memory):
     previous = Table("s", "dim")  # coefficients of the last step
     reference = Table("invariants")  # what the invariants are to be
     t0 = Real()
-    low = Real()
+    time_low = Real()
     n = Integer()
     h = Real()
     length = Real()  # of the last step; 0: unknown
     solved = Integer()
     tolerance = Real()  # 0: steps of one length
-    next = Real()  # length of the next step to be tried
+    next_length = Real()  # length of the next step to be tried
     length_after = Real()  # of the one after the step that is solved
-    behind = Real()  # estimated error of the last step ...
-    ahead = Real()  # ... and of the one that is solved
-    limit = Real()  # no step is longer
+    error_behind = Real()  # estimated error of the last step ...
+    error_ahead = Real()  # ... and of the one that is solved
+    length_limit = Real()  # no step is longer
     accepted = Integer()
 
     # --- room for the solution of a step ---
@@ -87,7 +87,7 @@ class Trajectory(Memory):
     largest = Table("blocks")
     slope = Table("blocks")
     time = Array(1)
-    change = Real()  # of the last iteration
+    last = Real()  # change of an iteration
     defect = Real()  # of the invariant that is none
     culprit = Integer()  # which that is
     made = Integer()  # samples
@@ -100,3 +100,7 @@ class Trajectory(Memory):
     restarts = Integer()
     rejections = Integer()
     lost = Integer()  # times that an invariant had moved by more than rounding accounts for
+
+    def read(self) -> NDArray[np.float64]:
+        """Return a copy of the state."""
+        return self.y.copy()

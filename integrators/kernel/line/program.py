@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from integrators.kernel.context import blocks
 from integrators.kernel.line.dependence import independent
 from integrators.kernel.line.memory import INVARIANTS, POISSON, Trajectory
-from integrators.kernel.line.stepper import LineStepper
+from integrators.kernel.line.stepper import LineStepper, VaryingLineStepper
 from integrators.kernel.native import binary, engine
 from integrators.kernel.native import field as fields
+from integrators.kernel.stepper import HBVMStepper
 from integrators.legendre import tables
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
@@ -57,6 +58,7 @@ class LineProgram:
         started = binary.clock()
         self.system = system
         self.k, self.s, self.h, self.tol = k, s, h, tol
+        self.first, self.max_step, self.max_steps, self.breakpoints = h, None, None, np.empty(0)
         self.mode = INVARIANTS if invariants else POISSON
         self.components = [part for name in invariants for part in components(system, name)]
         if self.mode == POISSON:
@@ -84,7 +86,7 @@ class LineProgram:
         kept = f"invariants={self.components!r}" if self.components else "Poisson form"
         return f"LineIntegral(k={self.k}, s={self.s}, h={self.h!r}, tol={self.tol!r}, {kept})"
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> LineStepper:
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper:
         """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
 
         Raises
@@ -93,16 +95,18 @@ class LineProgram:
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return LineStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        kind: Any = LineStepper if self.tol is None else VaryingLineStepper
+        return kind(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def memory(self, y: Array, par: Array, t0: float) -> Trajectory:
-        """Return the memory of a trajectory."""
+        """Return the memory of a trajectory that starts at (t0, y)."""
         dim, n = y.size, len(self.components)
         numbers = {
             "mode": self.mode, "field": self.field, "values": self.values,
             "k": self.k, "s": self.s, "dim": dim, "invariants": n,
             "row": dim * (1 + (n if self.mode == INVARIANTS else dim)), "width": dim * (1 + n),
-            "after": self.s + 1, "rows": max(2, n), "blocks": self.group.size, "t0": t0,
+            "after": self.s + 1, "rows": max(2, n), "blocks": self.group.size,
+            "tolerance": self.tol or 0.0, "length_limit": np.inf,
         }  # fmt: skip
         metric = metric_of(self.system, par)
         given: dict[str, Any] = {
@@ -111,9 +115,7 @@ class LineProgram:
         }  # fmt: skip
         if n:
             given["active"] = independent(self.system, self.slopes, metric, y, par, t0).astype(np.int64)
-        made = Trajectory(numbers, {name: np.ascontiguousarray(array) for name, array in given.items()})
-        made.y[:] = y
-        return made
+        return Trajectory(numbers, {name: np.ascontiguousarray(array) for name, array in given.items()})
 
 
 def components(system: System, name: str) -> list[str]:

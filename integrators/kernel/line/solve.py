@@ -152,7 +152,7 @@ def iterate(m, t, h):
             keep_invariants(m, h)
         m.iterations += 1
         strict, floored = renew(m, h)
-        m.change = strict
+        m.last = strict
         if not strict < INFINITY:
             # Growing changes overflow in the end; a NaN out of the blue is the field's own.
             return DIVERGED if last > 1.0 else NOT_FINITE

@@ -82,11 +82,11 @@ def ready(m):
     """Solve the step ahead with a length that the tolerance allows; H is its length."""
     if m.solved:
         return DONE
-    t = m.t0 + m.low
+    t = m.t0 + m.time_low
     grow, failure = GROW, UNDERFLOW
     power = 1.0 / (2.0 * m.s + 1.0)
     while True:
-        h = m.next
+        h = m.next_length
         if not abs(h) > SHORTEST * abs(t):
             return failure
         before = m.iterations
@@ -100,22 +100,22 @@ def ready(m):
             log_factor(
                 power * log(m.tolerance),
                 power * log(max(estimate, TINY)),
-                power * log(m.behind) if m.behind > 0.0 else INFINITY,
-                log(abs(h / m.length)) if m.behind > 0.0 else 0.0,
+                power * log(m.error_behind) if m.error_behind > 0.0 else INFINITY,
+                log(abs(h / m.length)) if m.error_behind > 0.0 else 0.0,
             ),
             grow,
         )
         if estimate <= m.tolerance:
             factor = min(factor, max(BUSY / (m.iterations - before), 0.5))
-            m.limit *= APPROACH
-            m.length_after = h * min(factor, m.limit / abs(h))
-            m.ahead = estimate
+            m.length_limit *= APPROACH
+            m.length_after = h * min(factor, m.length_limit / abs(h))
+            m.error_ahead = estimate
             m.accepted = 1
             break
         if outcome != DONE:
-            m.limit = RETREAT * abs(h)
+            m.length_limit = RETREAT * abs(h)
         failure = NOT_FINITE if outcome == NOT_FINITE else UNDERFLOW
-        m.next = h * min(factor, SAFETY)
+        m.next_length = h * min(factor, SAFETY)
         m.rejections += 1
         grow = 1.0
     m.h = h
@@ -130,9 +130,9 @@ def take(m):
     end(m, h)
     commit(m, h)
     t, low = two_sum(m.t0, h)
-    m.t0, m.low = two_sum(t, low + m.low)
-    m.next = m.length_after
-    m.behind = m.ahead
+    m.t0, m.time_low = two_sum(t, low + m.time_low)
+    m.next_length = m.length_after
+    m.error_behind = m.error_ahead
     m.accepted = 0
     m.steps += 1
 
@@ -143,7 +143,7 @@ def vary(m, between, count, times, made, out, budget):
     for i in range(made, count):
         m.made = i
         while True:
-            rest = (times[i] - m.t0) - m.low
+            rest = (times[i] - m.t0) - m.time_low
             if abs(rest) <= CLOSE * abs(times[i]):
                 rest = 0.0
                 break
@@ -159,12 +159,12 @@ def vary(m, between, count, times, made, out, budget):
             if outcome != DONE:
                 return outcome
             take(m)
-        t = m.t0 + m.low
+        t = m.t0 + m.time_low
         outcome = sample(m, between, t, m.h, rest, out + m.dim * i)
         if outcome != DONE:
             return outcome
         if between == LAND and rest != 0.0:
-            m.t0, m.low = times[i], 0.0
+            m.t0, m.time_low = times[i], 0.0
             m.accepted = 0
     m.made = count
     return DONE
@@ -179,7 +179,7 @@ def walk(m, times, out, budget):
         outcome = ready(m)
         if outcome != DONE:
             return outcome
-        rest = (end_time - m.t0) - m.low
+        rest = (end_time - m.t0) - m.time_low
         if abs(rest) < abs(m.h) - CLOSE * abs(end_time):
             return DONE
         take(m)

@@ -54,7 +54,7 @@ STEPS = ("simd", "native", "context", "tables", "step")
 
 kernel = Engine("integrators.kernel.step.entry", 11, *STEPS)
 implicit = Engine("integrators.kernel.implicit.entry", 3, *STEPS, "implicit")
-line = Engine("integrators.kernel.line.loops", 10, *STEPS, "line")
+line = Engine("integrators.kernel.line.loops", 11, *STEPS, "line")
 
-# What `kernel` can do; see `integrators.kernel.step.entry`.
+# What `kernel` and, but for batches, `line` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, ADVANCE_BATCH, WALK = range(4)
