@@ -10,7 +10,9 @@ that an entry needs; `integrators.kernel.native.binary` does the rest once.
 from typing import Any, cast
 
 import llvmlite.binding as llvm
-from numba.core import codegen, cpu, registry
+from numba.core import codegen, cpu, registry, typed_passes, untyped_passes
+from numba.core.compiler import Compiler, CompilerBase
+from numba.core.compiler_machinery import PassManager
 from numba.core.target_extension import (
     CPU,
     dispatcher_registry,
@@ -65,6 +67,26 @@ class _Target(registry.CPUTarget):
         return self._made
 
 
+class _Passes(CompilerBase):
+    """What of numba's passes plain functions need: no closures, no array expressions, no object mode."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        passes = PassManager(NAME)
+        for one in (
+            untyped_passes.TranslateByteCode,
+            untyped_passes.FixupArgs,
+            untyped_passes.IRProcessing,
+            untyped_passes.ReconstructSSA,
+            typed_passes.NopythonTypeInference,
+            typed_passes.PreLowerStripPhis,
+            typed_passes.NativeLowering,
+            typed_passes.NoPythonBackend,
+        ):
+            passes.add_pass(one, one.__name__)
+        passes.finalize()
+        return [passes]
+
+
 class _Function(registry.CPUDispatcher):
     """A function that is compiled when another one or an entry needs it."""
 
@@ -75,14 +97,14 @@ class _Function(registry.CPUDispatcher):
             return super().compile(sig)
 
 
-def compiled(function: Any) -> Any:
+def compiled(function: Any, passes: type[CompilerBase] = _Passes) -> Any:
     """Decorate a function of the kernel: numba code that allocates nothing and raises nothing."""
-    return _Function(function, locals={}, targetoptions=OPTIONS)
+    return _Function(function, locals={}, targetoptions=OPTIONS, pipeline_class=passes)
 
 
 def _jit(*functions: Any, **options: Any) -> Any:
     """Compile numba's own helpers for this target too."""
-    return compiled(functions[0]) if functions else compiled
+    return compiled(functions[0], Compiler) if functions else _jit
 
 
 target_registry[NAME] = _Processor
