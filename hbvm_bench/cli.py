@@ -6,15 +6,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 from typer.exceptions import TyperException
 
-from hbvm_bench import listing, terminal
-from hbvm_bench.identity import make_problem
-from hbvm_bench.metrics import find
-from hbvm_bench.records import printable
-from hbvm_bench.store import Store, ensure_writable, write_all
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.commands import listing
+from hbvm_bench.measure.metrics import find
+from hbvm_bench.report import terminal
+from hbvm_bench.store.files import ensure_writable, write_all
+from hbvm_bench.store.records import printable
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 app = typer.Typer(
@@ -29,9 +30,9 @@ app = typer.Typer(
 # Commands with an implementation of their own; each is imported only when it is asked for.
 SEPARATE = {
     "automatic": "hbvm_bench.commands.automatic",
-    "race": "hbvm_bench.race.command",
-    "endure": "hbvm_bench.endure.command",
-    "paper": "hbvm_bench.paper.command",
+    "race": "hbvm_bench.commands.race",
+    "endure": "hbvm_bench.commands.endure",
+    "paper": "hbvm_bench.commands.paper",
     "compare": "hbvm_bench.commands.compare",
     "doctor": "hbvm_bench.commands.doctor",
     "engines": "hbvm_bench.commands.engines",
@@ -123,8 +124,7 @@ def show(
     index = store.index()
     records = store.records()
     if as_json:
-        encoded = msgspec.json.encode(listing.as_json(index, records))
-        print(msgspec.json.format(encoded, indent=1).decode())
+        terminal.print_json(listing.as_json(index, records))
         return
     if not records:
         raise InputError(f"the run in {str(directory)!r} has no finished case yet; run: {index.command}.")
@@ -156,13 +156,12 @@ def reference(
     """Recompute the reference solution of a problem in two ways and compare it with the stored one."""
     import numpy as np
 
-    from hbvm_bench import reference as references
-    from hbvm_bench import trusted
+    from hbvm_bench.reference import solutions, trusted
 
     made = make_problem(problem)
     if out is not None:
         ensure_writable(out.parent)
-    stored = references.find_file(made)
+    stored = solutions.find_file(made)
     at = None if stored is None else np.array([float.fromhex(time) for time in stored.t])
     fresh = trusted.make(made, until, at)
     for key, value in fresh.provenance.items():
@@ -171,9 +170,9 @@ def reference(
     if stored is None:
         print("there is no stored reference of this problem.")
     else:
-        print(f"largest difference from the stored reference: {references.difference(stored, fresh):.1e}")
+        print(f"largest difference from the stored reference: {solutions.difference(stored, fresh):.1e}")
     if out is not None:
-        write_all({out: references.encode(fresh).encode("ascii")})
+        write_all({out: solutions.encode(fresh).encode("ascii")})
 
 
 if __name__ == "__main__":

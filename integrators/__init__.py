@@ -8,8 +8,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from integrators import registry
-from integrators.integrate import Solution, integrate
+from integrators.integrate import integrate
 from integrators.protocol import MethodBase, Samples, Stats, Status
+from integrators.solution import Solution
 
 if TYPE_CHECKING:
     from integrators.events import Event as Event

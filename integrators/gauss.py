@@ -1,11 +1,11 @@
 """Gauss-Legendre collocation, which is HBVM(s, s)."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from integrators.caveats import blind, unseen
-from integrators.hbvm import HBVM
+from integrators.hbvm import HBVM, Solver
+from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -60,30 +60,26 @@ class Gauss(MethodBase):
         For values outside these ranges.
     """
 
-    s: int
-    h: float | None = None
-    tol: float | None = None
-    solver: str = "auto"
-    max_step: float | None = None
-    breakpoints: Sequence[float] = ()
-    max_steps: int | None = None
+    s: Stages
+    h: Step | None = None
+    tol: Tolerance | None = None
+    solver: Solver = "auto"
+    max_step: Step | None = None
+    breakpoints: Landings = ()
+    max_steps: Count | None = None
 
     library = "hbvm-bench"
     citation = CITATION
     family = "gauss"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.h is None and self.tol is None:
             raise InputError("Gauss needs a step h, or a tolerance tol for steps of varying length.")
         try:
-            twin = self.as_hbvm()
+            self.as_hbvm()
         except InputError as error:
             raise InputError(re.sub(r"\bHBVM\b", "Gauss", str(error))) from None
-        object.__setattr__(self, "s", twin.s)
-        object.__setattr__(self, "h", twin.h)
-        object.__setattr__(self, "tol", twin.tol)
-        for name in ("max_step", "breakpoints", "max_steps"):
-            object.__setattr__(self, name, getattr(twin, name))
 
     @property
     def order(self) -> int:

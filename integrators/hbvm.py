@@ -1,13 +1,12 @@
 """Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from integrators.caveats import blind, unseen
-from integrators.options import landings, length, tolerance, whole
+from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
-from problems.errors import InputError, shown, unknown
+from problems.errors import InputError
 from problems.problem import Problem, System
 
 CITATION = """\
@@ -22,7 +21,7 @@ CITATION = """\
 TOLERANCE = 3e-16
 """Of a method that is given neither a step nor a tolerance."""
 
-SOLVERS = ("auto", "fixed_point", "newton", "blended")
+Solver = Literal["auto", "fixed_point", "newton", "blended"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -136,20 +135,21 @@ class HBVM(MethodBase):
     methods for Poisson problems*, Numer. Algorithms (2022), doi:10.1007/s11075-022-01285-z.
     """
 
-    k: int | None = None
-    s: int | None = None
-    h: float | None = None
-    tol: float | None = None
-    solver: str = "auto"
-    max_step: float | None = None
-    breakpoints: Sequence[float] = ()
-    max_steps: int | None = None
+    k: Stages | None = None
+    s: Stages | None = None
+    h: Step | None = None
+    tol: Tolerance | None = None
+    solver: Solver = "auto"
+    max_step: Step | None = None
+    breakpoints: Landings = ()
+    max_steps: Count | None = None
 
     library = "hbvm-bench"
     citation = CITATION
     family = "hbvm"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.h is None and self.tol is None:
             object.__setattr__(self, "tol", TOLERANCE)
         if (self.k is None) != (self.s is None):
@@ -157,21 +157,8 @@ class HBVM(MethodBase):
             raise InputError(f"HBVM needs k and s, or neither of them; give {missing} too.")
         if self.k is None and self.tol is None:
             raise InputError(
-                f"HBVM needs k and s with a fixed step, h={shown(self.h)}; or give tol, and they are chosen."
+                f"HBVM needs k and s with a fixed step, h={self.h!r}; or give tol, and they are chosen."
             )
-        for name in ("s", "k"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, whole(type(self).__name__, name, getattr(self, name)))
-        if self.h is not None:
-            object.__setattr__(self, "h", length(type(self).__name__, self.h))
-        if self.tol is not None:
-            object.__setattr__(self, "tol", tolerance(type(self).__name__, self.tol))
-        if self.max_step is not None:
-            longest = length(type(self).__name__, self.max_step, "max_step")
-            object.__setattr__(self, "max_step", longest)
-        if self.max_steps is not None:
-            object.__setattr__(self, "max_steps", whole(type(self).__name__, "max_steps", self.max_steps))
-        object.__setattr__(self, "breakpoints", landings(type(self).__name__, self.breakpoints))
         if self.tol is None and (given := self.control()):
             raise InputError(
                 f"HBVM takes {', '.join(given)} with a tolerance only; give tol, or choose h "
@@ -183,8 +170,6 @@ class HBVM(MethodBase):
             raise InputError(
                 "HBVM needs k > 1 with a tolerance: one stage tells nothing about its error; give h instead."
             )
-        if not isinstance(self.solver, str) or self.solver not in SOLVERS:
-            raise unknown("solver", self.solver, SOLVERS)
 
     @property
     def order(self) -> int | None:

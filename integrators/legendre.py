@@ -17,6 +17,8 @@ L. Brugnano, F. Iavernaro, *Line Integral Methods for Conservative Problems*,
 CRC Press, 2016, chapter 3.
 """
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -99,7 +101,21 @@ class Tables:
 
 def xi(i: int) -> float:
     """Return ``xi_i = 1 / (2 sqrt(4 i^2 - 1))`` for i >= 1."""
-    return 0.5 / np.sqrt(4.0 * i * i - 1.0)
+    return 0.5 / math.sqrt(4.0 * i * i - 1.0)
+
+
+def polynomials(c: Any, s: int, xi: Callable[[int], Any] = xi) -> list[Any]:
+    """Return ``P_0 .. P_{s-1}`` at c, a number or an array of any library, as precise as c and xi are."""
+    P = [c * 0.0 + 1.0, (c - 0.5) / xi(1)]
+    for j in range(1, s - 1):
+        P.append(((c - 0.5) * P[j] - j * xi(j) * P[j - 1]) / ((j + 1) * xi(j + 1)))
+    return P[:s]
+
+
+def integrated(P: Sequence[Any], xi: Callable[[int], Any] = xi) -> list[Any]:
+    """Return the integrals of ``P_0 .. P_{s-1}`` from 0 to c, given the values ``P_0 .. P_s`` at c."""
+    first = xi(1) * P[1] + 0.5
+    return [first, *(xi(j + 1) * P[j + 1] - xi(j) * P[j - 1] for j in range(1, len(P) - 1))]
 
 
 def legendre(c: Array, s: int) -> Array:
@@ -117,22 +133,12 @@ def legendre(c: Array, s: int) -> Array:
     ndarray, shape (n, s)
         ``P_j(c_i)`` for j = 0 .. s-1.
     """
-    c = np.asarray(c, dtype=np.float64)
-    P = np.ones((c.size, s))
-    if s > 1:
-        P[:, 1] = (c - 0.5) / xi(1)
-    for j in range(1, s - 1):
-        P[:, j + 1] = ((c - 0.5) * P[:, j] - j * xi(j) * P[:, j - 1]) / ((j + 1) * xi(j + 1))
-    return P
+    return np.stack(polynomials(np.asarray(c, dtype=np.float64), s), axis=1)
 
 
 def legendre_integrals(c: Array, s: int) -> Array:
     """Evaluate ``int_0^c P_j`` in double precision; arguments and shape as `legendre`."""
-    P = legendre(c, s + 1)
-    integrals = P[:, 1:] * np.array([xi(j + 1) for j in range(s)])
-    integrals[:, 0] += 0.5
-    integrals[:, 1:] -= P[:, : s - 1] * np.array([xi(j) for j in range(1, s)])
-    return integrals
+    return np.stack(integrated(polynomials(np.asarray(c, dtype=np.float64), s + 1)), axis=1)
 
 
 def x_matrix(s: int) -> Array:
@@ -163,10 +169,8 @@ def tables(k: int, s: int) -> Tables:
     xis = [_mp.mpf(0)] + [half / _mp.sqrt(4 * i * i - 1) for i in range(1, s + 1)]
     nodes, weights = _gauss(k)
 
-    basis = [_basis(c, xis, s + 1) for c in nodes]
-    integrals = [
-        [row[j + 1] * xis[j + 1] - (row[j - 1] * xis[j] if j else -half) for j in range(s)] for row in basis
-    ]
+    basis = [polynomials(c, s + 1, xis.__getitem__) for c in nodes]
+    integrals = [integrated(row, xis.__getitem__) for row in basis]
     double_integrals = [_times_x(row, xis, half) for row in integrals]
     projection = [b * row[j] for j in range(s) for b, row in zip(weights, basis, strict=True)]
     if s == 1:
@@ -190,17 +194,6 @@ def tables(k: int, s: int) -> Tables:
         double_integrals=Table.of([v for row in double_integrals for v in row], (k, s)),
         position_weights=Table.of(position_weights, (k,)),
     )
-
-
-def _basis(c: Any, xis: list[Any], s: int) -> list[Any]:
-    """P_0 .. P_{s-1} at c with 50 digits; xis[i] = xi_i, s <= len(xis)."""
-    shifted = c - _mp.mpf(1) / 2
-    P = [_mp.mpf(1)]
-    if s > 1:
-        P.append(shifted / xis[1])
-    for j in range(1, s - 1):
-        P.append((shifted * P[j] - j * xis[j] * P[j - 1]) / ((j + 1) * xis[j + 1]))
-    return P
 
 
 def _times_x(row: list[Any], xis: list[Any], half: Any) -> list[Any]:

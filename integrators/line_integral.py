@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from integrators.caveats import unseen
 from integrators.hbvm import CITATION as BOOK
-from integrators.options import length, tolerance, whole
+from integrators.options import Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
+from problems.checks import refusal
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -24,6 +25,18 @@ CITATION = (
 """
     + BOOK
 )
+
+
+class _Names:
+    def checked(self, owner: str, name: str, value: Any) -> tuple[str, ...]:
+        listed = tuple(value) if isinstance(value, list | tuple) else ()
+        if not listed or not all(isinstance(text, str) for text in listed):
+            raise refusal(
+                owner, name, value, f'a list of names, such as {name}=["energy", "angular_momentum"]'
+            )
+        if len(set(listed)) < len(listed):
+            raise refusal(owner, name, value, "a list of different names")
+        return listed
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -95,19 +108,18 @@ class LineIntegral(MethodBase):
     conservative problems*, J. Comput. Appl. Math. 236 (2012) 3905-3919.
     """
 
-    k: int
-    s: int
-    h: float | None = None
-    tol: float | None = None
-    invariants: Sequence[str]
+    k: Stages
+    s: Stages
+    h: Step | None = None
+    tol: Tolerance | None = None
+    invariants: Annotated[Sequence[str], _Names()]
 
     library = "hbvm-bench"
     citation = CITATION
     family = "line integral"
 
     def __post_init__(self) -> None:
-        for name in ("s", "k"):
-            object.__setattr__(self, name, whole("LineIntegral", name, getattr(self, name)))
+        super().__post_init__()
         if self.k <= self.s:
             raise InputError(
                 f"LineIntegral needs k > s, not k={self.k}, s={self.s}: {self.k} nodes see no more of the "
@@ -115,11 +127,6 @@ class LineIntegral(MethodBase):
             )
         if self.h is None and self.tol is None:
             raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
-        if self.h is not None:
-            object.__setattr__(self, "h", length("LineIntegral", self.h))
-        if self.tol is not None:
-            object.__setattr__(self, "tol", tolerance("LineIntegral", self.tol))
-        object.__setattr__(self, "invariants", _names(self.invariants))
 
     @property
     def order(self) -> int:
@@ -156,16 +163,3 @@ class LineIntegral(MethodBase):
         from integrators.kernel.line.program import LineProgram
 
         return LineProgram(system, k=self.k, s=self.s, h=self.h, tol=self.tol, invariants=self.invariants)
-
-
-def _names(invariants: Any) -> tuple[str, ...]:
-    """Return the invariants as a tuple of different names, or refuse them."""
-    listed = tuple(invariants) if isinstance(invariants, list | tuple) else ()
-    if not listed or not all(isinstance(name, str) for name in listed):
-        raise InputError(
-            f"LineIntegral needs invariants as a list of names, not {invariants!r}; "
-            'such as invariants=["energy", "angular_momentum"].'
-        )
-    if len(set(listed)) < len(listed):
-        raise InputError(f"LineIntegral needs different invariants, not {list(listed)!r}.")
-    return listed

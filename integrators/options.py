@@ -1,13 +1,15 @@
-"""The options that several methods have: checked, and refused with one sentence."""
+"""The annotations of options that several methods have; `problems.checks` checks them.
 
-import math
-import operator
-from typing import Any
+A method writes ``h: Step`` and nothing else: `integrators.protocol.MethodBase` refuses what is
+no step, and keeps what is one as a float.
+"""
 
-import numpy as np
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 from problems import limits
-from problems.errors import InputError, shown
+from problems.checks import Must, at_least, checked, numbers, refusal
+from problems.errors import shown
 
 SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
@@ -15,64 +17,52 @@ SMALLEST = 2.0**-52
 SHORTEST = 2.0**-48
 """Of the time: a shorter step cannot be told from none; as in `integrators.kernel.step.control`."""
 
+Step = Annotated[
+    float, Must("a finite step above 0; the sign of time is that of the times asked for", lambda h: h > 0)
+]
+"""Length of a step."""
 
-def whole(method: str, name: str, value: Any) -> int:
-    """Return an option as an int >= 1, or refuse it."""
-    try:
-        number = 0 if isinstance(value, bool) else operator.index(value)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise InputError(f"{method} needs a whole number {name} >= 1, not {name}={shown(value)}.")
-    if name in ("k", "s"):
-        limits.check(f"{method} with {name}={shown(value)}", "STAGES", number)
-    return number
+Tolerance = Annotated[
+    float,
+    Must(
+        f"a tolerance from {SMALLEST:.1e} to below 1: a smaller error cannot be told from rounding",
+        lambda tol: SMALLEST <= tol < 1,
+    ),
+]
+"""Local error per step."""
 
+NotNegative = Annotated[float, Must("a finite number of at least 0", lambda x: x >= 0)]
+"""A finite number, 0 or above."""
 
-def length(method: str, h: Any, name: str = "h") -> float:
-    """Return a step as a float > 0, or refuse it."""
-    value = _number(h)
-    if not (value > 0.0 and math.isfinite(value)):
-        raise InputError(
-            f"{method} needs a finite step {name} > 0, not {name}={shown(h)}; "
-            "the sign of time is that of the times."
-        )
-    return value
+Share = Annotated[float, Must("a number between 0 and 1", lambda x: 0 < x < 1)]
+"""A number between 0 and 1, such as a relative tolerance."""
 
-
-def tolerance(method: str, tol: Any) -> float:
-    """Return a tolerance as a float, or refuse it."""
-    value = _number(tol)
-    if not SMALLEST <= value < 1.0:
-        raise InputError(
-            f"{method} needs a tolerance {SMALLEST:.1e} <= tol < 1, not tol={shown(tol)}: "
-            "an error smaller than this cannot be told from rounding."
-        )
-    return value
+Count = Annotated[int, at_least(1)]
+"""A whole number from 1 on."""
 
 
-def landings(method: str, breakpoints: Any) -> tuple[float, ...]:
-    """Return breakpoints, a list or array of times, as ascending floats, or refuse them.
-
-    Of those that are so close that no step between them could be told from none, the first.
-    """
-    if isinstance(breakpoints, np.ndarray):
-        breakpoints = breakpoints.tolist()
-    values = [_number(t) for t in breakpoints] if isinstance(breakpoints, list | tuple) else [math.nan]
-    if not all(math.isfinite(t) for t in values):
-        raise InputError(
-            f"{method} needs breakpoints as a list of finite times, not breakpoints={shown(breakpoints)}; "
-            "such as breakpoints=[1.0, 2.5]."
-        )
-    kept: list[float] = []
-    for t in sorted(values):
-        if not kept or t - kept[-1] > SHORTEST * max(abs(t), abs(kept[-1])):
-            kept.append(t)
-    return tuple(kept)
+class _Stages:
+    def checked(self, owner: str, name: str, value: Any) -> int:
+        given = checked(owner, name, value, Count)
+        limits.check(f"{owner} with {name}={shown(value)}", "STAGES", given)
+        return given
 
 
-def _number(value: Any) -> float:
-    try:
-        return math.nan if isinstance(value, (bool, str)) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
+Stages = Annotated[int, _Stages()]
+"""A whole number from 1 on, not above what `problems.limits` allow."""
+
+
+class _Landings:
+    def checked(self, owner: str, name: str, value: Any) -> tuple[float, ...]:
+        times = numbers(value)
+        if times is None:
+            raise refusal(owner, name, value, f"a list of finite times, such as {name}=[1.0, 2.5]")
+        kept: list[float] = []
+        for t in sorted(times):
+            if not kept or t - kept[-1] > SHORTEST * max(abs(t), abs(kept[-1])):
+                kept.append(t)
+        return tuple(kept)
+
+
+Landings = Annotated[Sequence[float], _Landings()]
+"""A list or array of times, kept in ascending order; of those that no step could tell apart, the first."""

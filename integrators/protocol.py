@@ -4,11 +4,16 @@ Guide for implementers
 ----------------------
 A **method** is a description; it holds options and nothing else.
 
-1. Derive a frozen, keyword-only dataclass from `MethodBase`; validate the
-   options in ``__post_init__`` and raise `problems.errors.InputError`.
-2. Set the class attributes ``library`` (the package that does the work) and
-   ``citation`` (how its authors ask to be cited); give ``order`` (``None``
-   where the order varies with the tolerance).
+A method with a fixed step derives from `integrators.stepping.FixedStep`, which leaves of
+this only the options, ``accepts`` and the steps themselves.
+
+1. Derive a frozen, keyword-only dataclass from `MethodBase`. Annotate each option with
+   what must hold of it (`problems.checks`, `integrators.options`): it is checked by that.
+   What depends on several options, check in ``__post_init__`` after the base's, and raise
+   `problems.errors.InputError`.
+2. Set the class attributes ``library`` (the package that does the work), ``citation``
+   (how its authors ask to be cited) and ``order`` (``None`` where the order varies with
+   the tolerance).
 3. ``accepts(problem)`` returns ``None`` or the reason why not, as a sentence.
 4. ``compile(system)`` does all compilation, imports the library (raising
    `problems.errors.MissingLibraryError`) and returns a `Program`, which knows
@@ -28,15 +33,18 @@ A **method** is a description; it holds options and nothing else.
 """
 
 import dataclasses
+import inspect
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from functools import cache
+from typing import Any, ClassVar, Protocol, cast, get_type_hints, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems import limits
 from problems.calls import Called
+from problems.checks import checked
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
 
@@ -132,6 +140,32 @@ class Samples:
     reason: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """Trajectories of one system from many starts, as ``batch`` of a program returns them.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Times.
+    y : ndarray, shape (n, m, dim)
+        States; NaN where a trajectory did not arrive.
+    status, reason : list, length n
+        How each trajectory ended, and one sentence where it failed.
+    t_stop : ndarray, shape (n,)
+        The last time, or that of the last own step before a failure.
+    steps : ndarray of int, shape (n,)
+        Own steps; accepted ones where lengths vary.
+    """
+
+    t: Array
+    y: Array
+    status: list[Status]
+    reason: list[str]
+    t_stop: Array
+    steps: NDArray[np.int64]
+
+
 @runtime_checkable
 class Stepper(Protocol):
     """A trajectory under way."""
@@ -215,6 +249,15 @@ class Program(Protocol):
         ...
 
 
+class _Signature:
+    """What ``help`` and ``inspect.signature`` show of a method: its options with their plain types."""
+
+    def __get__(self, method: object, cls: type) -> inspect.Signature:
+        made, plain = inspect.signature(cls.__init__), get_type_hints(cls)
+        options = [p.replace(annotation=plain.get(p.name)) for p in made.parameters.values()]
+        return made.replace(parameters=options[1:])
+
+
 @dataclass(frozen=True, kw_only=True)
 class MethodBase(Called):
     """Base of all methods: a frozen description that prints as the call that makes it.
@@ -232,7 +275,7 @@ class MethodBase(Called):
     problems.errors.UnknownNameError
         For an option that does not exist, with the nearest names.
     problems.errors.InputError
-        For an option that is missing, or not given by name.
+        For an option that is missing, not given by name, or not what its annotation says.
     """
 
     library: ClassVar[str] = "hbvm-bench"
@@ -240,10 +283,15 @@ class MethodBase(Called):
     family: ClassVar[str] = ""
     to_end: ClassVar[str | None] = None
 
-    @property
-    def order(self) -> int | None:
-        """Order of convergence; ``None`` where it varies with the tolerance."""
-        raise NotImplementedError
+    __signature__ = _Signature()
+
+    order = cast("int | None", None)  # without an annotation, with which it would be an option
+    """Order of convergence, an int; ``None`` where it varies with the tolerance."""
+
+    def __post_init__(self) -> None:
+        for name, annotation in _annotations(type(self)).items():
+            value = checked(type(self).__name__, name, getattr(self, name), annotation)
+            object.__setattr__(self, name, value)
 
     def accepts(self, problem: Problem) -> str | None:
         """Return ``None`` if the method can integrate ``problem``, else the reason."""
@@ -268,6 +316,27 @@ class MethodBase(Called):
     def __repr__(self) -> str:
         inside = ", ".join(f"{name}={value!r}" for name, value in self.options().items())
         return f"{type(self).__name__}({inside})"
+
+
+@cache
+def _annotations(method: type[MethodBase]) -> dict[str, Any]:
+    """Return what the options of a method must be, by name."""
+    found = get_type_hints(method, include_extras=True)
+    return {option.name: found[option.name] for option in dataclasses.fields(method)}
+
+
+def check_problem(problem: Problem, method: MethodBase) -> None:
+    """Raise `problems.errors.InputError` unless ``method`` can integrate ``problem``."""
+    if not isinstance(problem, Problem):
+        raise InputError(
+            f"problem must be a Problem, not {shown(problem)}; "
+            "make one with problems.load or problems.Problem."
+        )
+    if not isinstance(method, MethodBase):
+        raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {shown(method)}.")
+    reason = method.accepts(problem)
+    if reason is not None:
+        raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
 
 
 def check_times(times: ArrayLike, t: float) -> Array:

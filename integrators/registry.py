@@ -1,7 +1,7 @@
-"""Find methods by name: our own, the peers' and third parties' by one path.
+"""Find methods by name: our own and the peers' by a table, third parties' by their entry points.
 
-A method registers its class under the entry point group
-``hbvm_bench.integrators``; nothing is imported until its name is asked for.
+A third party registers its class under the entry point group ``hbvm_bench.integrators``;
+nothing is imported until its name is asked for.
 """
 
 from functools import cache
@@ -13,9 +13,22 @@ from problems.errors import InputError, unknown
 
 GROUP = "hbvm_bench.integrators"
 
+BUILT_IN = {
+    "integrators.hbvm": ("HBVM",),
+    "integrators.gauss": ("Gauss",),
+    "integrators.line_integral": ("LineIntegral",),
+    "integrators.peers.heyoka.taylor": ("Taylor",),
+    "integrators.peers.rebound": ("IAS15", "Leapfrog", "WHFast", "WHFast512"),
+    "integrators.peers.diffrax.methods": (
+        "Dopri8", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler",
+    ),
+    "integrators.peers.scipy": ("DOP853", "Radau"),
+}  # fmt: skip
+"""Modules and the methods in them; a table, for to look into a module is to import it."""
+
 
 def names() -> list[str]:
-    """Return the names of all registered methods, sorted."""
+    """Return the names of all methods, sorted."""
     return sorted(_entries())
 
 
@@ -48,12 +61,14 @@ def create(name: str, **options: Any) -> MethodBase:
 
 @cache
 def _entries() -> dict[str, EntryPoint]:
-    found: dict[str, EntryPoint] = {}
+    found = {
+        name: EntryPoint(name, f"{module}:{name}", GROUP) for module, own in BUILT_IN.items() for name in own
+    }
     for entry in entry_points(group=GROUP):
         other = found.setdefault(entry.name, entry)
         if other.value != entry.value:
             raise InputError(
-                f"two installed packages register a method {entry.name!r}: {other.value} and {entry.value}; "
-                "uninstall one of them."
+                f"two packages offer a method {entry.name!r}: {other.value} and {entry.value}; "
+                "uninstall one of them, or rename one."
             )
     return found

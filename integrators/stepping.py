@@ -1,15 +1,23 @@
-"""What all peers' programs and steppers share: the book-keeping around a library's own stepping."""
+"""Bases of integrators written in Python: the book-keeping around somebody's own steps.
+
+`FixedStep` is for a method with a fixed step: it says how it takes steps, and all the rest of
+`integrators.protocol` comes with it. `ProgramBase` and `StepperBase` are for methods that choose
+their steps; `FixedStepper` also for libraries that hold the state of a fixed-step integration themselves.
+"""
 
 import math
 import threading
-from dataclasses import dataclass
-from typing import Any, ClassVar, TypeGuard, TypeVar
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any, ClassVar, Protocol, TypeGuard
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.checkpoints import Identity
 from integrators.one_thread import one_thread
+from integrators.options import Step
 from integrators.protocol import (
     Array,
     MethodBase,
@@ -25,25 +33,25 @@ from integrators.times import plan
 from problems.errors import unknown
 from problems.problem import System
 
-Stepped = TypeVar("Stepped", bound="PeerStepper")
+STEPS_AT_ONCE = 1 << 14
+"""Steps of a `March` between two looks at Ctrl-C."""
 
 
-class PeerProgram:
-    """A peer compiled for one system; satisfies `integrators.protocol.Program`."""
+class ProgramBase:
+    """A method compiled for one system; satisfies `integrators.protocol.Program`.
 
+    A subclass implements `stepper`.
+    """
+
+    method: Any
     compile_seconds: float = 0.0
     from_cache: bool | None = None
 
     def __init__(self, system: System, method: MethodBase):
         self.system, self.method = system, method
 
-    def started(self, stepper: Stepped, par: Array) -> Stepped:
-        """Return a new stepper, which now knows what its checkpoints belong to."""
-        stepper.identity = Identity.of(repr(self.method), self.system, par)
-        return stepper
-
-    def arguments(self, y0: ArrayLike, par: ArrayLike | None, t0: float) -> tuple[Array, Array, float]:
-        """Return copies of a start's arguments, checked.
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "StepperBase":
+        """Return a stepper at ``t0``; see the protocol.
 
         Raises
         ------
@@ -51,12 +59,18 @@ class PeerProgram:
             For a state or time that is not finite, or a wrong shape.
         """
         values = check_parameters(par, self.system)
-        return check_state(y0, self.system.dim), values, check_start(t0)
+        stepper = self.stepper(check_state(y0, self.system.dim), values, check_start(t0))
+        stepper.identity = Identity.of(repr(self.method), self.system, values)
+        return stepper
+
+    def stepper(self, y: Array, par: Array, t: float) -> "StepperBase":
+        """Return a trajectory from a start that is checked, and its own."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """All that the continuation of a peer's stepper depends on."""
+    """All that the continuation of a stepper depends on."""
 
     t: float
     y: Array
@@ -66,8 +80,8 @@ class Checkpoint:
     identity: Identity
 
 
-class PeerStepper:
-    """A peer's trajectory; satisfies `integrators.protocol.Stepper`.
+class StepperBase:
+    """A trajectory; satisfies `integrators.protocol.Stepper`.
 
     A subclass states its ``samplings`` (the default first) and implements
     `_serve`, `_own_steps`, `_one`, `_save` and `_load`.
@@ -225,7 +239,7 @@ class PeerStepper:
         raise NotImplementedError
 
 
-class FixedStepper(PeerStepper):
+class FixedStepper(StepperBase):
     """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
 
     ``"side"`` (default)
@@ -236,15 +250,26 @@ class FixedStepper(PeerStepper):
     ``"land"``
         The last step before each time is shortened onto it; steps count from there then.
 
-    A subclass implements `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
+    Its state is one array, which ``program.march``, a `March`, moves on. For a library that holds the
+    state itself a subclass has its own `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
     ``"land"``), `_restart`, `_save_steps` and `_load_steps`.
+
+    Parameters
+    ----------
+    program : ProgramBase
+        Its ``method`` has the step ``h``.
+    y, par, t
+        A start, checked, and the stepper's own.
     """
 
     samplings = ("side", "steps", "land")
 
-    def __init__(self, y: Array, t: float, h: float):
+    def __init__(self, program: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
-        self._t0, self._n, self._h = t, 0, h
+        self._program, self._par, self._here = program, par, y.copy()
+        self._t0, self._n, self._h = t, 0, program.method.h
+        if getattr(program.method, "evaluations", None) is not None:
+            self._stats.evaluations = 0
 
     def _time(self) -> float:
         return self._t0 + self._n * self._h
@@ -314,28 +339,114 @@ class FixedStepper(PeerStepper):
 
     def _march(self, count: int) -> None:
         """Take ``count`` own steps."""
-        raise NotImplementedError
+        end = self._n + count
+        for n in range(self._n, end, STEPS_AT_ONCE):
+            t = self._t0 + n * self._h
+            self._program.march(t, self._h, min(STEPS_AT_ONCE, end - n), self._here, self._par)
+        self._evaluated(count)
+
+    def _evaluated(self, steps: int) -> None:
+        if (each := self._program.method.evaluations) is not None:
+            self._stats.evaluations = (self._stats.evaluations or 0) + steps * each
 
     def _state(self) -> Array:
         """Return a copy of the state at the last own step."""
-        raise NotImplementedError
+        return self._here.copy()
 
     def _aside(self, part: float) -> Array:
         """Return the state a throw-away step of length ``part`` after the last own step."""
-        raise NotImplementedError
+        y = self._here.copy()
+        self._program.march(self._time(), part, 1, y, self._par)
+        return y
 
     def _shorten(self, part: float) -> None:
         """Take one step of length ``part`` after the last own step."""
-        raise NotImplementedError
+        self._here = self._aside(part)
+        self._evaluated(1)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         """Begin anew at ``t`` with steps of ``h``."""
-        raise NotImplementedError
+        self._here = y.copy()
 
     def _save_steps(self) -> Any:
-        """Return a copy of the library's own state."""
-        raise NotImplementedError
+        """Return a copy of what the next steps depend on."""
+        return self._here.copy()
 
     def _load_steps(self, steps: Any) -> None:
         """Take back what `_save_steps` returned."""
+        self._here = steps.copy()
+
+
+class March(Protocol):
+    """Takes ``n`` steps of length ``h`` from the time ``t``; ``y``, shape (dim,), is changed in place."""
+
+    def __call__(self, t: float, h: float, n: int, y: Array, par: Array, /) -> object: ...
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class FixedStep(MethodBase):
+    """Base of an integrator with a fixed step: a subclass says how it steps, all the rest is here.
+
+    A subclass is a frozen dataclass. It states ``order``, ``library``, ``family``,
+    ``citation`` and ``evaluations``, says in `accepts` which problems it takes, and returns
+    from `march` the function that takes steps. Samples beside the steps and at them,
+    checkpoints, counters, failures and turning round come with it;
+    `integrators.testing.check_method` checks them all.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0; the sign of time is that of the times asked for.
+
+    Attributes
+    ----------
+    evaluations : int or None
+        Evaluations of the field, or of the force, in a step.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a step that is not a finite number above 0.
+
+    Examples
+    --------
+    ``examples/integrator`` has Yoshida's composition of order 6 in about forty lines.
+    """
+
+    h: Step
+
+    evaluations: ClassVar[int | None] = None
+
+    def march(self, system: System) -> March:
+        """Return the function that takes steps of ``system``, compiled if it shall be fast.
+
+        It must depend on nothing but its arguments: steps aside and checkpoints rely on that. It is
+        kept while ``system`` lives, and serves every ``h``.
+        """
         raise NotImplementedError
+
+    def compile(self, system: System) -> "FixedStepProgram":
+        """Compile what `march` returns."""
+        return FixedStepProgram(system, self)
+
+
+_marches: WeakKeyDictionary[System, dict[FixedStep, March]] = WeakKeyDictionary()
+
+
+class FixedStepProgram(ProgramBase):
+    """A `FixedStep` method compiled for one system."""
+
+    def __init__(self, system: System, method: FixedStep):
+        super().__init__(system, method)
+        started = perf_counter()
+        known, key = _marches.setdefault(system, {}), replace(method, h=1.0)
+        self.from_cache = key in known
+        self.march = known[key] if self.from_cache else method.march(system)
+        # No step at all: what numba compiles at the first call belongs here.
+        self.march(0.0, method.h, 0, np.zeros(system.dim), system.pack())
+        known[key] = self.march
+        self.compile_seconds = perf_counter() - started
+
+    def stepper(self, y: Array, par: Array, t: float) -> FixedStepper:
+        """Return a trajectory."""
+        return FixedStepper(self, y, par, t)

@@ -3,9 +3,11 @@
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.problem import Problem
 from problems.registry import load, names
-from problems.systems.hamiltonian import Bodies, Hamiltonian, System, VectorField
+from problems.systems.base import Bodies, System
+from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.poisson import Poisson
 from problems.systems.untraced import Foreign
+from problems.systems.vector_field import VectorField
 
 __all__ = [
     "Bodies",

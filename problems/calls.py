@@ -1,4 +1,4 @@
-"""Calls that a function does not take, told in one sentence instead of Python's TypeError."""
+"""Arguments that a function does not take, told in one sentence."""
 
 import dataclasses
 import functools
@@ -6,6 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, Self, TypeVar
 
+from problems import checks
 from problems.errors import InputError, shown, unknown
 
 P = ParamSpec("P")
@@ -85,3 +86,32 @@ class Called:
 @functools.cache
 def _signature(cls: type) -> inspect.Signature:
     return inspect.signature(cls)
+
+
+def bound(
+    name: str, signature: inspect.Signature, values: Sequence[Any], options: Mapping[str, Any]
+) -> inspect.BoundArguments:
+    """Return all arguments of a call, defaults included, checked by their annotations.
+
+    Parameters
+    ----------
+    name : str
+        What is called.
+    signature : inspect.Signature
+        What it takes; `problems.checks.checked` says what annotations it knows.
+    values, options
+        What it is given by place and by name.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a name that is not taken or is missing (`check`), or a value that is not allowed.
+    """
+    check(name, signature, values, options, "argument")
+    call = signature.bind(*values, **options)
+    call.apply_defaults()
+    for key, value in call.arguments.items():
+        found = checks.checked(name, key, value, signature.parameters[key].annotation)
+        # A call prints as it was made: e=0, not e=0.0.
+        call.arguments[key] = value if type(value) in (int, float) else found
+    return call

@@ -8,8 +8,9 @@ environment variable ``HBVM_BENCH_MAX_<NAME>`` raises a limit: ``HBVM_BENCH_MAX_
 
 import math
 import os
+from typing import Any
 
-from problems.errors import InputError, large
+from problems.errors import InputError, large, shown
 
 PREFIX = "HBVM_BENCH_MAX_"
 
@@ -75,6 +76,13 @@ def check(what: str, name: str, size: float, hint: str = "make it smaller") -> N
             f"{what} has {_shown(size)} {LIMITS[name][1]}, and the limit is {most:,.15g}; {hint}, "
             f"or raise the limit with the environment variable {PREFIX}{name}."
         )
+
+
+def check_problem(name: str, unknowns: int, terms: int = 0, **values: Any) -> None:
+    """Refuse arguments of a problem that make its state, or a sum in it, larger than a limit; see `check`."""
+    call = f"{name}({', '.join(f'{key}={shown(value)}' for key, value in values.items())})"
+    check(call, "COMPONENTS", unknowns)
+    check(call, "TERMS", terms)
 
 
 def _shown(size: float) -> str:

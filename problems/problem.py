@@ -1,18 +1,19 @@
 """A problem: a system, a start, parameters and a span of time."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from problems import emit
 from problems.analysis import invariants
 from problems.calls import checked
 from problems.errors import InputError, shown
-from problems.systems.base import check_names
-from problems.systems.hamiltonian import System, Value
+from problems.systems.base import System, Value, check_names
 
 Array = NDArray[np.float64]
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -95,12 +96,7 @@ class Problem:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
-        for key, text in {"name": name, "title": title, "notes": notes}.items():
-            if text is not None and not isinstance(text, str):
-                raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
-        if not isinstance(references, list | tuple):
-            raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
-        check_names("arguments", arguments)
+        words = _words(name, title, arguments, references, notes)
         state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
         span = _numbers("t0 and t_end", [t0, t_end], 2)
         if span[0] == span[1]:
@@ -118,16 +114,28 @@ class Problem:
             "par": _frozen(par),
             "t0": float(span[0]),
             "t_end": float(span[1]),
-            "name": name,
+            **words,
             "title": title or name or system.name,
-            "arguments": MappingProxyType(dict(arguments)),
             "times": None if grid is None else _frozen(grid),
-            "references": tuple(references),
-            "notes": notes,
             "_made_with": ", ".join([repr(system), *printed, f"t_end={t_end!r}"]),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
+
+    def entitled(
+        self, *, name: str, title: str, arguments: Mapping[str, Any], references: Sequence[str], notes: str
+    ) -> Self:
+        """Return the same problem under a name: what it prints as, and what reports say of it.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For words that are no text.
+        """
+        named = copy.copy(self)
+        for key, value in _words(name, title, arguments, references, notes).items():
+            object.__setattr__(named, key, value)
+        return named
 
     def __repr__(self) -> str:
         if self.name is None:
@@ -138,7 +146,7 @@ class Problem:
     def _identity(self) -> tuple[Any, ...]:
         return (
             repr(self),
-            self.system.fingerprint,
+            emit.fingerprint(self.system),
             self.y0.tobytes(),
             self.par.tobytes(),
             self.t0,
@@ -167,7 +175,7 @@ class Problem:
         dict of str to ndarray
             Shape (n,), or (n, k) for a vector; the energy first.
         """
-        return invariants.invariants(self, y, t)
+        return invariants.invariants(self.system, self.par, y, t)
 
     def errors(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return how far each invariant is from its value at the start, relative to its size there.
@@ -185,15 +193,32 @@ class Problem:
         -------
         dict of str to ndarray, shape (n,)
         """
-        return invariants.errors(self, y, t)
+        return invariants.errors(self.system, self.par, y, t, start=(self.t0, self.y0))
 
     def guards(self, y: ArrayLike, t: ArrayLike | None = None) -> dict[str, Array]:
         """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
-        return invariants.guards(self, y, t)
+        return invariants.guards(self.system, self.par, y, t)
 
     def velocity(self, y: ArrayLike) -> Array | None:
         """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
-        return invariants.velocity(self, y)
+        return invariants.velocity(self.system, self.par, y)
+
+
+def _words(name: Any, title: Any, arguments: Any, references: Any, notes: Any) -> dict[str, Any]:
+    """Return what a problem says of itself, or refuse it."""
+    for key, text in {"name": name, "title": title, "notes": notes}.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
+    if not isinstance(references, list | tuple):
+        raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
+    check_names("arguments", arguments)
+    return {
+        "name": name,
+        "title": title,
+        "arguments": MappingProxyType(dict(arguments)),
+        "references": tuple(references),
+        "notes": notes,
+    }
 
 
 def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:

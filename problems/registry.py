@@ -1,14 +1,21 @@
-"""Problems by name: entry points ``hbvm_bench.problems``, built-ins and third parties alike."""
+"""Problems by name: the files of `problems.catalogue`, and third parties' entry points.
+
+A file ``problems/catalogue/NAME.py`` with a function ``NAME`` is a built-in problem;
+other packages name theirs under the entry point group ``hbvm_bench.problems``.
+Nothing is imported until its name is asked for.
+"""
 
 import functools
 import inspect
+import pkgutil
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 import numpy as np
 
-from problems import calls
+from problems import calls, catalogue
+from problems.entry import Entry
 from problems.errors import InputError, unknown
 from problems.problem import Problem
 
@@ -18,12 +25,19 @@ GROUP = "hbvm_bench.problems"
 @functools.cache
 def _entries() -> dict[str, list[EntryPoint]]:
     """Return what is offered under each name, different things only."""
+    own = [EntryPoint(name, f"{catalogue.__name__}.{name}:{name}", GROUP) for name in built_in()]
     found: dict[str, list[EntryPoint]] = {}
-    for entry in entry_points(group=GROUP):
-        offered = found.setdefault(entry.name, [])
-        if all(entry.value != other.value for other in offered):
-            offered.append(entry)
+    for point in (*own, *entry_points(group=GROUP)):
+        offered = found.setdefault(point.name, [])
+        if all(point.value != other.value for other in offered):
+            offered.append(point)
     return found
+
+
+def built_in() -> list[str]:
+    """Return the names of the catalogue's own problems, sorted."""
+    files = pkgutil.iter_modules(catalogue.__path__)
+    return sorted(file.name for file in files if not file.name.startswith("_"))
 
 
 def names() -> list[str]:
@@ -45,9 +59,14 @@ def factory(name: str) -> Callable[..., Problem]:
     if offered is None:
         raise unknown("problem", name, _entries())
     if len(offered) > 1:
-        who = " and ".join(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in offered)
+        who = " and ".join(f"{at.dist.name if at.dist else 'hbvm-bench'} ({at.value})" for at in offered)
         raise InputError(f"the problem {name!r} is offered by {who}; uninstall one of them, or rename one.")
     return offered[0].load()
+
+
+def entry(name: str) -> Entry | None:
+    """Return what a problem's decorator says; ``None`` for a function without one. Raises as `factory`."""
+    return getattr(factory(name), "entry", None)
 
 
 def load(name: str, **arguments: Any) -> Problem:
@@ -66,16 +85,11 @@ def load(name: str, **arguments: Any) -> Problem:
         For an unknown name or argument, with the nearest ones, or a value out of range.
     """
     make = factory(name)
-    calls.check(name, inspect.signature(make), (), arguments, "argument")
+    if entry(name) is None:  # the others check their own
+        calls.check(name, inspect.signature(make), (), arguments, "argument")
     # NumPy's numbers and arrays become Python's, which print as the call that is typed
     plain = {
         key: value.tolist() if isinstance(value, np.generic | np.ndarray) else value
         for key, value in arguments.items()
     }
     return make(**plain)
-
-
-def changed(make: Callable[..., Problem], **values: Any) -> dict[str, Any]:
-    """Return those arguments that differ from the defaults of a problem's function."""
-    known = inspect.signature(make).parameters
-    return {key: value for key, value in values.items() if value != known[key].default}

@@ -13,11 +13,12 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from hbvm_bench import automatic as automatic_
-from hbvm_bench import general as general_
-from hbvm_bench import machine, processes, terminal
-from hbvm_bench.cells import on_terminal
-from hbvm_bench.store import ensure_writable
+from hbvm_bench.measure import machine
+from hbvm_bench.report import terminal
+from hbvm_bench.run import processes
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.studies.automatic import runs as automatic_
+from hbvm_bench.studies.general import runs as general_
 from problems.errors import InputError
 
 
@@ -51,7 +52,7 @@ def automatic(
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         result = _measured(problems or [], rounds, avx2, out, Path(scratch))
     page = automatic_.keep(result, out) if out is not None else None
-    console.print(on_terminal(automatic_.sides(result.duels)))
+    terminal.print_table(automatic_.sides(result.duels))
     console.print(machine.sentence(result.machine), highlight=False)
     if page is not None:
         terminal.console(stderr=True).print(str(page), style="dim")
@@ -72,7 +73,9 @@ def _measured(
     path = scratch / "request.json"
     path.write_bytes(msgspec.json.encode(request))
     try:
-        code = processes.wait([sys.executable, "-m", "hbvm_bench.automatic", str(path)], environment)
+        code = processes.wait(
+            [sys.executable, "-m", "hbvm_bench.studies.automatic.runs", str(path)], environment
+        )
     except KeyboardInterrupt:
         raise typer.Exit(130) from None
     if code == 2:  # it has said why

@@ -5,16 +5,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench import compare as comparing
-from hbvm_bench import terminal
-from hbvm_bench.store import Store
+from hbvm_bench.report import terminal
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import compare as comparing
 
 CHANGED = 1
 
@@ -30,7 +29,7 @@ def compare(
     """
     found = comparing.compare(Store(first), Store(second))
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(asdict(found)), indent=1).decode())
+        terminal.print_json(asdict(found))
     else:
         _print(found, terminal.console(), str(first), str(second))
     if not found.unchanged:

@@ -11,9 +11,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench import doctor as examining
-from hbvm_bench import terminal
-from hbvm_bench.store import ensure_writable
+from hbvm_bench.measure import doctor as examining
+from hbvm_bench.report import terminal
+from hbvm_bench.store.files import ensure_writable, write_json
 from problems.errors import InputError
 
 UNHEALTHY = 1
@@ -45,7 +45,7 @@ def doctor(
     healthy = examining.healthy(findings)
     if as_json:
         content = {key: [asdict(one) for one in group] for key, group in findings.items()}
-        print(msgspec.json.format(msgspec.json.encode(content | {"healthy": healthy}), indent=1).decode())
+        terminal.print_json(content | {"healthy": healthy})
     else:
         _print(findings)
     if not healthy:
@@ -53,26 +53,27 @@ def doctor(
 
 
 def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
-    from hbvm_bench import peer_check, processes
-    from hbvm_bench.cells import on_terminal
+    from hbvm_bench.run import processes
+    from hbvm_bench.studies.peers import check
+    from hbvm_bench.summaries import peers
 
     if out is not None:
         ensure_writable(out.parent)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         made, request = Path(scratch) / "result.json", Path(scratch) / "request.json"
-        asked = peer_check.Request(out=str(made), rounds=rounds or peer_check.ROUNDS)
+        asked = check.Request(out=str(made), rounds=rounds or check.ROUNDS)
         request.write_bytes(msgspec.json.encode(asked))
-        code = processes.wait([sys.executable, "-m", "hbvm_bench.peer_check", str(request)])
-        result = peer_check.load(made)
+        code = processes.wait([sys.executable, "-m", "hbvm_bench.studies.peers.check", str(request)])
+        result = peers.load(made)
     if code != 0 or result is None:
         print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(UNHEALTHY)
     if out is not None:
-        peer_check.save(result, out)
+        write_json(out, result)
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(result), indent=1).decode())
+        terminal.print_json(result)
     else:
-        terminal.console().print(on_terminal(peer_check.table(result)))
+        terminal.print_table(peers.table(result))
         for method, reason in result.refused.items():
             print(f"{method} did not run: {reason}")
     if result.refused or any(row.beyond for row in result.rows):

@@ -8,8 +8,8 @@ from rich.table import Table
 from rich.text import Text
 
 import problems
-from hbvm_bench import engines as engines_
-from hbvm_bench import terminal
+from hbvm_bench.report import terminal
+from hbvm_bench.summaries import engines as engines_
 from problems.errors import unknown
 
 

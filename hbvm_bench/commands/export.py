@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import export as exporting
-from hbvm_bench.store import Store, ensure_writable
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import export as exporting
 
 
 def export(

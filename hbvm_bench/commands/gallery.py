@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.gallery import compile_times, pages
-from hbvm_bench.store import ensure_writable
+from hbvm_bench.store.files import ensure_writable
 
 
 def gallery(

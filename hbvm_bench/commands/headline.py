@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import automatic, machine
-from hbvm_bench.cells import in_markdown
-from hbvm_bench.race import report, results, tables
-from hbvm_bench.race.contests import CONTESTS
-from hbvm_bench.race.results import Race
-from hbvm_bench.report.markdown import plain
+from hbvm_bench.measure import machine
+from hbvm_bench.report.markdown import in_markdown, plain
+from hbvm_bench.studies.automatic import runs as automatic
+from hbvm_bench.studies.race import report, results, tables
+from hbvm_bench.studies.race.contests import CONTESTS
+from hbvm_bench.studies.race.results import Race
 from problems.errors import InputError
 
 

@@ -3,12 +3,12 @@
 from dataclasses import asdict
 from typing import Annotated
 
-import msgspec
 import typer
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench import findings, terminal
+from hbvm_bench.commands import findings
+from hbvm_bench.report import terminal
 
 
 def inspect(
@@ -21,7 +21,7 @@ def inspect(
     """Say what can be read off a Hamiltonian: degree, exact k, separability, cyclic coordinates, engines."""
     found = findings.inspect(system, parameters)
     if as_json:
-        print(msgspec.json.format(msgspec.json.encode(asdict(found)), indent=1).decode())
+        terminal.print_json(asdict(found))
         return
     table = Table.grid(padding=(0, 2))
     for heading, sentence in findings.lines(found):

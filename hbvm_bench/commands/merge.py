@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import merge as merging
-from hbvm_bench.store import Store
+from hbvm_bench.store import merge as merging
+from hbvm_bench.store.store import Store
 
 
 def merge(

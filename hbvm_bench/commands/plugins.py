@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import machine, plugin_costs
-from hbvm_bench.measure import POSITION
+from hbvm_bench.measure import machine
+from hbvm_bench.measure.measured import POSITION
+from hbvm_bench.studies.plugins import costs
 from problems.errors import InputError
 
 
@@ -25,10 +26,10 @@ def plugins(
         )
     if host == "leak":
         print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
-        for t, errors in plugin_costs.leak(span):
+        for t, errors in costs.leak(span):
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
         return
-    print(plugin_costs.markdown(plugin_costs.measure(host, rounds)))
+    print(costs.markdown(costs.measure(host, rounds)))
     print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
 

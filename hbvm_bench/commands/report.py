@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.store import Store, ensure_writable
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 

@@ -8,14 +8,16 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench import executors, runner, serial, supervise, terminal
-from hbvm_bench.campaign import Campaign, Grid, MethodEntry, load
-from hbvm_bench.estimate import Estimate
-from hbvm_bench.execute import InterruptedRunError
-from hbvm_bench.executors import Pool
-from hbvm_bench.identity import Resolved, make_method
-from hbvm_bench.live import Live
-from hbvm_bench.store import Index, Store, ensure_writable
+from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, load
+from hbvm_bench.campaign.identity import Resolved, make_method
+from hbvm_bench.commands.live import Live
+from hbvm_bench.report import terminal
+from hbvm_bench.run import executors, loop, supervise, timing_pass
+from hbvm_bench.run.estimate import Estimate
+from hbvm_bench.run.executors import Pool
+from hbvm_bench.run.task import InterruptedRunError
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
 
 UNFINISHED = 1
@@ -49,7 +51,7 @@ def run(
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step)
-    cases = runner.plan(campaign)
+    cases = loop.plan(campaign)
     store = Store(out or Path("runs") / campaign.name)
     with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
         if report_to is not None:
@@ -79,7 +81,7 @@ def _measure(
             _run(campaign, cases, store, pool, timing)
         except (KeyboardInterrupt, InterruptedRunError):
             raise _given_up("interrupted", cases, store, INTERRUPTED) from None
-        except runner.UnfinishedRunError as error:
+        except loop.UnfinishedRunError as error:
             raise _given_up(str(error), cases, store, UNFINISHED) from None
 
 
@@ -125,13 +127,13 @@ def _command(
 
 def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool) -> None:
     supervise.allow()
-    missing = [case for case in cases if not runner.is_kept(case, store, campaign.limits)]
+    missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
     with Live() as live:
         try:
             estimate = Estimate(_known_seconds(store, missing), campaign.limits.wall_seconds)
             ids = [case.id for case in missing]
             live.phase(f"measuring {pool.where}", ids, len(cases) - len(missing), estimate)
-            for record in runner.run_accuracy(missing, store, campaign.limits, pool, live.running):
+            for record in loop.run_accuracy(missing, store, campaign.limits, pool, live.running):
                 live.case(record)
             if timing:
                 _time(campaign, cases, store, live)
@@ -153,10 +155,10 @@ def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
 
 
 def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -> None:
-    visits = serial.missing_visits(cases, store, campaign.timing)
+    visits = timing_pass.missing_visits(cases, store, campaign.timing)
     known = {case.id: record.seconds for case in cases if (record := store.load(case.id)) is not None}
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
-    serial.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
+    timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from hbvm_bench import machine
-from hbvm_bench.identity import make_problem
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import machine
 from integrators.kernel.native import field
 from problems import emit
 from problems.problem import Problem

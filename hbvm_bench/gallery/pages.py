@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import problems
-from hbvm_bench import engines, reference
 from hbvm_bench.gallery import pictures
-from hbvm_bench.store import write_all
+from hbvm_bench.reference import solutions as reference
+from hbvm_bench.store.files import write_all
+from hbvm_bench.summaries import engines
 from problems import registry
 from problems.analysis import structure
 from problems.analysis.latex import latex
@@ -64,7 +65,40 @@ solution = integrators.integrate(problem, integrators.HBVM(k=4, s=2, h=0.1))
 ```
 
 `problems.VectorField(f, dim=...)` takes any first-order system, `problems.Poisson(H, B, dim=...)` a system
-y' = B(y) grad H(y). `examples/plugin` is a package that adds a problem and a method by entry points.
+y' = B(y) grad H(y).
+
+## A problem with a name
+
+A decorated function is a problem as those above are: its arguments are checked by their annotations, it
+prints as the call that makes it, and reports and the gallery have their words and their picture from the
+decorator.
+
+```python
+from problems import Hamiltonian, Problem
+from problems.checks import Positive
+from problems.entry import entry
+from problems.picture import Phase
+
+
+def _energy(q, p, par):
+    return p[0] ** 2 / 2 + par.k * q[0] ** 4 / 4
+
+
+@entry(
+    title="a quartic oscillator",
+    references=("your paper",),
+    notes="What to know about it.",
+    shows=("k",),  # printed even at its default: quartic(k=1.0)
+    picture=Phase(span=12.0),
+)
+def quartic(*, k: Positive = 1.0, q: float = 1.0, t_end: float = 100.0) -> Problem:
+    system = Hamiltonian(_energy, dof=1, parameters={"k": 1.0}, name="quartic")
+    return Problem(system, q0=[q], p0=[0.0], parameters={"k": k}, t_end=t_end)
+```
+
+A package names it under the entry point group `hbvm_bench.problems`, as `examples/integrator` does
+(`quartic = "package.module:quartic"`); in this repository it is the file `problems/catalogue/quartic.py` and
+nothing else, with `expected=` for the tests.
 
 """
 
@@ -72,8 +106,8 @@ REFERENCES = """## References
 
 Position errors are measured against solutions that two independent computations agree on: heyoka's Taylor
 method in 128-bit arithmetic and Gauss collocation in double-double arithmetic (for large systems the
-collocation and the Taylor method in long double). Each is a text file under `hbvm_bench/references/` with its
-provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
+collocation and the Taylor method in long double). Each is a text file in `hbvm_bench/reference/data/`, with
+its provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
 recomputes and compares.
 
 | problem | up to t = | the two differ by (relative) |
@@ -120,8 +154,12 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     list of Path
         What was written.
     """
-    drawn = [name for name in problems.names() if name in pictures.PICTURES]
-    names = [name for name in drawn if not pictures.PICTURES[name].arguments]
+    drawn = {
+        name: entry.picture
+        for name in registry.built_in()
+        if (entry := registry.entry(name)) and entry.picture
+    }
+    names = [name for name, picture in drawn.items() if not picture.arguments]
     made = {
         directory / "problems.md": text(names).encode(),
         directory / "engines.md": (ENGINES + engines.markdown(names)).encode(),

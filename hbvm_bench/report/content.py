@@ -7,19 +7,19 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign import Case
-from hbvm_bench.cells import Table
-from hbvm_bench.identity import make_problem
-from hbvm_bench.metrics import METRICS, Metric
-from hbvm_bench.records import Record
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure.metrics import METRICS, Metric
 from hbvm_bench.report import provenance, words
-from hbvm_bench.report.canvas import Picture
+from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.figures.style import Look, looks, method_name
 from hbvm_bench.report.overview import Overview, overview
 from hbvm_bench.report.sections import Section, section
-from hbvm_bench.report.style import Look, looks, method_name
-from hbvm_bench.store import Store, damage, progress
-from hbvm_bench.summaries import fairness
-from hbvm_bench.table import columns, tasks
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Store, damage, progress
+from hbvm_bench.summaries import fairness, peers
+from hbvm_bench.summaries.rows import columns, tasks
+from hbvm_bench.summaries.table import Table
 
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
@@ -74,7 +74,7 @@ class Content:
     settings : list
         See `words.settings_count`.
     peers : Table or None
-        What the bench costs every peer; see `hbvm_bench.peer_check`.
+        What the bench costs every peer; see `hbvm_bench.summaries.peers`.
     excluded : list of str
         What takes no part in the ranking, and why.
     versions, machine : list of (str, str)
@@ -113,7 +113,7 @@ def gather(stores: Sequence[Store]) -> Content:
     """Read the stores of one or more runs and make everything a report says.
 
     A case that several runs have is taken from the one that got further with it
-    (`hbvm_bench.store.progress`).
+    (`hbvm_bench.store.store.progress`).
 
     Raises
     ------
@@ -172,7 +172,7 @@ def gather(stores: Sequence[Store]) -> Content:
         records=records,
         rules=(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
         settings=words.settings_count(records),
-        peers=fairness.peers(),
+        peers=peers.kept(),
         excluded=words.excluded(records),
         versions=provenance.versions(records),
         machine=provenance.machines(records),

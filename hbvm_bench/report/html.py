@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from hbvm_bench.metrics import Metric
+from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report import pack, shell
 from hbvm_bench.report.content import Content
-from hbvm_bench.table import Cell, Row, seconds
+from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 FEW = 3  # problems whose summaries all stand at the top
 FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 
 from hbvm_bench.report.markdown import plain
-from hbvm_bench.store import atomic, ensure_writable
+from hbvm_bench.store.files import atomic, ensure_writable
 from problems.errors import InputError
 
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from

@@ -1,35 +1,8 @@
-"""The report as markdown, for a code forge."""
+"""Text, code and tables in markdown."""
 
 import re
-from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from hbvm_bench.table import Row, seconds
-
-if TYPE_CHECKING:  # so that the escapes below cost no plotting library
-    from collections.abc import Sequence
-
-    from hbvm_bench.metrics import Metric
-    from hbvm_bench.report.content import Content
-
-
-def markdown(content: "Content") -> str:
-    """Return the report as markdown with relative links to its figures."""
-    environment = Environment(
-        loader=PackageLoader("hbvm_bench.report", "templates"),
-        autoescape=False,  # markdown has its own escapes, see `plain`
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    from hbvm_bench.cells import in_markdown  # which itself needs the escapes below
-
-    environment.filters |= {"plain": plain, "code": code, "one_line": one_line, "table": in_markdown}
-    environment.globals |= {"row_cells": row_cells}
-    text = environment.get_template("report.md.j2").render(c=content)
-    return re.sub(r"\n{3,}", "\n\n", text).lstrip("\n")
+from hbvm_bench.summaries.table import Table
 
 
 def one_line(text: object) -> str:
@@ -55,14 +28,11 @@ def block(text: object) -> str:
     return "\n".join(f"    {one_line(line)}" for line in str(text).splitlines())
 
 
-def row_cells(columns: "Sequence[Metric]", row: Row) -> list[str]:
-    """Return the cells of a row: void ones in brackets, times with their quartiles."""
-    made = []
-    for metric in columns:
-        cell = row.cells.get(metric.key)
-        text = "–" if cell is None else f"({cell.text})" if cell.void else cell.text
-        if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:
-            summary = row.record.timing.summary
-            text += f" [{seconds(summary['q1'])}, {seconds(summary['q3'])}]"
-        made.append(text)
-    return made
+def in_markdown(table: Table) -> str:
+    """Return a table in markdown, with its title before and its note after it."""
+    rule = (":--" if table.is_words(index) else "--:" for index in range(len(table.head)))
+    lines = [table.head, *table.rows]
+    text = [f"| {' | '.join(plain(cell) for cell in line)} |" for line in lines]
+    text.insert(1, f"| {' | '.join(rule)} |")
+    parts = [f"**{plain(table.title)}**", "\n".join(text), plain(table.note)]
+    return "\n\n".join(part for part in parts if part)

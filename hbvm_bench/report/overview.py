@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.ticker import PercentFormatter
 
-from hbvm_bench.cells import Table
-from hbvm_bench.metrics import find
-from hbvm_bench.records import Record
-from hbvm_bench.report.canvas import Picture, drawing, log_axis, new, picture
-from hbvm_bench.report.figures import WIDTH
-from hbvm_bench.report.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
+from hbvm_bench.measure.metrics import find
+from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures.over_time import WIDTH
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import laws, needs, outcomes
 from hbvm_bench.summaries.points import work_of
 from hbvm_bench.summaries.profiles import GOALS, Profile, profile
+from hbvm_bench.summaries.table import Table
 
 FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
 NEVER = 6.0  # decades: the end of the axis where a family is not within any factor

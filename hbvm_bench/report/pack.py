@@ -15,14 +15,15 @@ from typing import Any
 import msgspec
 from plotly.offline import get_plotlyjs
 
-from hbvm_bench.metrics import METRICS
-from hbvm_bench.records import Record
-from hbvm_bench.report import motion
-from hbvm_bench.report.canvas import Picture
+from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report.content import Content
-from hbvm_bench.report.plots import as_csv, as_json, numbers
-from hbvm_bench.report.style import Look
-from hbvm_bench.table import group_of, status_of
+from hbvm_bench.report.figures import motion
+from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.figures.plots import as_csv, as_json, numbers
+from hbvm_bench.report.figures.style import Look
+from hbvm_bench.store.files import json_of
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of, status_of
 
 # Marker names: of matplotlib, of plotly.
 SYMBOLS = {
@@ -136,10 +137,9 @@ def results_json(content: Content) -> dict[str, Any]:
 
 def files(content: Content) -> dict[str, bytes]:
     """Return the data of a report as files by their path beside the page."""
-    everything = msgspec.json.format(msgspec.json.encode(results_json(content)), indent=1)
     made = {
         "data/results.csv": results_csv(content.records).encode(),
-        "data/results.json": everything + b"\n",
+        "data/results.json": json_of(results_json(content)),
     }
     for picture in content.pictures:
         if picture.plot is not None:

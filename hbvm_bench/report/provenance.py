@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from datetime import datetime
 
-from hbvm_bench import machine
-from hbvm_bench.records import Record
+from hbvm_bench.measure import machine
+from hbvm_bench.store.records import Record
 
 # Machine code of the libraries: what the times were made with.
 BUILT = {

@@ -7,20 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench import reference as references
-from hbvm_bench.campaign import Case
-from hbvm_bench.identity import make_problem
-from hbvm_bench.quantities import PLANETOID_Z
-from hbvm_bench.records import Record
-from hbvm_bench.reference import Reference
-from hbvm_bench.report import figures, motion, portraits, views, words
-from hbvm_bench.report.canvas import Picture, drawing
-from hbvm_bench.report.drift_figure import drift_figure
-from hbvm_bench.report.figures import Drawn, OverTime
-from hbvm_bench.report.motion import Motion
-from hbvm_bench.report.style import Look, method_name
-from hbvm_bench.report.work_precision import work_precision
-from hbvm_bench.table import GROUPS, Row, at_once, group_of, rows, title_of
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.reference import solutions
+from hbvm_bench.reference.solutions import Reference
+from hbvm_bench.report import words
+from hbvm_bench.report.figures import motion, over_time, portraits, views
+from hbvm_bench.report.figures.canvas import Picture, drawing
+from hbvm_bench.report.figures.drift import drift_figure
+from hbvm_bench.report.figures.motion import Motion
+from hbvm_bench.report.figures.over_time import Drawn, OverTime
+from hbvm_bench.report.figures.style import Look, method_name
+from hbvm_bench.report.figures.work_precision import work_precision
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import GROUPS, Row, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -95,7 +96,7 @@ def section(
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
-    known = references.find(problem)
+    known = solutions.find(problem)
     ensemble = records[0].case.ensemble
     cases = [Drawn(record, look[record.id], series) for record, series in found if ensemble is None]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
@@ -130,7 +131,7 @@ def _pictures(
             made = [
                 work_precision(cases),
                 drift_figure(main),
-                figures.over_time(main, OVER_TIME[0]),
+                over_time.over_time(main, OVER_TIME[0]),
                 portraits.portrait(problem, main),
                 portraits.section(problem, main),
             ]
@@ -145,8 +146,8 @@ def _pictures(
         ]
     with drawing():
         made = [work_precision(cases), drift_figure(cases)]
-        made += [figures.over_time(cases, what) for what in OVER_TIME]
-        made += [figures.over_time(cases, what) for what in _other_invariants(cases)]
+        made += [over_time.over_time(cases, what) for what in OVER_TIME]
+        made += [over_time.over_time(cases, what) for what in _other_invariants(cases)]
         made += [portraits.portrait(problem, cases), portraits.section(problem, cases)]
         if problem.name == "sitnikov":
             made.insert(2, motion.still(cases, "The system in space"))
@@ -182,7 +183,7 @@ OVER_TIME = (
         key="energy",
         title="Energy error over time",
         caption="Relative error of the energy. A line is the largest value in each of "
-        f"{figures.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
+        f"{over_time.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
         label="|H − H₀| / |H₀|",
         get=lambda series: _pair(series, "t", "error.energy"),
         low=-17,

@@ -11,9 +11,9 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from hbvm_bench.report import pack
-from hbvm_bench.report.canvas import Picture, inline_svg
+from hbvm_bench.report.figures.canvas import Picture, inline_svg
+from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.report.markdown import block, plain
-from hbvm_bench.report.style import DARK_NEUTRALS, NEUTRALS, Look
 
 HERE = "hbvm_bench.report"
 INLINE = 1_000_000  # characters of drawings in a page; what is more would make it slow to open

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from statistics import median
 
-from hbvm_bench import ensemble
-from hbvm_bench.measure import POSITION
-from hbvm_bench.metrics import GUARD_TOLERANCE, METRICS
-from hbvm_bench.records import Record
-from hbvm_bench.report.style import method_name
-from hbvm_bench.table import group_of, seconds, status_of
+from hbvm_bench.measure import ensemble
+from hbvm_bench.measure.measured import POSITION
+from hbvm_bench.measure.metrics import GUARD_TOLERANCE, METRICS
+from hbvm_bench.report.figures.style import method_name
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of, seconds, status_of
 
 # The levels of the summary's question "who is fastest among those that are right?"
 RIGHT_POSITION = 1e-8

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hbvm_bench.report import pack
+from hbvm_bench.report.as_markdown import markdown
 from hbvm_bench.report.content import Content, gather
 from hbvm_bench.report.html import page
-from hbvm_bench.report.markdown import markdown
-from hbvm_bench.store import Store, again, write_all
+from hbvm_bench.store.files import write_all
+from hbvm_bench.store.store import Store, again
 from problems.errors import InputError
 
 FIGURES = "figures"

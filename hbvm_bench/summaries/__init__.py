@@ -7,6 +7,6 @@
 `laws`       the law of each invariant's drift, in rows, and counted by family
 `fairness`   how many settings each family had, what was left out and why, what is doubtful
 
-Every function takes the records of a run (`hbvm_bench.store.Store.records`) and nothing
+Every function takes the records of a run (`hbvm_bench.store.store.Store.records`) and nothing
 else: nothing is run, and nothing is drawn, here. A family is all settings of one method.
 """

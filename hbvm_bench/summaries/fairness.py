@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from hbvm_bench.cells import Table
-from hbvm_bench.records import Record
-from hbvm_bench.store import Index
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Index
 from hbvm_bench.summaries.outcomes import reason_of
 from hbvm_bench.summaries.points import family_of, problems_of
-from hbvm_bench.table import group_of
+from hbvm_bench.summaries.rows import group_of
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
@@ -108,14 +107,6 @@ def fairness(index: Index, records: Sequence[Record]) -> Fairness:
     ]
     equal = numbers.pop() if len(numbers) == 1 else None
     return Fairness(families, equal, excluded, doubts(records))
-
-
-def peers() -> Table | None:
-    """Return what the bench costs every peer beside its library alone, as measured for this version."""
-    from hbvm_bench import peer_check  # it needs the reports' stores
-
-    result = peer_check.load()
-    return None if result is None else peer_check.table(result)
 
 
 def sentences(records: Sequence[Record]) -> list[str]:

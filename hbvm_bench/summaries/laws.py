@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hbvm_bench.laws import Law
-from hbvm_bench.records import Record
+from hbvm_bench.store.records import Law, Record
 from hbvm_bench.summaries.points import family_of
-from hbvm_bench.table import group_of
+from hbvm_bench.summaries.rows import group_of
 
 SHORT = {
     "bounded": "bounded",
@@ -16,7 +15,7 @@ SHORT = {
     "exponential": "exp t",
     "drift": "drift",
 }
-"""Every law in a few signs, by the keys of `hbvm_bench.drift.LAWS`."""
+"""Every law in a few signs, by the keys of `hbvm_bench.measure.drift.LAWS`."""
 
 
 @dataclass(frozen=True)

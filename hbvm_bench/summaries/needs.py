@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from hbvm_bench.metrics import find
-from hbvm_bench.records import Record
+from hbvm_bench.measure.metrics import find
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number, problems_of, work_of
 from hbvm_bench.summaries.profiles import Goal, reaches
-from hbvm_bench.table import group_of
+from hbvm_bench.summaries.rows import group_of
 
 SHOWN = 3
 ROUND_OFF = 1e-15  # an error below this is as good as any other

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from hbvm_bench.records import Record
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, problems_of
-from hbvm_bench.table import group_of, status_of
+from hbvm_bench.summaries.rows import group_of, status_of
 
 State = Literal["ok", "off", "ended", "refused", "absent"]
 

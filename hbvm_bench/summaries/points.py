@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hbvm_bench.metrics import find
-from hbvm_bench.records import Record
-from hbvm_bench.spec import parse_spec
-from hbvm_bench.table import group_of
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.measure.metrics import find
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of
 
 WORKS = ("warm_seconds", "evaluations")
 """What an integration costs: the first that a run has is shown by default."""

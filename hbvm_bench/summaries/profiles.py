@@ -12,9 +12,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hbvm_bench.records import Record
+from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number, problems_of
-from hbvm_bench.table import group_of
+from hbvm_bench.summaries.rows import group_of
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Goal:
     Attributes
     ----------
     position : float
-        Error at the end; see `hbvm_bench.measure.POSITION`.
+        Error at the end; see `hbvm_bench.measure.measured.POSITION`.
     energy : float
         Largest relative error.
     """

@@ -1,4 +1,4 @@
-"""What a user says about an event, and what is found."""
+"""What a user says about an event."""
 
 import operator
 from collections.abc import Callable, Sequence
@@ -6,9 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from integrators.protocol import Array
 from problems.calls import Called
 from problems.errors import InputError, shown
 
@@ -75,28 +73,6 @@ def _whole(value: Any) -> int | None:
         return operator.index(value)
     except TypeError:
         return int(value) if isinstance(value, float | np.bool_) and value in (-1.0, 0.0, 1.0) else None
-
-
-@dataclass(frozen=True, eq=False)
-class Occurrences:
-    """Where one event happened.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Times, in the order of integration.
-    y : ndarray, shape (n, dim)
-        States there: ends of steps of solved length.
-    direction : ndarray of int, shape (n,)
-        1 where g rises, -1 where it falls, 0 where it touches zero and turns back.
-    """
-
-    t: Array
-    y: Array
-    direction: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return self.t.size
 
 
 def named(events: Any) -> dict[str, Event]:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from integrators.events import roots
-from integrators.events.event import Event, Occurrences
+from integrators.events.event import Event
 from integrators.events.function import EventFunction
 from integrators.events.step import Step, Unresolved
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, Stepper, UserError
+from integrators.solution import Occurrences
 from problems import Problem
 from problems.errors import InputError
 
@@ -40,13 +41,11 @@ class Found:
     ----------
     events : dict of str to Occurrences
         By the events' names.
-    terminal : bool
-        Whether one of them ended the search.
     t_stop : float
         Where the search ended.
     status : Status
-        How: ``EVENT``, ``FINISHED``, or a failure of the method; ``NOT_FINITE`` also
-        where one of the functions was finite nowhere, ``STALLED`` where one varies too
+        How: ``EVENT`` at a terminal one, ``FINISHED``, or a failure of the method; ``NOT_FINITE``
+        also where one of the functions was finite nowhere, ``STALLED`` where one varies too
         fast to be followed.
     reason : str
         One sentence, unless it is ``FINISHED``.
@@ -57,7 +56,6 @@ class Found:
     """
 
     events: dict[str, Occurrences]
-    terminal: bool
     t_stop: float
     status: Status
     reason: str
@@ -110,31 +108,30 @@ class Search:
         self._touched = [np.nan] * len(self._events)  # where each was last seen to touch zero
         self._hits: list[Hit] = []
         self._terminal: str | None = None
-        self._failed = False
-        self._error: Exception | None = None
-        self._unresolved = ""
+        self._failed = False  # one of the steppers
         self._looked = problem.t0
         self._zero = self._rests(problem)
 
     def run(self) -> Found:
         """Search to the end, the first terminal event, or a failure of the method."""
-        while self._t != self._end and self._terminal is None and not self._failed:
-            try:
+        raised: UserError | Unresolved | None = None
+        try:
+            while self._t != self._end and self._terminal is None and not self._failed:
                 self._go_on()
-            except UserError as raised:
-                self._error, self._failed = raised.error, True
-            except Unresolved as unresolved:
-                self._unresolved, self._failed = str(unresolved), True
-            self._count = min(4 * self._count, self._most)
+                self._count = min(4 * self._count, self._most)
+        except (UserError, Unresolved) as error:
+            raised = error
         stop = self._hits[-1].t if self._terminal is not None else self._t
+        status, reason, error = self._outcome(stop, raised)
         steppers = (self._walker, self._probe)
         work = {name: sum(getattr(stepper.stats, name) or 0 for stepper in steppers) for name in RESULTS}
         return Found(
             events={name: self._occurrences(i) for i, name in enumerate(self._names)},
-            terminal=self._terminal is not None,
             t_stop=stop,
-            **self._outcome(stop),
+            status=status,
+            reason=reason,
             stats=replace(self._walker.stats, **work),
+            error=error,
         )
 
     def _go_on(self) -> None:
@@ -146,32 +143,28 @@ class Search:
                 self._looked = float(t[0, 0])
                 self._look(before, t, y)
 
-    def _outcome(self, stop: float) -> dict[str, Any]:
-        """Return status, reason and, if there is one, error by name."""
-        unknown = [name for name, known in zip(self._names, self._finite, strict=True) if not known]
+    def _outcome(
+        self, stop: float, raised: "UserError | Unresolved | None"
+    ) -> tuple[Status, str, Exception | None]:
+        """Return status, reason and, if there is one, the user's error."""
         if self._terminal is not None:
-            reason = f"the event {self._terminal!r} ended the integration at t = {stop!r}."
-            return {"status": Status.EVENT, "reason": reason}
-        if self._error is not None:
-            return {
-                "status": Status.USER_ERROR,
-                "reason": f"{UserError(self._error)}: events are known up to t = {self._looked!r} only.",
-                "error": self._error,
-            }
-        if self._unresolved:
-            reason = f"{self._unresolved} Events are known up to t = {self._looked!r} only."
-            return {"status": Status.STALLED, "reason": reason}
+            return Status.EVENT, f"the event {self._terminal!r} ended the integration at t = {stop!r}.", None
+        known = f"are known up to t = {self._looked!r} only."
+        if isinstance(raised, UserError):
+            return Status.USER_ERROR, f"{raised}: events {known}", raised.error
+        if raised is not None:
+            return Status.STALLED, f"{raised} Events {known}", None
         for stepper in (self._walker, self._probe):
             if self._failed and stepper.status.failed:
-                error = getattr(stepper, "error", None)
-                return {"status": stepper.status, "reason": stepper.reason, "error": error}
+                return stepper.status, stepper.reason, getattr(stepper, "error", None)
+        unknown = [name for name, known in zip(self._names, self._finite, strict=True) if not known]
         if unknown:
             reason = (
                 f"the event function {', '.join(unknown)} was finite at none of the states between "
                 f"t = {self._start!r} and t = {stop!r}, so nothing is known of the event."
             )
-            return {"status": Status.NOT_FINITE, "reason": reason}
-        return {"status": Status.FINISHED, "reason": ""}
+            return Status.NOT_FINITE, reason, None
+        return Status.FINISHED, "", None
 
     def _occurrences(self, event: int) -> Occurrences:
         hits = [hit for hit in self._hits if hit.event == event]

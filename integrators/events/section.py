@@ -7,10 +7,11 @@ import numpy as np
 
 from integrators.events.event import Event, named
 from integrators.events.search import search
-from integrators.integrate import Solution, check
-from integrators.options import whole
-from integrators.protocol import MethodBase, as_numbers
+from integrators.options import Count
+from integrators.protocol import MethodBase, as_numbers, check_problem
+from integrators.solution import Solution
 from problems import Problem
+from problems.checks import checked
 from problems.errors import InputError, shown
 
 
@@ -58,14 +59,14 @@ def section(
     >>> made.y.shape
     (3, 4)
     """
-    check(problem, method)
+    check_problem(problem, method)
     end = as_numbers("t_end of a section", problem.t_end if t_end is None else t_end)
     if end.ndim or not np.isfinite(end) or end == problem.t0:
         raise InputError(
             f"t_end={shown(t_end)} of a section must be a finite time other than t0={problem.t0!r}."
         )
     if count is not None:
-        count = whole("a section", "count", count)
+        count = checked("a section", "count", count, Count)
     program = method.compile(problem.system)
     events = named(Event(g, direction=direction, terminal=int(count or 0), name="section"))
     found = search(problem, method, program, events, float(end))

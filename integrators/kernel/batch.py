@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 from integrators.kernel.context import ALWAYS_IMPLICIT, DENSE, DONE, LAND, SIDE, Context, Shape
 from integrators.kernel.native import engine
 from integrators.kernel.stepper import HBVMStepper, Program, failure
-from integrators.options import whole
+from integrators.options import Count
 from integrators.pace import Pace
-from integrators.protocol import Array, Status, UserError, check_batch, check_times
+from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
 from integrators.times import Counts, plan
-from integrators.trajectories import Trajectories
+from problems.checks import checked
 from problems.errors import unknown
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
@@ -74,7 +74,7 @@ def prepare_batch(
     """Check and allocate; return what integrates every start to all times. See `HBVMProgram.batch`."""
     if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
         raise unknown("sampling of a batch", sample, SAMPLINGS)
-    threads = whole("a batch", "threads", threads)
+    threads = checked("a batch", "threads", threads, Count)
     grid = check_times(times, t0)
     starts, parameters = check_batch(Y0, par, grid, program.system)
     h = -program.h if grid[-1] < t0 else program.h

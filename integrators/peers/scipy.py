@@ -9,11 +9,11 @@ from types import FunctionType
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from integrators.peers.options import load, number
+from integrators.options import NotNegative, Share
+from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
-from integrators.stepping import PeerProgram, PeerStepper
+from integrators.stepping import ProgramBase, StepperBase
 from integrators.watchdog import Crawl
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -63,16 +63,15 @@ class _SciPyMethod(MethodBase):
     The tolerances hold for the local error: ``atol + rtol |y|`` in each component.
     """
 
-    rtol: float
-    atol: float
+    rtol: Share
+    atol: NotNegative
 
     solver: ClassVar[str]
     library = "scipy"
     to_end = "land"
 
     def __post_init__(self) -> None:
-        number(self, "rtol", below=1.0)
-        number(self, "atol", strict=False)
+        super().__post_init__()
         if self.rtol < RTOL_FLOOR:
             raise InputError(
                 f"rtol={self.rtol!r} is below what SciPy attains (100 times the double's epsilon); "
@@ -109,10 +108,7 @@ class DOP853(_SciPyMethod):
     citation = SCIPY + HAIRER_I
     family = "runge-kutta"
 
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 8
+    order = 8
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -128,7 +124,7 @@ class Radau(_SciPyMethod):
 
     Notes
     -----
-    The Jacobian is the traced system's own (`problems.calculus.jacobian`), as our implicit methods have
+    The Jacobian is the traced system's own (`problems.System.jacobian`), as our implicit methods have
     it; SciPy's finite differences where there is none. It is L-stable, so it damps oscillations:
     no method for conserving energy.
     """
@@ -137,40 +133,35 @@ class Radau(_SciPyMethod):
     citation = SCIPY + HAIRER_II
     family = "runge-kutta"
 
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 5
+    order = 5
 
 
-class SciPyProgram(PeerProgram):
+class SciPyProgram(ProgramBase):
     """A vector field compiled for SciPy's solvers."""
 
     def __init__(self, system: System, method: _SciPyMethod):
         super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
         from problems import emit
-        from problems.calculus.jacobian import jacobian
 
         started = perf_counter()
         self.method, self.solver = method, getattr(integrate, method.solver)
         self.field = emit.numba(system, "field")
         # The first call compiles for these types.
         self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
-        self.jacobian = jacobian(system) if method.solver == "Radau" else None
+        self.jacobian = system.jacobian() if method.solver == "Radau" else None
         if self.jacobian is not None:
-            self.entries = emit.numba(system, "jacobian")
+            self.entries = emit.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
         self.from_cache = None
         self.compile_seconds = perf_counter() - started
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "SciPyStepper":
-        """Return a stepper at ``t0``; see the protocol."""
-        arguments = self.arguments(y0, par, t0)
-        return self.started(SciPyStepper(self, *arguments), arguments[1])
+    def stepper(self, y: Array, par: Array, t: float) -> "SciPyStepper":
+        """Return a trajectory."""
+        return SciPyStepper(self, y, par, t)
 
 
-class SciPyStepper(PeerStepper):
+class SciPyStepper(StepperBase):
     """A trajectory of one of SciPy's solvers.
 
     ``"side"`` (default)

@@ -5,27 +5,30 @@ states are the doubles that the integrators see, every operation carries 32
 digits, and the result is rounded once. What is left is the integrator's error.
 """
 
-from typing import TYPE_CHECKING
+import operator
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems.analysis import double_double
 from problems.analysis.double_double import DD
-from problems.calculus.functions import Function
-from problems.calculus.gradient import reachable
+from problems.calculus.function import Function
 from problems.errors import InputError, shown
-from problems.systems.hamiltonian import System
-from problems.trace.graph import Node, T
-from problems.trace.sums import Loop
-
-if TYPE_CHECKING:
-    from problems.problem import Problem
+from problems.systems.base import System
+from problems.trace.graph import Loop, Node, T, reachable
 
 Array = NDArray[np.float64]
 
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000
+_OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "neg": operator.neg,
+}
 
 
 def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]:
@@ -47,8 +50,7 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
     list of DD
         One array of shape (n,) per output.
     """
-    roots = [term.node for terms in function.outputs for term in terms]
-    lengths = [len(node.data) for node in reachable(roots) if node.op == "sum"]
+    lengths = [len(node.data) for node in reachable(function.roots) if node.op == "sum"]
     largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
     columns = max(1, _BLOCK // largest)
     n = y.shape[1]
@@ -70,11 +72,9 @@ class _Interpreter:
         self.known: dict[int, DD] = {}
 
     def outputs(self, function: Function) -> list[DD]:
-        roots = [term.node for terms in function.outputs for term in terms]
-        roots += [entry.node for _, entries in function.loops for entry in entries]
         # Overflow and 0/0 at a state that is not finite give nan there, which is the answer.
         with np.errstate(all="ignore"):
-            for node in reachable(roots):
+            for node in reachable(function.roots):
                 if node.loop is None:
                     self.known[node.id] = self._value(node, self.known)
             summands: list[list[DD]] = [[] for _ in function.outputs]
@@ -98,9 +98,8 @@ class _Interpreter:
 
     def _inside(self, roots: list[Node], loop: Loop) -> dict[int, DD]:
         body: dict[int, DD] = {}
-        for node in reachable(roots):
-            if node.loop is loop:
-                body[node.id] = self._value(node, body)
+        for node in reachable(roots, loop):
+            body[node.id] = self._value(node, body)
         return body
 
     def _value(self, node: Node, known: dict[int, DD]) -> DD:
@@ -115,21 +114,9 @@ class _Interpreter:
         if node.op == "sum":
             return self._sum(node, node.data)
         args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
-        match node.op:
-            case "add":
-                return args[0] + args[1]
-            case "sub":
-                return args[0] - args[1]
-            case "mul":
-                return args[0] * args[1]
-            case "div":
-                return args[0] / args[1]
-            case "neg":
-                return -args[0]
-            case "pow":
-                return args[0] ** node.data
-            case _:
-                return double_double.FUNCTIONS[node.op](args[0])
+        if node.op == "pow":
+            return args[0] ** node.data
+        return _OPERATIONS[node.op](*args)
 
     def _sum(self, node: Node, loop: Loop) -> DD:
         terms = self._rows(self._inside([node.args[0]], loop)[node.args[0].id], len(loop))
@@ -143,62 +130,65 @@ class _Interpreter:
         return DD(hi[0], lo[0])
 
 
-def _states(problem: "Problem", y: ArrayLike) -> Array:
+def _states(system: System, y: ArrayLike) -> Array:
     try:
         states = np.asarray(y, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"states must be an array of numbers, not {shown(y)}.") from error
-    if states.ndim not in (1, 2) or states.shape[-1] != problem.system.dim:
-        raise InputError(f"states must have the shape (n, {problem.system.dim}), not {states.shape}.")
+    if states.ndim not in (1, 2) or states.shape[-1] != system.dim:
+        raise InputError(f"states must have the shape (n, {system.dim}), not {states.shape}.")
     return np.atleast_2d(states)
 
 
-def _evaluate(problem: "Problem", what: str, states: Array, t: ArrayLike | None) -> list[DD]:
-    function = problem.system.function(what)
+def _along(system: System, par: Array, what: str, states: Array, t: ArrayLike | None) -> list[DD]:
+    function = system.function(what)
     if t is None:
-        if any(term.node.flags & T for terms in function.outputs for term in terms):
+        if any(node.flags & T for node in function.roots):
             raise InputError(f"{what.split(':')[-1]} depends on time; give the times of the states as t=.")
-        t = problem.t0
+        t = 0.0
     try:
         times = np.asarray(t, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"t must be {len(states)} times, not {shown(t)}.") from error
     if times.ndim > 1 or (times.ndim == 1 and times.size != len(states)):
         raise InputError(f"t must be {len(states)} times, one per state, not of shape {times.shape}.")
-    return evaluate(function, times, np.ascontiguousarray(states.T), problem.par)
+    return evaluate(function, times, np.ascontiguousarray(states.T), par)
 
 
-def invariants(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
-    """See `problems.problem.Problem.invariants`."""
-    states = _states(problem, y)
+def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
+    """Return the invariants along states, see `problems.problem.Problem.invariants`."""
+    states = _states(system, y)
     found: dict[str, Array] = {}
-    for name in problem.system.invariant_names:
-        values = [value.rounded() for value in _evaluate(problem, f"invariant:{name}", states, t)]
-        vector = problem.system.is_vector(f"invariant:{name}")
-        found[name] = np.stack(values, axis=1) if vector else values[0]
+    for name in system.invariant_names:
+        values = [value.rounded() for value in _along(system, par, f"invariant:{name}", states, t)]
+        found[name] = np.stack(values, axis=1) if system.is_vector(name) else values[0]
     return found
 
 
-def errors(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
-    """See `problems.problem.Problem.errors`."""
-    states = _states(problem, y)
+def errors(
+    system: System, par: Array, y: ArrayLike, t: ArrayLike | None, *, start: tuple[float, Array]
+) -> dict[str, Array]:
+    """Return how far the invariants are from those at ``start``, see `problems.problem.Problem.errors`."""
+    states = _states(system, y)
     found: dict[str, Array] = {}
-    for name in problem.system.invariant_names:
+    for name in system.invariant_names:
         what = f"invariant:{name}"
-        start = _evaluate(problem, what, problem.y0[np.newaxis, :], problem.t0)
-        now = _evaluate(problem, what, states, t)
-        gaps = np.stack([(a - b).rounded() for a, b in zip(now, start, strict=True)])
-        size = np.linalg.norm([value.rounded()[0] for value in start])
-        found[name] = np.linalg.norm(gaps, axis=0) / (size if size != 0 else 1.0)
+        first = _along(system, par, what, np.atleast_2d(start[1]), start[0])
+        gaps = [
+            (now - before).rounded()
+            for now, before in zip(_along(system, par, what, states, t), first, strict=True)
+        ]
+        size = np.linalg.norm([value.rounded()[0] for value in first])
+        found[name] = np.linalg.norm(np.stack(gaps), axis=0) / (size if size != 0 else 1.0)
     return found
 
 
-def guards(problem: "Problem", y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
-    """See `problems.problem.Problem.guards`."""
-    states = _states(problem, y)
+def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
+    """Return the guards along states, see `problems.problem.Problem.guards`."""
+    states = _states(system, y)
     return {
-        name: np.abs(_evaluate(problem, f"guard:{name}", states, t)[0].rounded())
-        for name in problem.system.guard_names
+        name: np.abs(_along(system, par, f"guard:{name}", states, t)[0].rounded())
+        for name in system.guard_names
     }
 
 
@@ -206,16 +196,13 @@ def _scale(system: System, par: Array) -> list[DD]:
     return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, 1)), par)
 
 
-def velocity(problem: "Problem", y: ArrayLike) -> Array | None:
-    """See `problems.problem.Problem.velocity`."""
-    system = problem.system
-    states = _states(problem, y)
+def velocity(system: System, par: Array, y: ArrayLike) -> Array | None:
+    """Return the velocities at states, see `problems.problem.Problem.velocity`."""
+    states = _states(system, y)
     if not system.separable or system.dof is None:
         return None
     momenta = states[:, system.dof :]
-    return np.stack(
-        [(c * momenta[:, i]).rounded() for i, c in enumerate(_scale(system, problem.par))], axis=1
-    )
+    return np.stack([(c * momenta[:, i]).rounded() for i, c in enumerate(_scale(system, par))], axis=1)
 
 
 def momentum(system: System, par: Array, v: Array) -> Array:

@@ -2,11 +2,9 @@
 
 import re
 
-from problems.calculus.gradient import reachable
 from problems.errors import InputError
 from problems.systems.base import System
-from problems.trace.node import Node
-from problems.trace.sums import Affine, Loop
+from problems.trace.graph import Affine, Loop, Node, reachable
 
 LONGEST = 20_000  # characters: a formula beyond that is no longer read
 _SUM, _SIGNED, _PRODUCT, _LEAF = 0, 1, 2, 3
@@ -142,6 +140,7 @@ class _Printer:
             return self._parameter(node)
         dof = self.system.dof
         if isinstance(place, Affine):
+            assert node.loop is not None
             low = int(place.values(node.loop).min())
             letter = "y" if dof is None else ("q" if low < dof else "p")
             base = dof if letter == "p" and dof is not None else 0

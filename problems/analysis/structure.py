@@ -1,16 +1,11 @@
 """What can be read off a traced system: degree, time, coordinates that do not occur."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from problems.calculus.functions import Function
-from problems.calculus.gradient import reachable
 from problems.errors import InputError
 from problems.systems.base import System
-from problems.trace.graph import STATE, T
-from problems.trace.node import Node
+from problems.trace.graph import STATE, Node, T, reachable
 
 
 def degree(system: System, par: ArrayLike | None = None) -> int | None:
@@ -98,12 +93,12 @@ def exact_k(nu: int, s: int) -> int:
 def depends_on_time(system: System) -> bool:
     """Whether the energy, or the vector field where there is none, contains the time itself."""
     what = "hamiltonian" if _has_energy(system) else "field"
-    return any(node.flags & T for node in _roots(system.function(what)))
+    return any(node.flags & T for node in system.function(what).roots)
 
 
 def has_kinks(system: System) -> bool:
     """Whether the vector field has an absolute value, or its derivative, of the state or of time."""
-    nodes = reachable(list(_roots(system.function("field"))))
+    nodes = reachable(system.function("field").roots)
     return any(node.op in ("abs", "sign") and node.flags & (STATE | T) for node in nodes)
 
 
@@ -147,11 +142,4 @@ def _has_energy(system: System) -> bool:
 def _energy(system: System) -> Node:
     if not _has_energy(system):
         raise InputError(f"{system.name} has no energy; give it as a Hamiltonian or a Poisson system.")
-    return system.function("hamiltonian").outputs[0][0].node
-
-
-def _roots(function: Function) -> Iterator[Node]:
-    for terms in function.outputs:
-        yield from (term.node for term in terms)
-    for _, entries in function.loops:
-        yield from (entry.node for entry in entries)
+    return system.function("hamiltonian").roots[0]

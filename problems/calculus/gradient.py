@@ -17,69 +17,103 @@ the same whether a sum is emitted as a loop or term by term.
 from dataclasses import dataclass
 from fractions import Fraction
 
-from problems.calculus.adjoint import ONE, Adjoint, added, merged
-from problems.trace.graph import STATE, Node
-from problems.trace.sums import Affine, Loop
+from problems.calculus.function import Function, LoopTerm, Term
+from problems.trace.graph import STATE, Graph, Loop, Node, is_power_of_two, reachable
+
+_ONE = Fraction(1)
+_SMALL = 2**20  # 2/3 is written 2*x/3; a quotient of long decimals is rounded once instead
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
-    """A summand of a derivative.
+class _Adjoint:
+    """``factor * num / den`` (``None`` is 1); ``key`` is the node it comes from."""
 
-    Attributes
-    ----------
-    node : Node
-        Its value.
-    key : int
-        Where the user's expression uses the variable: emitters that follow it
-        finish one pair of bodies before they begin the next.
-    """
-
-    node: Node
+    factor: Fraction
+    num: Node | None
+    den: Node | None
     key: int
 
+    def times(self, node: Node, key: int, *, factor: Fraction = _ONE) -> "_Adjoint":
+        """Multiply; constants and powers of two go into the exact factor."""
+        factor = factor * self.factor
+        if node.op == "const":
+            return _Adjoint(factor * Fraction(node.data), self.num, self.den, key)
+        if node.op == "neg":
+            factor, node = -factor, node.args[0]
+        if node.op == "mul" and node.args[0].op == "const" and is_power_of_two(node.args[0].data):
+            factor, node = factor * Fraction(node.args[0].data), node.args[1]
+        return _Adjoint(factor, node if self.num is None else self.num * node, self.den, key)
 
-@dataclass(frozen=True, eq=False)
-class LoopTerm:
-    """A summand of many derivatives: ``node`` is added at ``index`` for each term of a loop."""
+    def over(self, node: Node, key: int, *, factor: Fraction = _ONE) -> "_Adjoint":
+        """Divide; constants and powers of two go into the exact factor."""
+        factor = factor * self.factor
+        if node.op == "const":
+            return _Adjoint(factor / Fraction(node.data), self.num, self.den, key)
+        if node.op == "mul" and node.args[0].op == "const" and is_power_of_two(node.args[0].data):
+            factor, node = factor / Fraction(node.args[0].data), node.args[1]
+        return _Adjoint(factor, self.num, node if self.den is None else self.den * node, key)
 
-    index: Affine
-    node: Node
+    def scaled(self, factor: Fraction, key: int) -> "_Adjoint":
+        return _Adjoint(self.factor * factor, self.num, self.den, key)
+
+    def divided(self, graph: Graph) -> "_Adjoint":
+        """Carry out the division, once, before the adjoint is used several times."""
+        if self.den is None:
+            return self
+        num = graph.const(1.0) if self.num is None else self.num
+        return _Adjoint(self.factor, num / self.den, None, self.key)
+
+    def node(self, graph: Graph) -> Node:
+        """Return the value as one node."""
+        size = abs(self.factor)
+        num, den = self.num, self.den
+        up, down = float(size), 1.0
+        if Fraction(up) != size and max(size.numerator, size.denominator) < _SMALL:
+            up, down = float(size.numerator), float(size.denominator)
+        value = graph.const(up) if num is None else graph.mul(graph.const(up), num)
+        if down != 1.0:
+            den = graph.const(down) if den is None else graph.mul(graph.const(down), den)
+        if den is not None:
+            value = value / den
+        return -value if self.factor < 0 else value
 
 
-@dataclass(frozen=True, eq=False)
-class Gradient:
-    """Derivatives of a scalar with respect to the state.
-
-    Attributes
-    ----------
-    terms : dict of int to tuple of Term
-        Summands by place in the state, in order; places without one are absent.
-    loops : tuple of (Loop, tuple of LoopTerm)
-        Summands that stand in loops; they come before `terms`.
-    """
-
-    terms: dict[int, tuple[Term, ...]]
-    loops: tuple[tuple[Loop, tuple[LoopTerm, ...]], ...]
+def _merged(parts: list[_Adjoint]) -> list[_Adjoint]:
+    """Join contributions that differ in their factor only: x + x is 2 x, exactly."""
+    kept: dict[tuple[int, int], _Adjoint] = {}
+    for part in parts:
+        name = (-1 if part.num is None else part.num.id, -1 if part.den is None else part.den.id)
+        other = kept.get(name)
+        if other is None:
+            kept[name] = part
+        else:
+            kept[name] = _Adjoint(other.factor + part.factor, part.num, part.den, other.key)
+    return [part for part in kept.values() if part.factor != 0]
 
 
-def reachable(roots: list[Node]) -> list[Node]:
-    """Return all nodes that ``roots`` depend on, arguments first."""
-    seen: dict[int, Node] = {}
-    stack = list(roots)
-    while stack:
-        node = stack.pop()
-        if node.id not in seen:
-            seen[node.id] = node
-            stack.extend(node.args)
-    return [seen[key] for key in sorted(seen)]
+def _added(parts: list[_Adjoint], graph: Graph) -> _Adjoint | None:
+    """Add contributions in order; a common factor and a common denominator stay outside."""
+    parts = _merged(parts)
+    if len(parts) <= 1:
+        return parts[0] if parts else None
+    size = abs(parts[0].factor)
+    common = size if all(abs(part.factor) == size for part in parts) else _ONE
+    den = parts[0].den
+    if any(part.den is not den for part in parts):
+        den = None
+    else:
+        parts = [_Adjoint(part.factor, part.num, None, part.key) for part in parts]
+    total = parts[0].scaled(1 / common, 0).node(graph)
+    for part in parts[1:]:
+        total = total + part.scaled(1 / common, 0).node(graph)
+    return _Adjoint(common, total, den, parts[0].key)
 
 
 class _Sweep:
     def __init__(self, root: Node) -> None:
         self.graph = root.graph
         self.nodes = reachable([root])
-        self.parts: dict[int, list[Adjoint]] = {}
+        self.parts: dict[int, list[_Adjoint]] = {}
         self._needed: set[int] = set()
         self._inverse: dict[int, Node] = {}
         self._survey()
@@ -105,26 +139,26 @@ class _Sweep:
                 if a.op == "const" and a.data == 1.0:
                     self._inverse[b.id] = node
 
-    def _over(self, part: Adjoint, node: Node, key: int, factor: Fraction = ONE) -> Adjoint:
+    def _over(self, part: _Adjoint, node: Node, key: int, factor: Fraction = _ONE) -> _Adjoint:
         """Divide by ``node``, or multiply by its reciprocal where that is known."""
         inverse = self._inverse.get(node.id)
         if inverse is not None:
             return part.times(inverse, key, factor=factor)
         return part.over(node, key, factor=factor)
 
-    def _give(self, node: Node, part: Adjoint) -> None:
+    def _give(self, node: Node, part: _Adjoint) -> None:
         if node.flags & STATE and part.factor != 0:
             self.parts.setdefault(node.id, []).append(part)
 
-    def collected(self, node: Node) -> list[Adjoint]:
+    def collected(self, node: Node) -> list[_Adjoint]:
         """Return the contributions to a node in the user's order, those from loops summed up."""
         parts = self.parts.pop(node.id, [])[::-1]
         return self._out_of_loops(parts) if node.loop is None else parts
 
-    def _out_of_loops(self, parts: list[Adjoint]) -> list[Adjoint]:
+    def _out_of_loops(self, parts: list[_Adjoint]) -> list[_Adjoint]:
         graph = self.graph
-        outside: list[Adjoint] = []
-        inside: dict[int, tuple[Loop, list[Adjoint]]] = {}
+        outside: list[_Adjoint] = []
+        inside: dict[Loop, list[_Adjoint]] = {}
         for part in parts:
             loop = next((n.loop for n in (part.num, part.den) if n is not None and n.loop is not None), None)
             # A contribution from inside a loop that does not vary there still occurs once per term.
@@ -132,16 +166,16 @@ class _Sweep:
             if loop is None:
                 outside.append(part)
             else:
-                inside.setdefault(loop.id, (loop, []))[1].append(part)
-        sums: list[Adjoint] = []
-        for loop, loop_parts in inside.values():
-            total = added(loop_parts, graph)
+                inside.setdefault(loop, []).append(part)
+        sums: list[_Adjoint] = []
+        for loop, loop_parts in inside.items():
+            total = _added(loop_parts, graph)
             if total is not None:
-                body = Adjoint(ONE, total.num, total.den, 0).node(graph)
-                sums.append(Adjoint(total.factor, graph.sum(body, loop), None, total.key))
+                body = _Adjoint(_ONE, total.num, total.den, 0).node(graph)
+                sums.append(_Adjoint(total.factor, graph.sum(body, loop), None, total.key))
         return sums + outside
 
-    def pull(self, node: Node, adjoint: Adjoint) -> None:
+    def pull(self, node: Node, adjoint: _Adjoint) -> None:
         """Pass the adjoint of ``node`` on to its arguments."""
         graph, key = self.graph, node.id
         active = [arg for arg in node.args if arg.flags & STATE]
@@ -150,12 +184,12 @@ class _Sweep:
         match node.op:
             case "add":
                 for arg in reversed(node.args):
-                    self._give(arg, adjoint.scaled(ONE, key))
+                    self._give(arg, adjoint.scaled(_ONE, key))
             case "sub":
-                self._give(node.args[1], adjoint.scaled(-ONE, key))
-                self._give(node.args[0], adjoint.scaled(ONE, key))
+                self._give(node.args[1], adjoint.scaled(-_ONE, key))
+                self._give(node.args[0], adjoint.scaled(_ONE, key))
             case "neg":
-                self._give(node.args[0], adjoint.scaled(-ONE, key))
+                self._give(node.args[0], adjoint.scaled(-_ONE, key))
             case "mul":
                 a, b = node.args
                 if a is b:
@@ -174,32 +208,32 @@ class _Sweep:
                 self._give(node.args[0], self._over(adjoint, node, key, Fraction(1, 2)))
             case "sum":
                 adjoint = adjoint.divided(graph)
-                self._give(node.args[0], adjoint.scaled(ONE, key))
+                self._give(node.args[0], adjoint.scaled(_ONE, key))
             case _:
                 self._give(node.args[0], self._pull_function(node, adjoint))
 
-    def _pull_quotient(self, node: Node, adjoint: Adjoint) -> None:
+    def _pull_quotient(self, node: Node, adjoint: _Adjoint) -> None:
         a, b = node.args
         key = node.id
         if b.flags & STATE:
             if node.id in self._needed:
-                part = self._over(adjoint.times(node, key), b, key, -ONE)
+                part = self._over(adjoint.times(node, key), b, key, -_ONE)
             elif b.op == "sqrt":
-                part = adjoint.times(a, key, factor=-ONE).over(b.args[0], key)
+                part = adjoint.times(a, key, factor=-_ONE).over(b.args[0], key)
             else:
-                part = adjoint.times(a, key, factor=-ONE).over(self.graph.mul(b, b), key)
+                part = adjoint.times(a, key, factor=-_ONE).over(self.graph.mul(b, b), key)
             self._give(b, part)
         if a.flags & STATE:
             self._give(a, self._over(adjoint, b, key))
 
-    def _pull_function(self, node: Node, adjoint: Adjoint) -> Adjoint:
+    def _pull_function(self, node: Node, adjoint: _Adjoint) -> _Adjoint:
         graph, key = self.graph, node.id
         x = node.args[0]
         match node.op:
             case "sin":
                 return adjoint.times(graph.call("cos", x), key)
             case "cos":
-                return adjoint.times(graph.call("sin", x), key, factor=-ONE)
+                return adjoint.times(graph.call("sin", x), key, factor=-_ONE)
             case "tan":
                 return adjoint.times(graph.node(1.0) + node * node, key)
             case "exp":
@@ -213,42 +247,40 @@ class _Sweep:
         raise AssertionError(f"no derivative of {node.op}")  # pragma: no cover
 
 
-def gradient(root: Node) -> Gradient:
-    """Differentiate a scalar with respect to every component of the state that it uses.
+def gradient(root: Node, dim: int) -> Function:
+    """Differentiate a scalar with respect to the state.
 
     Parameters
     ----------
     root : Node
         The scalar; not inside a loop.
+    dim : int
+        Length of the state.
 
     Returns
     -------
-    Gradient
-        Summands in order, added up by `problems.calculus.functions`.
+    Function
+        ``dim`` outputs; those of components that the scalar does not use have no summands.
     """
     graph = root.graph
-    terms: dict[int, tuple[Term, ...]] = {}
-    loops: dict[int, tuple[Loop, list[LoopTerm]]] = {}
-    if not root.flags & STATE:
-        return Gradient({}, ())
+    outputs: list[tuple[Term, ...]] = [()] * dim
+    loops: dict[Loop, list[LoopTerm]] = {}
     sweep = _Sweep(root)
-    sweep.parts[root.id] = [Adjoint(ONE, None, None, root.id)]
+    sweep.parts[root.id] = [_Adjoint(_ONE, None, None, root.id)]
     for node in reversed(sweep.nodes):
         if not node.flags & STATE or node.id not in sweep.parts:
             continue
         parts = sweep.collected(node)
-        if node.op != "symbol":
-            total = added(parts, graph)
-            if total is not None:
-                sweep.pull(node, total)
+        loop = node.loop
+        if node.op == "symbol" and loop is None:
+            outputs[node.data[1]] = tuple(Term(part.node(graph), part.key) for part in _merged(parts))
             continue
-        place = node.data[1]
-        if node.loop is None:
-            terms[place] = tuple(Term(part.node(graph), part.key) for part in merged(parts))
+        total = _added(parts, graph)
+        if total is None:
+            continue
+        if node.op == "symbol" and loop is not None:
+            loops.setdefault(loop, []).append(LoopTerm(node.data[1], total.node(graph)))
         else:
-            total = added(parts, graph)
-            if total is not None:
-                entry = LoopTerm(place, total.node(graph))
-                loops.setdefault(node.loop.id, (node.loop, []))[1].append(entry)
-    ordered = [(loop, tuple(entries[::-1])) for _, (loop, entries) in sorted(loops.items())]
-    return Gradient(terms, tuple(ordered))
+            sweep.pull(node, total)
+    ordered = sorted(loops, key=lambda loop: loop.id)
+    return Function(graph, tuple(outputs), tuple((loop, tuple(loops[loop][::-1])) for loop in ordered))

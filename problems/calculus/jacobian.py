@@ -10,22 +10,16 @@ with the places of its entries as further columns of the list.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.calculus.functions import Function
-from problems.calculus.gradient import LoopTerm, Term, gradient
-from problems.emit.rewrite import body_of
-from problems.errors import unknown
-from problems.systems.base import System
-from problems.trace.graph import STATE, Graph, Node, Q
-from problems.trace.sums import Affine, Loop
+from problems.calculus.function import Function, LoopTerm, Term
+from problems.calculus.gradient import gradient
+from problems.trace.graph import STATE, Affine, Graph, Loop, Node, Q, reachable
 
 Integers = NDArray[np.int64]
 
-NAMES = {"jacobian": "field", "jacobian:force": "force"}
 LARGEST = 2_000_000  # integers in one loop's list; beyond, source text is the wrong place for a list
 _CAPTURED = 1 << 40  # places beyond any state stand for values that a loop's term takes from outside
 
@@ -34,8 +28,13 @@ _CAPTURED = 1 << 40  # places beyond any state stand for values that a loop's te
 class Jacobian:
     """The derivatives of a field with respect to the state, entry by entry.
 
+    Its values come from the emitters, in the order of ``rows`` and ``columns``:
+    ``emit.numpy(system, system.jacobian())(t, y, par)``; ``emit.numba`` likewise.
+
     Attributes
     ----------
+    name : str
+        What generated code and messages call it.
     function : Function
         One output per entry, for the emitters.
     rows, columns : ndarray of int64, shape (n,)
@@ -44,6 +43,7 @@ class Jacobian:
         The matrix is size by size.
     """
 
+    name: str
     function: Function
     rows: Integers
     columns: Integers
@@ -55,74 +55,46 @@ class Jacobian:
         return self.rows.size / self.size**2
 
 
-_known: WeakKeyDictionary[System, dict[str, Jacobian | None]] = WeakKeyDictionary()
-
-
-def jacobian(system: System, what: str = "jacobian") -> Jacobian | None:
-    """Return a system's Jacobian, or ``None`` where there is none to be written down.
-
-    Its values come from the emitters: ``emit.numpy(system, what)(t, y, par)``, in the
-    order of ``rows`` and ``columns``; ``emit.numba`` likewise.
+def jacobian(function: Function, name: str) -> Jacobian | None:
+    """Return the derivatives of a function with respect to as many components of the state.
 
     Parameters
     ----------
-    system : System
-        A traced system.
-    what : {"jacobian", "jacobian:force"}
-        Of the field with respect to the state, or (separable systems) of the force
-        with respect to the positions.
+    function : Function
+        A field, or the force of a separable system, which depends on the positions alone.
+    name : str
+        See `Jacobian`.
 
     Returns
     -------
     Jacobian or None
-        ``None`` for a system that is not traced, and where the list of entries would
-        be larger than `LARGEST`: the derivatives must then be taken by differences.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For another name, or a system that has no such function.
+        ``None`` where the list of entries would be larger than `LARGEST`.
     """
-    if what not in NAMES:
-        raise unknown("Jacobian", what, NAMES)
-    known = _known.setdefault(system, {})
-    if what not in known:
-        known[what] = None if not system.traced else _differentiated(system.function(NAMES[what]))
-    return known[what]
-
-
-def _differentiated(function: Function) -> Jacobian | None:
-    size = len(function.outputs)
-    entries = _Entries(function.graph)
+    entries = _Entries(function.graph, len(function.outputs))
     for loop, terms in function.loops:
         for term in terms:
             entries.of_loop_term(loop, term.index, term.node)
     for row, terms in enumerate(function.outputs):
         for term in terms:
             entries.of_term(row, term.node)
-    return entries.collected(size)
-
-
-@dataclass
-class _InLoop:
-    """Derivatives in one loop: ``nodes[a, b]`` stands at row a, column b, for each term."""
-
-    loop: Loop
-    nodes: dict[tuple[Affine, Affine], Node]
+    return entries.collected(name)
 
 
 class _Entries:
-    def __init__(self, graph: Graph) -> None:
+    def __init__(self, graph: Graph, size: int) -> None:
         self.graph = graph
+        self.size = size
         self.plain: dict[tuple[int, int], list[Node]] = {}
-        self.loops: dict[int, _InLoop] = {}
+        # Derivatives in a loop: that at [row, column] stands there for each term.
+        self.loops: dict[Loop, dict[tuple[Affine, Affine], Node]] = {}
         self.too_large = False
 
     def of_term(self, row: int, node: Node) -> None:
         """Enter the derivatives of a summand of one output."""
-        found = gradient(node)
-        for column, terms in found.terms.items():
-            self.plain.setdefault((row, column), []).extend(term.node for term in terms)
+        found = gradient(node, self.size)
+        for column, terms in enumerate(found.outputs):
+            if terms:
+                self.plain.setdefault((row, column), []).extend(term.node for term in terms)
         for loop, terms in found.loops:
             for term in terms:
                 self._enter(loop, _constant(loop, row), term.index, term.node)
@@ -131,21 +103,24 @@ class _Entries:
         """Enter the derivatives of a summand that stands in a loop."""
         outside: dict[int, Node] = {}
 
-        def stand_in(inner: Node) -> Node:
-            # As a symbol of the loop it keeps a derivative of its own in every term.
+        def captured(inner: Node) -> Node:
+            if inner.loop is not None or not inner.flags & STATE:
+                return inner
             outside[inner.id] = inner
+            # As a symbol of the loop it keeps a derivative of its own in every term.
             return self.graph.symbol("captured", _constant(loop, _CAPTURED + inner.id), flags=Q, loop=loop)
 
-        def captured(inner: Node) -> Node:
-            return stand_in(inner) if inner.loop is None and inner.flags & STATE else inner
+        def brought_back(inner: Node) -> Node:
+            stand_in = inner.op == "symbol" and inner.data[0] == "captured"
+            return outside[inner.data[1].offset - _CAPTURED] if stand_in else inner
 
         isolated = _copied(self.graph, node, loop, captured) if node.loop is loop else captured(node)
         if not isolated.flags & STATE:
             return
-        for found_loop, terms in gradient(self.graph.sum(isolated, loop)).loops:
+        for found_loop, terms in gradient(self.graph.sum(isolated, loop), self.size).loops:
             assert found_loop is loop
             for term in terms:
-                slope = _copied(self.graph, term.node, loop, lambda inner: _brought_back(inner, outside))
+                slope = _copied(self.graph, term.node, loop, brought_back)
                 if term.index.offset < _CAPTURED:
                     self._enter(loop, row, term.index, slope)
                 else:
@@ -156,8 +131,8 @@ class _Entries:
         if inner.op == "symbol":
             self._enter(loop, row, _constant(loop, inner.data[1]), slope)
             return
-        found = gradient(inner)
-        for column, terms in found.terms.items():
+        found = gradient(inner, self.size)
+        for column, terms in enumerate(found.outputs):
             for term in terms:
                 self._enter(loop, row, _constant(loop, column), slope * term.node)
         for other, terms in found.loops:
@@ -170,7 +145,7 @@ class _Entries:
             self.too_large = True
             return
         pairs = np.hstack([np.repeat(loop.rows, m, axis=0), np.tile(other.rows, (n, 1))])
-        both = _loop(self.graph, pairs)
+        both = self.graph.loop(pairs)
         left = _moved(self.graph, slope, loop, both, 0)
         for term in terms:
             right = _moved(self.graph, term.node, other, both, loop.width)
@@ -178,50 +153,38 @@ class _Entries:
             self._enter(both, _widened(row, both, 0), column, left * right)
 
     def _enter(self, loop: Loop, row: Affine, column: Affine, node: Node) -> None:
-        nodes = self.loops.setdefault(loop.id, _InLoop(loop, {})).nodes
+        nodes = self.loops.setdefault(loop, {})
         before = nodes.get((row, column))
         nodes[row, column] = node if before is None else before + node
 
-    def collected(self, size: int) -> Jacobian | None:
+    def collected(self, name: str) -> Jacobian | None:
         """Return the Jacobian; its entries in order, the loops' lists with their places."""
-        flat = [np.array([row * size + column for row, column in self.plain], dtype=np.int64)]
-        for part in self.loops.values():
-            flat += [row.values(part.loop) * size + column.values(part.loop) for row, column in part.nodes]
-        places = np.unique(np.concatenate(flat))
+        lengths = [len(loop) * (loop.width + len(nodes)) for loop, nodes in self.loops.items()]
+        if self.too_large or max(lengths, default=0) > LARGEST:
+            return None
+        size = self.size
+        inside = {
+            loop: [row.values(loop) * size + column.values(loop) for row, column in nodes]
+            for loop, nodes in self.loops.items()
+        }
+        plain = np.array([row * size + column for row, column in self.plain], dtype=np.int64)
+        places = np.unique(np.concatenate([plain, *(flat for each in inside.values() for flat in each)]))
         if places.size == 0:
             places = np.zeros(1, dtype=np.int64)  # a constant field: one entry, which is 0
-        loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
-        for part in self.loops.values():
-            made = self._with_places(part, places, size)
-            if made is None:
-                return None
-            loops.append(made)
-        if self.too_large:
-            return None
         outputs: list[tuple[Term, ...]] = [()] * places.size
-        for (row, column), nodes in self.plain.items():
-            place = int(np.searchsorted(places, row * size + column))
+        for place, nodes in zip(np.searchsorted(places, plain), self.plain.values(), strict=True):
             outputs[place] = tuple(Term(node, node.id) for node in nodes)
+        loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
+        for loop, nodes in self.loops.items():
+            columns = np.stack([np.searchsorted(places, flat) for flat in inside[loop]], axis=1)
+            longer = self.graph.loop(np.hstack([loop.rows, columns]))
+            terms: list[LoopTerm] = []
+            for i, node in enumerate(nodes.values(), start=loop.width):
+                place = tuple(int(j == i) for j in range(longer.width))
+                terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
+            loops.append((longer, tuple(terms)))
         function = Function(self.graph, tuple(outputs), tuple(loops))
-        return Jacobian(function, places // size, places % size, size)
-
-    def _with_places(
-        self, part: _InLoop, places: Integers, size: int
-    ) -> tuple[Loop, tuple[LoopTerm, ...]] | None:
-        loop = part.loop
-        width = loop.width
-        if len(loop) * (width + len(part.nodes)) > LARGEST:
-            return None
-        columns = [
-            np.searchsorted(places, row.values(loop) * size + column.values(loop))
-            for row, column in part.nodes
-        ]
-        longer = _loop(self.graph, np.hstack([loop.rows, np.stack(columns, axis=1)]))
-        terms: list[LoopTerm] = []
-        for i, node in enumerate(part.nodes.values()):
-            place = tuple(int(j == width + i) for j in range(longer.width))
-            terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
-        return longer, tuple(terms)
+        return Jacobian(name, function, places // size, places % size, size)
 
 
 def _constant(loop: Loop, place: int) -> Affine:
@@ -235,29 +198,16 @@ def _widened(affine: Affine, loop: Loop, at: int) -> Affine:
     return Affine(tuple(coefficients), affine.offset)
 
 
-def _loop(graph: Graph, rows: Integers) -> Loop:
-    rows = np.ascontiguousarray(rows, dtype=np.int64)
-    return graph.loops.setdefault((rows.shape, rows.tobytes()), Loop(rows, len(graph.loops)))
-
-
 def _copied(graph: Graph, root: Node, loop: Loop, leaf: Callable[[Node], Node]) -> Node:
     """Return ``root`` with ``leaf`` applied to the loop's symbols and to what comes from outside."""
     done: dict[int, Node] = {}
-    for node in body_of([root], loop):
+    for node in reachable([root], loop):
         if node.op in ("symbol", "index"):
             done[node.id] = leaf(node)
         else:
             args = tuple(done[arg.id] if arg.id in done else leaf(arg) for arg in node.args)
             done[node.id] = graph.apply(node, args)
     return done[root.id] if root.id in done else leaf(root)
-
-
-def _brought_back(node: Node, outside: dict[int, Node]) -> Node:
-    return outside[node.data[1].offset - _CAPTURED] if _is_stand_in(node) else node
-
-
-def _is_stand_in(node: Node) -> bool:
-    return node.op == "symbol" and node.data[0] == "captured"
 
 
 def _moved(graph: Graph, root: Node, loop: Loop, to: Loop, at: int) -> Node:

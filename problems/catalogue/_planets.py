@@ -1,31 +1,28 @@
 """What the planetary problems share: units of time, frames of reference, exact set-up."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
+from typing import Literal
 
-from problems.catalogue import _given as given
 from problems.catalogue import _gravity as gravity
 from problems.problem import Problem
-from problems.registry import changed
 
+Unit = Literal["year", "day"]
+Frame = Literal["barycentric", "heliocentric"]
 DAYS = {"day": Fraction(1), "year": Fraction("365.25")}
-FRAMES = ("barycentric", "heliocentric")
 SPAN = 1200  # years
 
 
 def planetary(
-    make: Callable[..., Problem],
+    name: str,
     *,
-    unit: str,
-    frame: str,
+    unit: Unit,
+    frame: Frame,
     t_end: float | None,
     gravity_per_day: Fraction,
     masses: Sequence[Fraction],
     positions: Sequence[Sequence[Fraction]],
     velocities: Sequence[Sequence[Fraction]],
-    title: str,
-    references: Sequence[str],
-    notes: str,
 ) -> Problem:
     """Return the problem of the Sun and some planets.
 
@@ -34,8 +31,8 @@ def planetary(
 
     Parameters
     ----------
-    make : callable
-        The problem's own function, for its name and its defaults.
+    name : str
+        The system's name.
     unit : {"year", "day"}
         Unit of time; a year is 365.25 days.
     frame : {"barycentric", "heliocentric"}
@@ -46,20 +43,8 @@ def planetary(
         G in au^3/(solar mass day^2).
     masses, positions, velocities : sequence
         In solar masses, au and au per day; the Sun first.
-    title, references, notes
-        As for `Problem`.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown unit or frame, or a span that is not finite.
     """
-    name = make.__name__
-    given.choice(name, "unit", unit, tuple(DAYS))
-    given.choice(name, "frame", frame, FRAMES)
     days = DAYS[unit]
-    span = float(SPAN * DAYS["year"] / days) if t_end is None else t_end
-    given.finite(name, t_end=span)
     q = [list(row) for row in positions]
     v = [[x * days for x in row] for row in velocities]
     if frame == "barycentric":
@@ -74,12 +59,7 @@ def planetary(
         system,
         q0=[float(x) for row in q for x in row],
         p0=[float(mass * x) for mass, row in zip(masses, v, strict=True) for x in row],
-        t_end=span,
-        name=name,
-        title=title,
-        arguments={"unit": unit, "frame": frame} | changed(make, t_end=t_end),
-        references=references,
-        notes=notes,
+        t_end=float(SPAN * DAYS["year"] / days) if t_end is None else t_end,
     )
 
 

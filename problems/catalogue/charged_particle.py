@@ -1,44 +1,39 @@
-"""A charged particle in magnetic fields: the momentum is not the velocity.
+"""A charged particle in a magnetic field: the momentum is not the velocity.
 
     H(q, p) = |p - A(q)|^2/2 + phi(q),   unit mass and charge
 
-In the plane with the growing field B = r (A = r/3 (-y, x)) and the repelling
-potential phi = 1/(100 r), as in H. Qin et al., "Why is Boris algorithm so
-good?", Physics of Plasmas 20 (2013) 084503. In a Penning trap with B = omega_c and
-the quadrupole phi = omega_z^2/2 (z^2 - (x^2 + y^2)/2), plus an octupole
-c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2): L. S. Brown, G. Gabrielse,
-"Geonium theory", Reviews of Modern Physics 58 (1986) 233-311.
+In the plane, with the growing field B = r (A = r/3 (-y, x)) and the repelling
+potential phi = 1/(100 r).
 """
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.catalogue import _starts as starts
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _plane_energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     x, y = q[0], q[1]
     r = m.sqrt(x * x + y * y)
     u, v = p[0] + r * y / 3, p[1] - r * x / 3
     return (u * u + v * v) / 2 + par.charge / r
 
 
-def _trap_energy(q: Any, p: Any, par: Any) -> Any:
-    x, y, z = q
-    u, v = p[0] + par.omega_c * y / 2, p[1] - par.omega_c * x / 2
-    rho, z2 = x * x + y * y, z * z
-    kinetic = (u * u + v * v + p[2] * p[2]) / 2
-    quadrupole = par.omega_z**2 / 2 * (z2 - rho / 2)
-    return kinetic + quadrupole + par.c4 * (z2 * z2 - 3 * z2 * rho + 0.375 * (rho * rho))
-
-
 def _turn(q: Any, p: Any) -> Any:
     return q[0] * p[1] - q[1] * p[0]
 
 
+@entry(
+    title="a charged particle in a magnetic field",
+    references=("H. Qin et al., Why is Boris algorithm so good?, Physics of Plasmas 20 (2013) 084503",),
+    notes="Not separable: momenta are not velocities. Gyration and drift.",
+    picture=Plane(span=300.0),
+    expected=Expected(h=0.2, energy=1e-15, default=7e-15),
+)
 def charged_particle(
     *,
     x: float = 0.0,
@@ -70,31 +65,19 @@ def charged_particle(
     Raises
     ------
     problems.errors.InputError
-        For values that are not finite, or a start in the centre.
+        For a start in the centre.
     """
-    given.finite("charged_particle", x=x, y=y, vx=vx, vy=vy, charge=charge, t_end=t_end)
     if x == 0 and y == 0:
         raise InputError("x=0 and y=0 of charged_particle are the singular centre; start elsewhere.")
-    momentum = [given.nearest(lambda c=c: _canonical(x, y, vx, vy)[c]) for c in range(2)]
+    momentum = [starts.nearest(lambda c=c: _canonical(x, y, vx, vy)[c]) for c in range(2)]
     system = Hamiltonian(
-        _plane_energy,
+        _energy,
         dof=2,
         parameters={"charge": 0.01},
         invariants={"angular_momentum": _turn},
         name="charged_particle",
     )
-    return Problem(
-        system,
-        q0=[x, y],
-        p0=momentum,
-        parameters={"charge": charge},
-        t_end=t_end,
-        name="charged_particle",
-        title="a charged particle in a magnetic field",
-        arguments=changed(charged_particle, x=x, y=y, vx=vx, vy=vy, charge=charge, t_end=t_end),
-        references=("H. Qin et al., Why is Boris algorithm so good?, Physics of Plasmas 20 (2013) 084503",),
-        notes="Not separable: momenta are not velocities. Gyration and drift.",
-    )
+    return Problem(system, q0=[x, y], p0=momentum, parameters={"charge": charge}, t_end=t_end)
 
 
 def _canonical(x: float, y: float, vx: float, vy: float) -> tuple[Any, Any]:
@@ -103,66 +86,3 @@ def _canonical(x: float, y: float, vx: float, vy: float) -> tuple[Any, Any]:
     a, b = mpmath.mpf(x), mpmath.mpf(y)
     third = mpmath.sqrt(a * a + b * b) / 3
     return vx - third * b, vy + third * a
-
-
-def penning_trap(
-    *,
-    omega_c: float = 5.0,
-    omega_z: float = 1.0,
-    c4: float = 0.01,
-    t_end: float = 500.0,
-) -> Problem:
-    """Return a charged particle in a Penning trap.
-
-    Tests three widely spaced frequencies in a Hamiltonian that is not separable:
-    modified cyclotron, axial and magnetron motion, the last around a potential
-    hill. With ``c4=0`` the system is linear and every Gauss method keeps its energy too.
-
-    Parameters
-    ----------
-    omega_c, omega_z : float
-        Cyclotron and axial frequency; the trap holds for omega_c^2 > 2 omega_z^2.
-    c4 : float
-        Strength of the octupole, which makes the energy a polynomial of degree 4.
-    t_end : float
-        End of the integration.
-
-    Returns
-    -------
-    Problem
-        State ``[x, y, z, p_x, p_y, p_z]``, from (1, 0, 1) with the velocity (0, 0.1, 0);
-        parameters as named; invariants: energy, canonical angular momentum about the axis.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
-    """
-    given.finite("penning_trap", c4=c4, t_end=t_end)
-    given.positive("penning_trap", omega_c=omega_c, omega_z=omega_z)
-    if omega_c * omega_c <= 2 * omega_z * omega_z:
-        raise InputError(
-            f"omega_c={omega_c!r} of penning_trap does not hold the particle; "
-            f"it must exceed sqrt(2)*omega_z, omega_z={omega_z!r}."
-        )
-    system = Hamiltonian(
-        _trap_energy,
-        dof=3,
-        parameters={"omega_c": 5.0, "omega_z": 1.0, "c4": 0.01},
-        invariants={"angular_momentum": _turn},
-        name="penning_trap",
-    )
-    return Problem(
-        system,
-        q0=[1.0, 0.0, 1.0],
-        p0=[0.0, 0.1 + omega_c / 2, 0.0],
-        parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
-        t_end=t_end,
-        name="penning_trap",
-        title="a Penning trap",
-        arguments=changed(penning_trap, omega_c=omega_c, omega_z=omega_z, c4=c4, t_end=t_end),
-        references=(
-            "L. S. Brown, G. Gabrielse, Geonium theory, Reviews of Modern Physics 58 (1986) 233-311",
-        ),
-        notes="Three widely spaced frequencies; not separable; polynomial of degree 4.",
-    )

@@ -2,14 +2,31 @@
 
 import math
 from random import Random
+from typing import Annotated
 
-from problems.catalogue import _given as given
+from problems import limits
 from problems.catalogue import _gravity as gravity
+from problems.checks import Positive, at_least
+from problems.entry import Expected, entry
+from problems.picture import Orbits
 from problems.problem import Problem
-from problems.registry import changed
 
 
-def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float = 10.0) -> Problem:
+@entry(
+    title="a softened cluster",
+    references=("H. C. Plummer, Monthly Notices of the Royal Astronomical Society 71 (1911) 460-470",),
+    notes="All pairs interact: the cost grows with the square of n. Chaotic.",
+    shows=("n",),
+    picture=Orbits(dimension=3, span=5.0),
+    expected=Expected(h=0.05, energy=1e-15, default=3e-16, small={"n": 5}),
+)
+def cluster(
+    *,
+    n: Annotated[int, at_least(2)] = 10,
+    softening: Positive = 0.1,
+    seed: Annotated[int, at_least(0)] = 1,
+    t_end: float = 10.0,
+) -> Problem:
     """Return a cluster of bodies of mass 1/n that starts in the unit ball; G = 1.
 
     Tests the cost per pair of bodies. The potential of a pair is
@@ -35,17 +52,8 @@ def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float 
     Problem
         State: positions body by body, then momenta. Parameters ``m``, ``eps``;
         invariants: energy, angular momentum (the linear momentum is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.whole("cluster", 2, n=n)
-    given.size("cluster", 6 * n, n * (n - 1) // 2, n=n)
-    given.whole("cluster", 0, seed=seed)
-    given.positive("cluster", softening=softening)
-    given.finite("cluster", t_end=t_end)
+    limits.check_problem("cluster", 6 * n, n * (n - 1) // 2, n=n)
     random = Random(seed)
     q = _centred([_in_ball(random) for _ in range(n)])
     v = _centred([_in_ball(random) for _ in range(n)])
@@ -55,11 +63,6 @@ def cluster(*, n: int = 10, softening: float = 0.1, seed: int = 1, t_end: float 
         p0=[x * (0.5 / n) for row in v for x in row],
         parameters={"m": [1.0 / n] * n, "eps": softening},
         t_end=t_end,
-        name="cluster",
-        title="a softened cluster",
-        arguments={"n": n} | changed(cluster, softening=softening, seed=seed, t_end=t_end),
-        references=("H. C. Plummer, Monthly Notices of the Royal Astronomical Society 71 (1911) 460-470",),
-        notes="All pairs interact: the cost grows with the square of n. Chaotic.",
     )
 
 

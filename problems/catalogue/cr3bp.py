@@ -3,21 +3,18 @@
     H(q, p) = (p1^2 + p2^2)/2 + q2 p1 - q1 p2 - (1 - mu)/r1 - mu/r2
 
 with r1 the distance from (-mu, 0), r2 from (1 - mu, 0), and p = q' + (-q2, q1).
-The Jacobi integral is C = -2 H. V. Szebehely, Theory of Orbits (Academic Press
-1967). Periodic orbits around Earth and Moon of R. F. Arenstorf (1963): those of
-4 and 3 loops as in E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary
-Differential Equations I, 2nd edition (Springer 1993), section II.0; that of 2
-loops, with another mass of the Moon, as in L. F. Shampine, M. K. Gordon,
-Computer Solution of Ordinary Differential Equations (Freeman 1975).
+The Jacobi integral is C = -2 H. Periodic orbits around Earth and Moon of R. F.
+Arenstorf (1963): those of 4 and 3 loops as in Hairer, Norsett and Wanner's book, that
+of 2 loops, with another mass of the Moon, as in Shampine and Gordon's.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from problems.catalogue import _given as given
-from problems.errors import InputError, shown
+from problems.checks import Must
+from problems.entry import Expected, entry
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 MOON = 0.012277471
@@ -52,7 +49,25 @@ def _jacobi(q: Any, p: Any, par: Any, m: Any) -> Any:
     return -2 * _energy(q, p, par, m)
 
 
-def cr3bp(*, loops: int = 4, mu: float | None = None, t_end: float | None = None) -> Problem:
+@entry(
+    title="the restricted three-body problem",
+    references=(
+        "V. Szebehely, Theory of Orbits, Academic Press 1967",
+        "E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, "
+        "2nd edition, Springer 1993, section II.0",
+        "L. F. Shampine, M. K. Gordon, Computer Solution of Ordinary Differential Equations, Freeman 1975",
+    ),
+    notes="Not separable; close passages; unstable periodic orbits that return to their start.",
+    shows=("loops",),
+    picture=Plane(points=4000),
+    expected=Expected(h=0.0005, energy=4e-15, default=9e-15),
+)
+def cr3bp(
+    *,
+    loops: Literal[4, 3, 2] = 4,
+    mu: Annotated[float, Must("a number between 0 and 1", lambda mu: 0 < mu < 1)] | None = None,
+    t_end: float | None = None,
+) -> Problem:
     """Return the restricted three-body problem on one of Arenstorf's orbits.
 
     Tests steps that must shrink at close passages, in a system that is not
@@ -73,20 +88,8 @@ def cr3bp(*, loops: int = 4, mu: float | None = None, t_end: float | None = None
     -------
     Problem
         State ``[q1, q2, p1, p2]``; parameter ``mu``; invariants: energy, Jacobi integral.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    if isinstance(loops, bool) or not isinstance(loops, int) or loops not in ORBITS:
-        raise InputError(f"loops={shown(loops)} of cr3bp must be one of {', '.join(map(str, ORBITS))}.")
     orbit = ORBITS[loops]
-    share = orbit.mu if mu is None else mu
-    span = orbit.period if t_end is None else t_end
-    given.finite("cr3bp", mu=share, t_end=span)
-    if not 0 < share < 1:
-        raise InputError(f"mu={mu!r} of cr3bp must lie between 0 and 1.")
     system = Hamiltonian(
         _energy, dof=2, parameters={"mu": MOON}, invariants={"jacobi": _jacobi}, name="cr3bp"
     )
@@ -94,17 +97,6 @@ def cr3bp(*, loops: int = 4, mu: float | None = None, t_end: float | None = None
         system,
         q0=[orbit.x, 0.0],
         p0=[0.0, orbit.speed + orbit.x],
-        parameters={"mu": share},
-        t_end=span,
-        name="cr3bp",
-        title="the restricted three-body problem",
-        arguments={"loops": loops} | changed(cr3bp, mu=mu, t_end=t_end),
-        references=(
-            "V. Szebehely, Theory of Orbits, Academic Press 1967",
-            "E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, "
-            "2nd edition, Springer 1993, section II.0",
-            "L. F. Shampine, M. K. Gordon, Computer Solution of Ordinary Differential Equations, "
-            "Freeman 1975",
-        ),
-        notes="Not separable; close passages; unstable periodic orbits that return to their start.",
+        parameters={"mu": orbit.mu if mu is None else mu},
+        t_end=orbit.period if t_end is None else t_end,
     )

@@ -6,15 +6,16 @@ With the angles q1, q2 from the vertical, d = q1 - q2 and M = m1 + m2,
         - M g l1 cos q1 - m2 g l2 cos q2
 
 which is p^T K(q)^-1 p/2 + V(q) with the mass matrix
-K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]. L. D. Landau, E. M.
-Lifshitz, Mechanics (Pergamon 1960), section 5, problem 1 has the Lagrangian.
+K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]; Landau and Lifshitz have the
+Lagrangian.
 """
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.checks import Positive
+from problems.entry import Expected, entry
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
@@ -27,16 +28,24 @@ def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     return kinetic - both * g * l1 * m.cos(q[0]) - m2 * g * l2 * m.cos(q[1])
 
 
+@entry(
+    title="the double pendulum",
+    references=("L. D. Landau, E. M. Lifshitz, Mechanics, Pergamon 1960, section 5, problem 1",),
+    notes="Neither separable nor polynomial; chaotic at larger energies.",
+    shows=("q1", "q2"),
+    picture=Plane(labels=("angle 1", "angle 2")),
+    expected=Expected(h=0.1, energy=6e-16, default=2e-15),
+)
 def double_pendulum(
     *,
     q1: float = 1.0,
     q2: float = 1.5,
     p1: float = 0.0,
     p2: float = 0.0,
-    m1: float = 1.0,
-    m2: float = 1.0,
-    l1: float = 1.0,
-    l2: float = 1.0,
+    m1: Positive = 1.0,
+    m2: Positive = 1.0,
+    l1: Positive = 1.0,
+    l2: Positive = 1.0,
     g: float = 1.0,
     t_end: float = 100.0,
 ) -> Problem:
@@ -62,14 +71,7 @@ def double_pendulum(
     -------
     Problem
         State ``[q1, q2, p1, p2]``; parameters as named; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite, masses or lengths that are not positive.
     """
-    given.finite("double_pendulum", q1=q1, q2=q2, p1=p1, p2=p2, g=g, t_end=t_end)
-    given.positive("double_pendulum", m1=m1, m2=m2, l1=l1, l2=l2)
     names = {"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 1.0}
     values = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
     return Problem(
@@ -78,9 +80,4 @@ def double_pendulum(
         p0=[p1, p2],
         parameters=values,
         t_end=t_end,
-        name="double_pendulum",
-        title="the double pendulum",
-        arguments={"q1": q1, "q2": q2} | changed(double_pendulum, p1=p1, p2=p2, **values, t_end=t_end),
-        references=("L. D. Landau, E. M. Lifshitz, Mechanics, Pergamon 1960, section 5, problem 1",),
-        notes="Neither separable nor polynomial; chaotic at larger energies.",
     )

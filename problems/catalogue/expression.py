@@ -7,27 +7,14 @@ else there is.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
-from problems.catalogue._formula import (
-    COORDINATE,
-    FUNCTIONS,
-    NAME,
-    Call,
-    Chain,
-    Expression,
-    Formula,
-    Name,
-    Negative,
-    Number,
-    Power,
-    applied,
-    parse,
-)
-from problems.errors import InputError, unknown
+from problems.catalogue._formula import COORDINATE, FUNCTIONS, NAME, Formula
+from problems.checks import Must
+from problems.entry import Expected, entry
+from problems.errors import InputError, shown, unknown
+from problems.picture import Phase
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 MOST_FREEDOM = 100  # degrees of freedom; larger systems have sums, which text has not
@@ -60,44 +47,47 @@ def hamiltonian(
         For text that is not a formula, names without a value, or values of names
         that do not occur.
     """
-    given_values = dict(parameters or {})
-    energy = parse(text)
-    others = {key: parse(value) for key, value in (invariants or {}).items()}
-    dof = _freedom(energy.text, energy.coordinates)
-    used: set[str] = set()
-    for formula in (energy, *others.values()):
-        for key in formula.parameters:
-            if key not in given_values:
-                raise _undeclared(formula, key, given_values)
-            used.add(key)
-        for key in formula.coordinates:
-            _check_coordinate(formula, key, dof)
-    for key in given_values:
-        if key not in used:
-            raise unknown("parameter, not in the formula,", key, energy.names)
+    values = dict(parameters or {})
+    energy = Formula(text)
+    others = {key: Formula(formula) for key, formula in (invariants or {}).items()}
+    dof = _freedom(energy)
+    system = Hamiltonian(
+        _traceable(energy, values, dof),
+        dof=dof,
+        parameters=values,
+        invariants={key: _traceable(formula, values, dof) for key, formula in others.items()},
+        name=name,
+    )
     try:
-        system = Hamiltonian(
-            _callable(energy),
-            dof=dof,
-            parameters=given_values,
-            invariants={key: _callable(formula) for key, formula in others.items()},
-            name=name,
-        )
-        system.function("field")  # the derivatives may overflow where H does not
-    except OverflowError:
+        system.function("field")
+    except (InputError, OverflowError):  # the derivatives' constants may overflow where H does not
         raise InputError(f"the formula {text!r} leads to numbers that a double cannot hold.") from None
-    except InputError as error:  # it names the line below that walks the formula, which is no help
-        reason = str(error).partition("`: ")[2] or str(error)
-        raise InputError(f"the formula {text!r} cannot be used: {reason}") from None
+    if not energy.coordinates:
+        raise InputError(f"the formula {text!r} contains no coordinate; use q and p, or q1, p1, q2, ...")
+    for key in values:
+        if not any(key in formula.names for formula in (energy, *others.values())):
+            raise unknown("parameter, not in the formula,", key, energy.names)
     return system
 
 
+@entry(
+    title=None,
+    references=("given by the user",),
+    notes="A formula of your own.",
+    shows=("H", "q0", "p0"),
+    picture=Phase(
+        span=12.0,
+        points=600,
+        arguments={"H": "p^2/2 + k*q^4/4", "q0": [1.0], "p0": [0.0], "parameters": "k=2"},
+    ),
+    expected=Expected(h=0.2, energy=2e-15, default=2e-15),
+)
 def expression(
     *,
-    H: str = "p^2/2 - cos(q)",
+    H: Annotated[str, Must('text, such as "p^2/2 - cos(q)"')] = "p^2/2 - cos(q)",
     q0: Sequence[float] = (0.0,),
     p0: Sequence[float] = (1.9,),
-    parameters: str = "",
+    parameters: Annotated[str, Must('text, such as "k=2, m=0.5"')] = "",
     t_end: float = 100.0,
 ) -> Problem:
     """Return a problem of your own, its Hamiltonian given as text.
@@ -127,24 +117,14 @@ def expression(
     problems.errors.InputError
         For anything that cannot be read.
     """
-    if not isinstance(H, str):
-        raise InputError(f'H={H!r} of expression must be text, such as "p^2/2 - cos(q)".')
     values = assignments(parameters)
     system = hamiltonian(H, parameters=values)
-    dof = system.dim // 2
-    return Problem(
-        system,
-        q0=given.numbers("expression", "q0", q0, dof),
-        p0=given.numbers("expression", "p0", p0, dof),
-        parameters=values,
-        t_end=t_end,
-        name="expression",
-        title=H,
-        arguments={"H": H, "q0": tuple(q0), "p0": tuple(p0)}
-        | changed(expression, parameters=parameters, t_end=t_end),
-        references=("given by the user",),
-        notes="A formula of your own.",
-    )
+    for key, start in {"q0": q0, "p0": p0}.items():
+        if len(start) != system.dof:
+            raise InputError(
+                f"{key}={shown(list(start))} of expression must be a list of {system.dof} finite numbers."
+            )
+    return Problem(system, q0=q0, p0=p0, parameters=values, t_end=t_end, title=H)
 
 
 def assignments(text: str) -> dict[str, float]:
@@ -155,8 +135,6 @@ def assignments(text: str) -> dict[str, float]:
     problems.errors.InputError
         For anything else.
     """
-    if not isinstance(text, str):
-        raise InputError(f'parameters={text!r} must be text, such as "k=2, m=0.5".')
     values: dict[str, float] = {}
     for part in filter(None, (piece.strip() for piece in text.split(","))):
         name, sign, number = (piece.strip() for piece in part.partition("="))
@@ -174,67 +152,49 @@ def assignments(text: str) -> dict[str, float]:
     return values
 
 
-def _freedom(text: str, coordinates: Sequence[str]) -> int:
-    plain = [name for name in coordinates if name in ("q", "p")]
-    numbered = [name for name in coordinates if name not in ("q", "p")]
+def _freedom(energy: Formula) -> int:
+    plain = [name for name in energy.coordinates if name in ("q", "p")]
+    numbered = [name for name in energy.coordinates if name not in ("q", "p")]
     if plain and numbered:
         raise InputError(
-            f"the formula {text!r} mixes {plain[0]!r} with {numbered[0]!r}; number all coordinates."
+            f"the formula {energy.text!r} mixes {plain[0]!r} with {numbered[0]!r}; number all coordinates."
         )
-    if not coordinates:
-        raise InputError(f"the formula {text!r} contains no coordinate; use q and p, or q1, p1, q2, ...")
     dof = max((int(name[1:]) for name in numbered), default=1)
     if dof > MOST_FREEDOM:
         raise InputError(
-            f"the formula {text!r} has more than {MOST_FREEDOM} degrees of freedom; "
+            f"the formula {energy.text!r} has more than {MOST_FREEDOM} degrees of freedom; "
             "write it in Python with m.sum."
         )
     return dof
 
 
-def _check_coordinate(formula: Expression, name: str, dof: int) -> None:
-    if name in ("q", "p") and dof != 1:
-        raise InputError(f"{name!r} in {formula.text!r} needs a number, such as {name}1.")
-    if name not in ("q", "p") and int(name[1:]) > dof:
-        raise InputError(f"{name!r} in {formula.text!r} does not exist: H has {dof} degrees of freedom.")
-
-
-def _undeclared(formula: Expression, name: str, values: Mapping[str, float]) -> InputError:
-    near = str(unknown("name", name, [*values, "q", "p", "t", "pi", *FUNCTIONS]))
-    hint = near.partition("; ")[2] if "did you mean" in near else f'give it a value, as in "{name}=1".'
-    return InputError(f"the formula {formula.text!r} contains {name!r}, which has no value; {hint}")
-
-
-def _callable(expression: Expression) -> Callable[..., Any]:
-    """Return the function to be traced; it walks the formula."""
+def _traceable(formula: Formula, values: Mapping[str, float], dof: int) -> Callable[..., Any]:
+    """Return the function to be traced: the formula, calculated with symbols."""
 
     def H(t: Any, q: Any, p: Any, par: Any, m: Any) -> Any:
         def named(word: str) -> Any:
             if word == "t":
                 return t
-            match = COORDINATE.fullmatch(word)
-            if match is None:
+            coordinate = COORDINATE.fullmatch(word)
+            if coordinate is None:
+                if word not in values:
+                    raise _undeclared(formula, word, values)
                 return getattr(par, word)
-            return (q if match[1] == "q" else p)[int(match[2] or 1) - 1]
+            letter, number = coordinate.groups()
+            if number is None and dof != 1:
+                raise InputError(f"{word!r} in {formula.text!r} needs a number, such as {word}1.")
+            if number is not None and int(number) > dof:
+                raise InputError(
+                    f"{word!r} in {formula.text!r} does not exist: H has {dof} degrees of freedom."
+                )
+            return (q if letter == "q" else p)[int(number or 1) - 1]
 
-        def value(formula: Formula) -> Any:
-            match formula:
-                case Number(value=number):
-                    return number
-                case Name(word=word):
-                    return named(word)
-                case Negative(inner=inner):
-                    return -value(inner)
-                case Chain(first=first, steps=steps):
-                    total = value(first)
-                    for symbol, right in steps:
-                        total = applied(symbol, total, value(right))
-                    return total
-                case Power(base=base, exponent=exponent):
-                    return value(base) ** (int(exponent) if exponent.is_integer() else exponent)
-                case Call(function=function, argument=argument):
-                    return getattr(m, function)(value(argument))
-
-        return value(expression.formula)
+        return formula.value(named, m)
 
     return H
+
+
+def _undeclared(formula: Formula, name: str, values: Mapping[str, float]) -> InputError:
+    near = str(unknown("name", name, [*values, "q", "p", "t", "pi", *FUNCTIONS]))
+    hint = near.partition("; ")[2] if "did you mean" in near else f'give it a value, as in "{name}=1".'
+    return InputError(f"the formula {formula.text!r} contains {name!r}, which has no value; {hint}")

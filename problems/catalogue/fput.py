@@ -3,29 +3,41 @@
     H(q, p) = sum_{i=1..n} p_i^2/2 + sum_{i=0..n} V(q_{i+1} - q_i),   q_0 = q_{n+1} = 0
     V(r) = r^2/2 + alpha r^3/3 + beta r^4/4
 
-E. Fermi, J. Pasta, S. Ulam, "Studies of nonlinear problems", Los Alamos report
-LA-1940 (1955): n = 32, alpha = 1/4, the lowest mode. T. Dauxois, "Fermi, Pasta,
-Ulam, and a mysterious lady", Physics Today 61 (2008) 55-57.
+By default as in the report: n = 32, alpha = 1/4, the lowest mode.
 """
 
 import math
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
+from problems.entry import Expected, entry
+from problems.picture import Lattice
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
+@entry(
+    title="the Fermi-Pasta-Ulam-Tsingou chain",
+    references=(
+        "E. Fermi, J. Pasta, S. Ulam, Studies of nonlinear problems, Los Alamos report LA-1940 (1955)",
+        "T. Dauxois, Fermi, Pasta, Ulam, and a mysterious lady, Physics Today 61 (2008) 55-57",
+    ),
+    notes="A polynomial energy of degree 3 or 4 in many degrees of freedom.",
+    shows=("n", "alpha", "beta"),
+    picture=Lattice(points=400),
+    expected=Expected(h=0.5, energy=2e-16, default=2e-16, small={"n": 8, "beta": 0.5}),
+)
 def fput(
     *,
-    n: int = 32,
+    n: Annotated[int, at_least(2)] = 32,
     alpha: float = 0.25,
     beta: float = 0.0,
-    start: str = "mode",
+    start: Literal["mode", "thermal"] = "mode",
     amplitude: float = 1.0,
-    temperature: float = 0.1,
-    seed: int = 1,
+    temperature: Positive = 0.1,
+    seed: Annotated[int, at_least(0)] = 1,
     t_end: float | None = None,
 ) -> Problem:
     """Return the chain, from its lowest mode or from a thermal start.
@@ -43,7 +55,7 @@ def fput(
         ``"mode"``: q_i = amplitude sin(pi i/(n + 1)), at rest.
         ``"thermal"``: q = 0 and independent momenta of variance ``2 temperature`` (so
         that half of the kinetic energy, about ``n temperature/2``, is left after
-        equipartition), by `problems.catalogue._given.gaussians`.
+        equipartition), by `problems.catalogue._starts.gaussians`.
     amplitude : float
         Of the lowest mode.
     temperature : float
@@ -58,20 +70,8 @@ def fput(
     -------
     Problem
         State ``[q_1 .. q_n, p_1 .. p_n]``; parameters ``alpha``, ``beta``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.whole("fput", 2, n=n)
-    given.size("fput", 2 * n, n=n)
-    given.whole("fput", 0, seed=seed)
-    given.choice("fput", "start", start, ("mode", "thermal"))
-    given.finite("fput", alpha=alpha, beta=beta, amplitude=amplitude)
-    given.positive("fput", temperature=temperature)
-    span = t_end if t_end is not None else {"mode": 960.0, "thermal": 240.0}[start]
-    given.finite("fput", t_end=span)
+    limits.check_problem("fput", 2 * n, n=n)
 
     def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
         def spring(r: Any) -> Any:
@@ -82,27 +82,17 @@ def fput(
         return kinetic + (spring(q[0]) + inner + spring(-q[n - 1]))
 
     if start == "mode":
-        q0 = [given.nearest(lambda i=i: _mode(i, n, amplitude)) for i in range(1, n + 1)]
+        q0 = [starts.nearest(lambda i=i: _mode(i, n, amplitude)) for i in range(1, n + 1)]
         p0 = [0.0] * n
-        shown = changed(fput, amplitude=amplitude)
     else:
         q0 = [0.0] * n
-        p0 = [math.sqrt(2 * temperature) * draw for draw in given.gaussians(seed, n)]
-        shown = {"start": start} | changed(fput, temperature=temperature, seed=seed)
+        p0 = [math.sqrt(2 * temperature) * draw for draw in starts.gaussians(seed, n)]
     return Problem(
         Hamiltonian(energy, dof=n, parameters={"alpha": 0.25, "beta": 0.0}, name=f"fput_{n}"),
         q0=q0,
         p0=p0,
         parameters={"alpha": alpha, "beta": beta},
-        t_end=span,
-        name="fput",
-        title="the Fermi-Pasta-Ulam-Tsingou chain",
-        arguments={"n": n, "alpha": alpha, "beta": beta} | shown | changed(fput, t_end=t_end),
-        references=(
-            "E. Fermi, J. Pasta, S. Ulam, Studies of nonlinear problems, Los Alamos report LA-1940 (1955)",
-            "T. Dauxois, Fermi, Pasta, Ulam, and a mysterious lady, Physics Today 61 (2008) 55-57",
-        ),
-        notes="A polynomial energy of degree 3 or 4 in many degrees of freedom.",
+        t_end={"mode": 960.0, "thermal": 240.0}[start] if t_end is None else t_end,
     )
 
 

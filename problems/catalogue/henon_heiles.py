@@ -2,10 +2,8 @@
 
     H(q, p) = (p1^2 + p2^2)/2 + (q1^2 + q2^2)/2 + q1^2 q2 - q2^3/3
 
-M. Henon, C. Heiles, "The applicability of the third integral of motion: some
-numerical experiments", Astronomical Journal 69 (1964) 73-79. Cubic, so
-HBVM(k, s) keeps the energy exactly for k >= 3s/2. Below the energy 1/6 an orbit
-that starts in the triangle of the saddles never leaves it.
+Cubic, so HBVM(k, s) keeps the energy exactly for k >= 3s/2. Below the energy 1/6 an
+orbit that starts in the triangle of the saddles never leaves it.
 """
 
 import math
@@ -14,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.catalogue import _given as given
+from problems.catalogue import _starts as starts
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 ESCAPE = 1 / 6
@@ -29,6 +28,17 @@ def _energy(q: Any, p: Any) -> Any:
     return kinetic + ((q[0] ** 2 + q[1] ** 2) / 2 + (q[0] ** 2 * q[1] - q[1] ** 3 / 3))
 
 
+@entry(
+    title="the Henon-Heiles problem",
+    references=(
+        "M. Henon, C. Heiles, The applicability of the third integral of motion: some numerical "
+        "experiments, Astronomical Journal 69 (1964) 73-79",
+    ),
+    notes="A cubic energy, and a bounded region that an energy error opens.",
+    shows=("energy",),
+    picture=Plane(span=400.0, points=3000, outline=(*SADDLES, SADDLES[0]), width=0.4),
+    expected=Expected(h=0.5, energy=1e-15, default=3e-14),
+)
 def henon_heiles(
     *,
     energy: float = 1 / 6 - 1e-3,
@@ -63,26 +73,11 @@ def henon_heiles(
     Raises
     ------
     problems.errors.InputError
-        If the potential at the start exceeds the energy, or for values that are
-        not finite.
+        If the potential at the start exceeds the energy.
     """
-    given.finite("henon_heiles", energy=energy, q1=q1, q2=q2, direction=direction, t_end=t_end)
-    momentum = [given.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
+    momentum = [starts.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
     system = Hamiltonian(_energy, dof=2, name="henon_heiles")
-    return Problem(
-        system,
-        q0=[q1, q2],
-        p0=momentum,
-        t_end=t_end,
-        name="henon_heiles",
-        title="the Henon-Heiles problem",
-        arguments={"energy": energy} | changed(henon_heiles, q1=q1, q2=q2, direction=direction, t_end=t_end),
-        references=(
-            "M. Henon, C. Heiles, The applicability of the third integral of motion: some numerical "
-            "experiments, Astronomical Journal 69 (1964) 73-79",
-        ),
-        notes="A cubic energy, and a bounded region that an energy error opens.",
-    )
+    return Problem(system, q0=[q1, q2], p0=momentum, t_end=t_end)
 
 
 def _start(energy: float, q1: float, q2: float, direction: float) -> tuple[Any, Any]:

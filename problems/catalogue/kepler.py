@@ -2,21 +2,21 @@
 
     H(q, p) = |p|^2/2 - 1/|q|
 
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.2. Superintegrable: energy, angular momentum and the
-Laplace-Runge-Lenz vector are all kept, so every orbit closes.
+Superintegrable: energy, angular momentum and the Laplace-Runge-Lenz vector are all
+kept, so every orbit closes.
 """
 
 from decimal import Decimal, localcontext
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.catalogue import _given as given
+from problems.checks import Must
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 HUNDRED_REVOLUTIONS = 628.3185307179587  # 200 pi
@@ -36,7 +36,22 @@ def _lenz(q: Any, p: Any, m: Any) -> Any:
     return [p[1] * turn - q[0] / r, -p[0] * turn - q[1] / r]
 
 
-def kepler(*, e: float = 0.6, t_end: float = HUNDRED_REVOLUTIONS) -> Problem:
+@entry(
+    title="Kepler's problem",
+    references=(
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section I.2",
+    ),
+    notes="Exact solution known; with all five invariants kept only the phase can be wrong.",
+    shows=("e",),
+    picture=Plane(span=6.5, points=600),
+    expected=Expected(h=0.1, energy=2e-15, default=7e-15),
+)
+def kepler(
+    *,
+    e: Annotated[float, Must("an eccentricity, 0 <= e < 1", lambda e: 0 <= e < 1)] = 0.6,
+    t_end: float = HUNDRED_REVOLUTIONS,
+) -> Problem:
     """Return Kepler's problem from the pericentre of an ellipse with half axis 1 and period 2 pi.
 
     Tests the passage through pericentres, and phase error against an exact
@@ -54,17 +69,9 @@ def kepler(*, e: float = 0.6, t_end: float = HUNDRED_REVOLUTIONS) -> Problem:
     Problem
         State ``[q1, q2, p1, p2]``, from ``(1 - e, 0, 0, sqrt((1 + e)/(1 - e)))``;
         invariants: energy, angular momentum, the Laplace-Runge-Lenz vector.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.finite("kepler", e=e, t_end=t_end)
-    if not 0 <= e < 1:
-        raise InputError(f"e={e!r} of kepler must be an eccentricity, 0 <= e < 1.")
     with localcontext(prec=60):
-        fast = given.nearest_sqrt((1 + Decimal(e)) / (1 - Decimal(e)))
+        fast = float(((1 + Decimal(e)) / (1 - Decimal(e))).sqrt())
         near = float(1 - Decimal(e))
     system = Hamiltonian(
         _energy,
@@ -72,20 +79,7 @@ def kepler(*, e: float = 0.6, t_end: float = HUNDRED_REVOLUTIONS) -> Problem:
         invariants={"angular_momentum": _angular_momentum, "lenz": _lenz},
         name="kepler",
     )
-    return Problem(
-        system,
-        q0=[near, 0.0],
-        p0=[0.0, fast],
-        t_end=t_end,
-        name="kepler",
-        title="Kepler's problem",
-        arguments={"e": e} | changed(kepler, t_end=t_end),
-        references=(
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section I.2",
-        ),
-        notes="Exact solution known; with all five invariants kept only the phase can be wrong.",
-    )
+    return Problem(system, q0=[near, 0.0], p0=[0.0, fast], t_end=t_end)
 
 
 def solution(problem: Problem, t: ArrayLike, *, digits: int = 40) -> NDArray[np.float64]:

@@ -2,19 +2,21 @@
 
     H(q, p) = sum_i |p_i|^2/(2 m) + sum_{i<j} 4 eps ((sigma/r)^12 - (sigma/r)^6)
 
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.4, table 4.1: eps/k_B = 119.8 K, sigma = 0.341 nm,
-m = 66.34e-27 kg, k_B = 1.380658e-23 J/K. Units here: nanometres, nanoseconds, and
-k_B times kelvin for the energy, so that the mass is m/k_B in K ns^2/nm^2.
+In the book's table: eps/k_B = 119.8 K, sigma = 0.341 nm, m = 66.34e-27 kg,
+k_B = 1.380658e-23 J/K. Units here: nanometres, nanoseconds, and k_B times kelvin for
+the energy, so that the mass is m/k_B in K ns^2/nm^2.
 """
 
 from fractions import Fraction
 from itertools import combinations
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
+from problems.entry import Expected, entry
+from problems.picture import Orbits
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 MASS = float(Fraction("66.34e-27") / Fraction("1.380658e-23"))
@@ -32,8 +34,23 @@ POSITIONS = (
 VELOCITIES = ((-30, -20), (50, -90), (-70, -60), (90, 40), (80, 90), (-40, 100), (-80, -60))
 
 
+@entry(
+    title="the frozen argon crystal",
+    references=(
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section I.4, table 4.1",
+    ),
+    notes="Times in nanoseconds: steps are of the order 1e-5 to 1e-4.",
+    shows=("rings",),
+    picture=Orbits(span=0.02, points=800),
+    expected=Expected(h=2e-4, energy=2e-15, default=2e-15),
+)
 def lennard_jones(
-    *, rings: int = 1, temperature: float = 20.0, seed: int = 1, t_end: float | None = None
+    *,
+    rings: Annotated[int, at_least(1)] = 1,
+    temperature: Positive = 20.0,
+    seed: Annotated[int, at_least(0)] = 1,
+    t_end: float | None = None,
 ) -> Problem:
     """Return the frozen argon crystal, or a larger hexagonal one.
 
@@ -46,7 +63,7 @@ def lennard_jones(
         atoms with its own start; with r rings there are 1 + 3 r (r + 1) atoms, in a
         hexagonal lattice of spacing 2^(1/6) sigma.
     temperature : float
-        Of the larger crystals, in kelvin: momenta are `problems.catalogue._given.gaussians` of the
+        Of the larger crystals, in kelvin: momenta are `problems.catalogue._starts.gaussians` of the
         variance ``2 m temperature``, less their mean; half of it goes into the bonds.
     seed : int
         Of the larger crystals' momenta.
@@ -60,19 +77,9 @@ def lennard_jones(
         State: positions in the plane atom by atom, then momenta. Parameters
         ``m``, ``eps``, ``sigma``; invariants: energy, linear momentum (of the book's
         crystal only: of the others it is 0 but for rounding), angular momentum.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.whole("lennard_jones", 1, rings=rings)
     atoms = 3 * rings * (rings + 1) + 1
-    given.size("lennard_jones", 4 * atoms, atoms * (atoms - 1) // 2, rings=rings)
-    given.whole("lennard_jones", 0, seed=seed)
-    given.positive("lennard_jones", temperature=temperature)
-    span = 0.2 if t_end is None else t_end
-    given.finite("lennard_jones", t_end=span)
+    limits.check_problem("lennard_jones", 4 * atoms, atoms * (atoms - 1) // 2, rings=rings)
     if rings == 1:
         q = [x for row in POSITIONS for x in row]
         p = [MASS * x for row in VELOCITIES for x in row]
@@ -80,20 +87,7 @@ def lennard_jones(
         q = [x for row in _lattice(rings) for x in row]
         p = _thermal(len(q) // 2, temperature, seed)
     n = len(q) // 2
-    return Problem(
-        _crystal(n, linear_momentum=rings == 1),
-        q0=q,
-        p0=p,
-        t_end=span,
-        name="lennard_jones",
-        title="the frozen argon crystal",
-        arguments={"rings": rings} | changed(lennard_jones, temperature=temperature, seed=seed, t_end=t_end),
-        references=(
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section I.4, table 4.1",
-        ),
-        notes="Times in nanoseconds: steps are of the order 1e-5 to 1e-4.",
-    )
+    return Problem(_crystal(n, linear_momentum=rings == 1), q0=q, p0=p, t_end=0.2 if t_end is None else t_end)
 
 
 def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
@@ -125,8 +119,8 @@ def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
 
 
 def _lattice(rings: int) -> list[tuple[float, float]]:
-    spacing = given.nearest(lambda: _spacing(1))
-    height = given.nearest(lambda: _spacing(2))
+    spacing = starts.nearest(lambda: _spacing(1))
+    height = starts.nearest(lambda: _spacing(2))
     cells = range(-rings, rings + 1)
     return [(spacing * (i + j / 2), height * j) for j in cells for i in cells if abs(i + j) <= rings]
 
@@ -140,6 +134,6 @@ def _spacing(part: int) -> Any:
 
 def _thermal(n: int, temperature: float, seed: int) -> list[float]:
     size = (2 * MASS * temperature) ** 0.5
-    p = [size * draw for draw in given.gaussians(seed, 2 * n)]
+    p = [size * draw for draw in starts.gaussians(seed, 2 * n)]
     mean = [sum(p[c::2]) / n for c in range(2)]
     return [x - mean[i % 2] for i, x in enumerate(p)]

@@ -1,14 +1,15 @@
 """The outer Solar System: the Sun, Jupiter, Saturn, Uranus, Neptune and Pluto.
 
-Data of E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd
-edition (Springer 2006), section I.2.4, table 2.2: 5 September 1994, 0h00;
-distances in astronomical units, velocities in astronomical units per day,
-masses in solar masses, heliocentric. The Sun's mass contains the inner planets.
+Data of the book's table: 5 September 1994, 0h00; distances in astronomical units,
+velocities in astronomical units per day, masses in solar masses, heliocentric. The
+Sun's mass contains the inner planets.
 """
 
 from fractions import Fraction
 
-from problems.catalogue._planets import planetary
+from problems.catalogue._planets import Frame, Unit, planetary
+from problems.entry import Expected, entry
+from problems.picture import Orbits
 from problems.problem import Problem
 
 G_PER_DAY = "2.95912208286e-4"  # au^3/(solar mass day^2)
@@ -39,8 +40,19 @@ VELOCITIES = (
 )
 
 
+@entry(
+    title="the outer Solar System",
+    references=(
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section I.2.4, table 2.2",
+    ),
+    notes="A dominant mass and weak perturbations; the inner planets are in the Sun's mass.",
+    shows=("unit", "frame"),
+    picture=Orbits(dimension=3, first=1, span=260.0, points=2500),
+    expected=Expected(h=1.0, energy=5e-15, default=5e-15),
+)
 def outer_solar_system(
-    *, unit: str = "year", frame: str = "barycentric", t_end: float | None = None
+    *, unit: Unit = "year", frame: Frame = "barycentric", t_end: float | None = None
 ) -> Problem:
     """Return the outer Solar System, six bodies.
 
@@ -65,14 +77,9 @@ def outer_solar_system(
         State: positions body by body (Sun first), then momenta. Invariants:
         energy, angular momentum, and in the heliocentric frame the linear
         momentum (in the other one it is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown unit or frame, or a span that is not finite.
     """
     return planetary(
-        outer_solar_system,
+        "outer_solar_system",
         unit=unit,
         frame=frame,
         t_end=t_end,
@@ -80,10 +87,4 @@ def outer_solar_system(
         masses=[Fraction(text) for text in MASSES],
         positions=[[Fraction(text) for text in row] for row in POSITIONS],
         velocities=[[Fraction(text) for text in row] for row in VELOCITIES],
-        title="the outer Solar System",
-        references=(
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section I.2.4, table 2.2",
-        ),
-        notes="A dominant mass and weak perturbations; the inner planets are in the Sun's mass.",
     )

@@ -1,17 +1,14 @@
 """The mathematical pendulum, with its exact solution in elliptic functions.
 
-    H(q, p) = p^2/2 - cos q
-
-E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition
-(Springer 2006), section I.1.
+H(q, p) = p^2/2 - cos q
 """
 
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.entry import Expected, entry
 from problems.errors import InputError
+from problems.picture import Phase
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
@@ -19,6 +16,17 @@ def _energy(q: Any, p: Any, m: Any) -> Any:
     return p[0] ** 2 / 2 - m.cos(q[0])
 
 
+@entry(
+    title="the pendulum",
+    references=(
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section I.1",
+    ),
+    notes="Not polynomial; an exact solution in elliptic functions for swings from below.",
+    shows=("q", "p"),
+    picture=Phase(span=11.0, points=600),
+    expected=Expected(h=0.2, energy=2e-15, default=4e-15),
+)
 def pendulum(*, q: float = 0.0, p: float = 1.9, t_end: float = 1000.0) -> Problem:
     """Return the pendulum of unit length, mass and gravity.
 
@@ -36,27 +44,8 @@ def pendulum(*, q: float = 0.0, p: float = 1.9, t_end: float = 1000.0) -> Proble
     -------
     Problem
         State ``[q, p]``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite.
     """
-    given.finite("pendulum", q=q, p=p, t_end=t_end)
-    return Problem(
-        Hamiltonian(_energy, dof=1, name="pendulum"),
-        q0=[q],
-        p0=[p],
-        t_end=t_end,
-        name="pendulum",
-        title="the pendulum",
-        arguments={"q": q, "p": p} | changed(pendulum, t_end=t_end),
-        references=(
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section I.1",
-        ),
-        notes="Not polynomial; an exact solution in elliptic functions for swings from below.",
-    )
+    return Problem(Hamiltonian(_energy, dof=1, name="pendulum"), q0=[q], p0=[p], t_end=t_end)
 
 
 def exact_state(problem: Problem, t: Any) -> list[Any]:

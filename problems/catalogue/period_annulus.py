@@ -4,18 +4,17 @@
     A = p^2 (1/2 + c3 p + b3 p^2 + a3 p^3)     B = p^2 (c2 + b2 p + a2 p^2)
     C = 1/2 + c1 p + b1 p^2 + a1 p^3           D = c0 + b0 p + a0 p^2
 
-L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between
-Gauss-Legendre methods and Hamiltonian BVMs defined over Gauss points", section
-on the period annulus, with a2 = b1 = b3 = c1 = c2 = 1 and all other coefficients
-0: the periodic orbits around the origin end at a loop through the saddle P1.
+In the paper's section on the period annulus a2 = b1 = b3 = c1 = c2 = 1 and all other
+coefficients are 0: the periodic orbits around the origin end at a loop through the saddle P1.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems.checks import Must
+from problems.entry import Expected, entry
+from problems.picture import Phase
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 # For the default coefficients, in the order (q, p); both are saddles.
@@ -23,6 +22,8 @@ P1 = (-0.6879526475540134, -0.5206527058470621)
 P2 = (-1.179582379893681, 1.756351969248087)
 H_STAR = 0.09050199350868576  # H at P1: the energy of the loop
 C_STAR = 0.37570559292634522367  # where the loop crosses the positive p axis
+
+Four = Annotated[Sequence[float], Must("a list of 4 finite numbers", lambda values: len(values) == 4)]
 
 
 def _energy(q: Any, p: Any, par: Any) -> Any:
@@ -35,12 +36,23 @@ def _energy(q: Any, p: Any, par: Any) -> Any:
     return constant + linear * x + square * x**2 + cubic * x**3
 
 
+@entry(
+    title="the edge of a period annulus",
+    references=(
+        "L. Brugnano, F. Iavernaro, T. Susca, Numerical comparisons between Gauss-Legendre "
+        "methods and Hamiltonian BVMs defined over Gauss points",
+    ),
+    notes="A polynomial energy of degree 5, not separable; k >= 5s/2 keeps it exactly.",
+    shows=("start",),
+    picture=Phase(span=30.0, points=4000),
+    expected=Expected(h=0.2, energy=2e-15, default=1e-13),
+)
 def period_annulus(
     *,
     start: float = 0.375,
-    a: Sequence[float] = (0.0, 0.0, 1.0, 0.0),
-    b: Sequence[float] = (0.0, 1.0, 0.0, 1.0),
-    c: Sequence[float] = (0.0, 1.0, 1.0, 0.0),
+    a: Four = (0.0, 0.0, 1.0, 0.0),
+    b: Four = (0.0, 1.0, 0.0, 1.0),
+    c: Four = (0.0, 1.0, 1.0, 0.0),
     t_end: float = 2500.0,
 ) -> Problem:
     """Return the paper's planar system of degree five, from the point (q, p) = (0, start).
@@ -64,16 +76,7 @@ def period_annulus(
         State ``[q, p]``; parameters ``a``, ``b``, ``c``; invariant: energy. The
         equilibria `P1`, `P2` and the energy of the loop `H_STAR` belong to the
         default coefficients.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values that are not finite, or coefficients that are not four numbers.
     """
-    given.finite("period_annulus", start=start, t_end=t_end)
-    a, b, c = (
-        given.numbers("period_annulus", key, value, 4) for key, value in (("a", a), ("b", b), ("c", c))
-    )
     default = {"a": (0.0, 0.0, 1.0, 0.0), "b": (0.0, 1.0, 0.0, 1.0), "c": (0.0, 1.0, 1.0, 0.0)}
     return Problem(
         Hamiltonian(_energy, dof=1, parameters=default, name="period_annulus"),
@@ -81,12 +84,4 @@ def period_annulus(
         p0=[start],
         parameters={"a": a, "b": b, "c": c},
         t_end=t_end,
-        name="period_annulus",
-        title="the edge of a period annulus",
-        arguments={"start": start} | changed(period_annulus, a=a, b=b, c=c, t_end=t_end),
-        references=(
-            "L. Brugnano, F. Iavernaro, T. Susca, Numerical comparisons between Gauss-Legendre "
-            "methods and Hamiltonian BVMs defined over Gauss points",
-        ),
-        notes="A polynomial energy of degree 5, not separable; k >= 5s/2 keeps it exactly.",
     )

@@ -1,17 +1,19 @@
 """Sitnikov's problem: two equal primaries on ellipses, a planetoid on the axis between them.
 
-L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between Gauss-Legendre
-methods and Hamiltonian BVMs defined over Gauss points", section "Sitnikov's
-problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5, t in [0, 1500].
+In the paper's section "Sitnikov's problem": G = 1, masses 1, 1, 1e-5, e = 0.75, d = 5, h = 0.5,
+t in [0, 1500].
 """
 
 from decimal import Decimal, localcontext
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
-from problems.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.checks import Must, Positive
+from problems.entry import Expected, entry
+from problems.picture import Curves
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Bodies, Hamiltonian
 
 
@@ -40,17 +42,37 @@ def _off_axis(q: Any, m: Any) -> Any:
     return m.sqrt(q[6] ** 2 + q[7] ** 2)
 
 
+def _apart(y: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of the primaries in some states."""
+    return np.hypot(y[:, 0] - y[:, 3], y[:, 1] - y[:, 4])
+
+
 def _apocentre_momentum(e: float, d: float) -> float:
     """Return sqrt(2 (1 - e)/d)/2, correctly rounded: for e = 3/4, d = 5 it is sqrt(10)/20."""
     with localcontext(prec=60):
         return float((2 * (1 - Decimal(e)) / Decimal(d)).sqrt() / 2)
 
 
+@entry(
+    title="Sitnikov's problem",
+    references=(
+        "L. Brugnano, F. Iavernaro, T. Susca: Numerical comparisons between Gauss-Legendre "
+        "methods and Hamiltonian BVMs defined over Gauss points",
+    ),
+    notes="The planetoid stays on the axis only while rounding keeps the symmetry of a half turn "
+    "with the primaries swapped bit for bit; energy and angular momentum hardly see an ejection. "
+    "The barycentre drifts along the axis and is not moved to the origin.",
+    shows=("e",),
+    picture=Curves(
+        curves=((8, "height of the planetoid"), (_apart, "primaries apart")), span=200.0, points=2000
+    ),
+    expected=Expected(h=0.1, energy=2e-15, default=1e-14),
+)
 def sitnikov(
     *,
-    e: float = 0.75,
-    d: float = 5.0,
-    m3: float = 1e-5,
+    e: Annotated[float, Must("an eccentricity, 0 <= e < 1", lambda e: 0 <= e < 1)] = 0.75,
+    d: Positive = 5.0,
+    m3: Positive = 1e-5,
     v3: float = 0.5,
     z3: float = 1e-9,
     t_end: float = 1500.0,
@@ -83,17 +105,7 @@ def sitnikov(
     Problem
         State ``[q1 q2 q3 p1 p2 p3]``, each x, y, z; invariants: energy, linear
         and angular momentum; guard: the planetoid's distance from the axis.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.finite("sitnikov", e=e, d=d, m3=m3, v3=v3, z3=z3, t_end=t_end)
-    if not 0 <= e < 1:
-        raise InputError(f"e={e!r} of sitnikov must be an eccentricity, 0 <= e < 1.")
-    if d <= 0 or m3 <= 0:
-        raise InputError(f"d={d!r} and m3={m3!r} of sitnikov must be positive.")
     system = Hamiltonian(
         _energy,
         dof=9,
@@ -110,16 +122,4 @@ def sitnikov(
         p0=[0.0, -momentum, 0.0, 0.0, momentum, 0.0, 0.0, 0.0, m3 * v3],
         parameters={"m": (1.0, 1.0, m3)},
         t_end=t_end,
-        name="sitnikov",
-        title="Sitnikov's problem",
-        arguments={"e": e} | changed(sitnikov, d=d, m3=m3, v3=v3, z3=z3, t_end=t_end),
-        references=(
-            "L. Brugnano, F. Iavernaro, T. Susca: Numerical comparisons between Gauss-Legendre "
-            "methods and Hamiltonian BVMs defined over Gauss points",
-        ),
-        notes=(
-            "The planetoid stays on the axis only while rounding keeps the symmetry of a half turn "
-            "with the primaries swapped bit for bit; energy and angular momentum hardly see an ejection. "
-            "The barycentre drifts along the axis and is not moved to the origin."
-        ),
     )

@@ -1,18 +1,18 @@
 """The Solar System: the Sun and eight planets, the Moon's mass with the Earth's.
 
-Ellipses at J2000.0 of E. M. Standish and J. G. Williams, "Keplerian elements for
-approximate positions of the major planets" (Jet Propulsion Laboratory), table 1,
-for 1800 to 2050, with respect to the mean ecliptic and equinox of J2000. Masses
-of the JPL ephemeris DE405 as in The Astronomical Almanac 2006, page K7. G is the
-square of the Gaussian gravitational constant. Each planet starts on its ellipse
-about the Sun, as if alone with it.
+Ellipses at J2000.0 of Standish and Williams' table for 1800 to 2050, with respect to
+the mean ecliptic and equinox of J2000. Masses of the JPL ephemeris DE405, as in the
+Almanac. G is the square of the Gaussian gravitational constant. Each planet starts on
+its ellipse about the Sun, as if alone with it.
 """
 
 from fractions import Fraction
 from functools import cache
 from typing import Any
 
-from problems.catalogue._planets import planetary
+from problems.catalogue._planets import Frame, Unit, planetary
+from problems.entry import Expected, entry
+from problems.picture import Orbits
 from problems.problem import Problem
 
 GAUSSIAN_CONSTANT = "0.01720209895"  # au^(3/2)/(solar mass^(1/2) day)
@@ -41,7 +41,26 @@ ELEMENTS = (
 )
 
 
-def solar_system(*, unit: str = "year", frame: str = "barycentric", t_end: float | None = None) -> Problem:
+@entry(
+    title="the Solar System",
+    references=(
+        "E. M. Standish, J. G. Williams, Keplerian elements for approximate positions of the "
+        "major planets, Jet Propulsion Laboratory, table 1",
+        "The Astronomical Almanac for the year 2006, page K7",
+    ),
+    notes="Periods from 0.24 to 165 years; approximate ellipses, not an ephemeris.",
+    shows=("unit", "frame"),
+    picture=Orbits(
+        dimension=3,
+        first=5,
+        span=165.0,
+        points=6000,
+        limits=(-35.0, 75.0, None, None),
+        inset=(1, 5, 1.9, "Mercury to Mars"),
+    ),
+    expected=Expected(h=0.02, energy=5e-16, default=1e-15),
+)
+def solar_system(*, unit: Unit = "year", frame: Frame = "barycentric", t_end: float | None = None) -> Problem:
     """Return the Solar System, nine bodies.
 
     Tests long-time conservation with periods from 0.24 to 165 years and a
@@ -63,15 +82,10 @@ def solar_system(*, unit: str = "year", frame: str = "barycentric", t_end: float
         State: positions body by body (Sun first), then momenta. Invariants:
         energy, angular momentum, and in the heliocentric frame the linear
         momentum (in the other one it is 0 but for rounding).
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown unit or frame, or a span that is not finite.
     """
     positions, velocities = heliocentric()
     return planetary(
-        solar_system,
+        "solar_system",
         unit=unit,
         frame=frame,
         t_end=t_end,
@@ -79,13 +93,6 @@ def solar_system(*, unit: str = "year", frame: str = "barycentric", t_end: float
         masses=_masses(),
         positions=positions,
         velocities=velocities,
-        title="the Solar System",
-        references=(
-            "E. M. Standish, J. G. Williams, Keplerian elements for approximate positions of the "
-            "major planets, Jet Propulsion Laboratory, table 1",
-            "The Astronomical Almanac for the year 2006, page K7",
-        ),
-        notes="Periods from 0.24 to 165 years; approximate ellipses, not an ephemeris.",
     )
 
 

@@ -2,17 +2,17 @@
 
     H(q, p) = |p|^2/(2 m) + k (|q| - l0)^2/2 + m g q3
 
-P. Lynch, C. Houghton, "Pulsation and precession of the resonant swinging
-spring", Physica D 190 (2004) 38-62: with m = 1, g = pi^2, k = 4 pi^2 and the
-length 1 at rest (so l0 = 3/4) the spring oscillates twice as fast as it swings.
+In the paper: m = 1, g = pi^2, k = 4 pi^2 and the length 1 at rest (so l0 = 3/4), with
+which the spring oscillates twice as fast as it swings.
 """
 
 import math
 from typing import Any
 
-from problems.catalogue import _given as given
+from problems.checks import Positive
+from problems.entry import Expected, entry
+from problems.picture import Plane
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 PI_SQUARED = math.pi * math.pi
@@ -29,15 +29,26 @@ def _turn(q: Any, p: Any) -> Any:
     return q[0] * p[1] - q[1] * p[0]
 
 
+@entry(
+    title="the swinging spring",
+    references=(
+        "P. Lynch, C. Houghton, Pulsation and precession of the resonant swinging spring, "
+        "Physica D 190 (2004) 38-62",
+    ),
+    notes="Resonance; the plane of the swing precesses in steps.",
+    shows=("x", "z", "vy"),
+    picture=Plane(labels=("x", "y"), span=40.0, points=2000),
+    expected=Expected(h=0.05, energy=2e-16, default=1e-15),
+)
 def spring_pendulum(
     *,
     x: float = 0.04,
     z: float = 0.08,
     vy: float = 0.03,
-    k: float = 4 * PI_SQUARED,
-    l0: float = 0.75,
+    k: Positive = 4 * PI_SQUARED,
+    l0: Positive = 0.75,
     g: float = PI_SQUARED,
-    m: float = 1.0,
+    m: Positive = 1.0,
     t_end: float = 200.0,
 ) -> Problem:
     """Return the swinging spring at its 2:1 resonance.
@@ -61,14 +72,7 @@ def spring_pendulum(
     Problem
         State ``[q1, q2, q3, p1, p2, p3]``, q3 upwards from the support; parameters
         ``m``, ``k``, ``l0``, ``g``; invariants: energy, angular momentum about the vertical.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.finite("spring_pendulum", x=x, z=z, vy=vy, g=g, t_end=t_end)
-    given.positive("spring_pendulum", k=k, l0=l0, m=m)
     system = Hamiltonian(
         _energy,
         dof=3,
@@ -82,12 +86,4 @@ def spring_pendulum(
         p0=[0.0, m * vy, 0.0],
         parameters={"m": m, "k": k, "l0": l0, "g": g},
         t_end=t_end,
-        name="spring_pendulum",
-        title="the swinging spring",
-        arguments={"x": x, "z": z, "vy": vy} | changed(spring_pendulum, k=k, l0=l0, g=g, m=m, t_end=t_end),
-        references=(
-            "P. Lynch, C. Houghton, Pulsation and precession of the resonant swinging spring, "
-            "Physica D 190 (2004) 38-62",
-        ),
-        notes="Resonance; the plane of the swing precesses in steps.",
     )

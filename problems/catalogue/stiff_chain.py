@@ -5,20 +5,34 @@
                      + (x_m + x_{2m})^4)
 
 with q = x: x_1..x_m the (scaled) positions of the stiff springs and x_{m+1}..x_{2m}
-their (scaled) lengths. L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992)
-334-348; E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd
-edition (Springer 2006), section I.5.1: m = 3, omega = 50.
+their (scaled) lengths. In the book: m = 3, omega = 50.
 """
 
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.checks import Positive, at_least
+from problems.entry import Expected, entry
+from problems.picture import Curves
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def stiff_chain(*, springs: int = 3, omega: float = 50.0, t_end: float = 200.0) -> Problem:
+@entry(
+    title="stiff and soft springs",
+    references=(
+        "L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992) 334-348",
+        "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
+        "Springer 2006, section I.5.1",
+    ),
+    notes="Highly oscillatory: a polynomial energy of degree 4 with one large frequency.",
+    shows=("omega",),
+    picture=Curves(curves=((3, "x₄"), (4, "x₅"), (5, "x₆")), span=200.0, points=3000),
+    expected=Expected(h=0.02, energy=5e-15, default=3e-14),
+)
+def stiff_chain(
+    *, springs: Annotated[int, at_least(2)] = 3, omega: Positive = 50.0, t_end: float = 200.0
+) -> Problem:
     """Return the chain with fixed ends, as in the book.
 
     Tests highly oscillatory motion: a method should step over the fast
@@ -39,16 +53,8 @@ def stiff_chain(*, springs: int = 3, omega: float = 50.0, t_end: float = 200.0) 
     Problem
         State ``[x_1 .. x_2m, y_1 .. y_2m]``, from x_1 = y_1 = y_{m+1} = 1, x_{m+1} = 1/omega
         and 0 elsewhere; parameter ``omega``; invariant: energy.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.whole("stiff_chain", 2, springs=springs)
-    given.size("stiff_chain", 4 * springs, springs=springs)
-    given.positive("stiff_chain", omega=omega)
-    given.finite("stiff_chain", t_end=t_end)
+    limits.check_problem("stiff_chain", 4 * springs, springs=springs)
     k = springs
 
     def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
@@ -66,13 +72,4 @@ def stiff_chain(*, springs: int = 3, omega: float = 50.0, t_end: float = 200.0) 
         p0=p0,
         parameters={"omega": omega},
         t_end=t_end,
-        name="stiff_chain",
-        title="stiff and soft springs",
-        arguments={"omega": omega} | changed(stiff_chain, springs=springs, t_end=t_end),
-        references=(
-            "L. Galgani, A. Giorgilli, A. Martinoli, S. Vanzini, Physica D 59 (1992) 334-348",
-            "E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd edition, "
-            "Springer 2006, section I.5.1",
-        ),
-        notes="Highly oscillatory: a polynomial energy of degree 4 with one large frequency.",
     )

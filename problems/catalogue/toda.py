@@ -2,20 +2,19 @@
 
     H(q, p) = sum_{i=1..n} p_i^2/2 + sum_{i=1..n} exp(q_i - q_{i+1}),   q_{n+1} = q_1
 
-M. Toda, "Vibration of a chain with nonlinear interaction", Journal of the
-Physical Society of Japan 22 (1967) 431-436. Integrable: M. Henon, "Integrals of
-the Toda lattice", Physical Review B 9 (1974) 1921-1923; H. Flaschka, "The Toda
-lattice II. Existence of integrals", Physical Review B 9 (1974) 1924-1925. The
-integrals are the coefficients of the characteristic polynomial of the periodic
-Jacobi matrix L with the diagonal p_i and the squared off-diagonals
-exp(q_i - q_{i+1}).
+Integrable, as Henon and Flaschka found: the integrals are the coefficients of the
+characteristic polynomial of the periodic Jacobi matrix L with the diagonal p_i and the
+squared off-diagonals exp(q_i - q_{i+1}).
 """
 
-from typing import Any
+from typing import Annotated, Any
 
-from problems.catalogue import _given as given
+from problems import limits
+from problems.catalogue import _starts as starts
+from problems.checks import Positive, at_least
+from problems.entry import Expected, entry
+from problems.picture import Lattice
 from problems.problem import Problem
-from problems.registry import changed
 from problems.systems.hamiltonian import Hamiltonian
 
 MOST_INTEGRALS = 16  # their formulas grow with n^2
@@ -51,7 +50,26 @@ def _integrals(n: int) -> Any:
     return integrals
 
 
-def toda(*, n: int = 8, spread: float = 1.0, seed: int = 1, t_end: float = 100.0) -> Problem:
+@entry(
+    title="the Toda lattice",
+    references=(
+        "M. Toda, Vibration of a chain with nonlinear interaction, Journal of the Physical "
+        "Society of Japan 22 (1967) 431-436",
+        "M. Henon, Integrals of the Toda lattice, Physical Review B 9 (1974) 1921-1923",
+        "H. Flaschka, The Toda lattice II, Physical Review B 9 (1974) 1924-1925",
+    ),
+    notes="Integrable: every integral can be watched. Exponential forces.",
+    shows=("n",),
+    picture=Lattice(moving=True, span=40.0, points=300),
+    expected=Expected(h=0.1, energy=3e-16, default=2e-15, small={"n": 5}),
+)
+def toda(
+    *,
+    n: Annotated[int, at_least(3)] = 8,
+    spread: Positive = 1.0,
+    seed: Annotated[int, at_least(0)] = 1,
+    t_end: float = 100.0,
+) -> Problem:
     """Return the periodic Toda lattice from equal distances and random momenta.
 
     Tests an integrable system: n integrals in involution can all be watched.
@@ -61,7 +79,7 @@ def toda(*, n: int = 8, spread: float = 1.0, seed: int = 1, t_end: float = 100.0
     n : int
         Number of masses, at least 3.
     spread : float
-        Standard deviation of the momenta at the start, which are `problems.catalogue._given.gaussians`.
+        Standard deviation of the momenta at the start, which are `problems.catalogue._starts.gaussians`.
     seed : int
         Of the momenta.
     t_end : float
@@ -75,17 +93,8 @@ def toda(*, n: int = 8, spread: float = 1.0, seed: int = 1, t_end: float = 100.0
         det(x - L) from x^{n-1} to 1, of which the first is minus the momentum and the
         second is half its square less H. (The constant 2 that the corners add to the
         last one is left out.)
-
-    Raises
-    ------
-    problems.errors.InputError
-        For values out of range.
     """
-    given.whole("toda", 3, n=n)
-    given.size("toda", 2 * n, n=n)
-    given.whole("toda", 0, seed=seed)
-    given.positive("toda", spread=spread)
-    given.finite("toda", t_end=t_end)
+    limits.check_problem("toda", 2 * n, n=n)
 
     def energy(q: Any, p: Any, m: Any) -> Any:
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(n))
@@ -98,16 +107,6 @@ def toda(*, n: int = 8, spread: float = 1.0, seed: int = 1, t_end: float = 100.0
     return Problem(
         Hamiltonian(energy, dof=n, invariants=invariants, name=f"toda_{n}"),
         q0=[0.0] * n,
-        p0=[spread * draw for draw in given.gaussians(seed, n)],
+        p0=[spread * draw for draw in starts.gaussians(seed, n)],
         t_end=t_end,
-        name="toda",
-        title="the Toda lattice",
-        arguments={"n": n} | changed(toda, spread=spread, seed=seed, t_end=t_end),
-        references=(
-            "M. Toda, Vibration of a chain with nonlinear interaction, Journal of the Physical "
-            "Society of Japan 22 (1967) 431-436",
-            "M. Henon, Integrals of the Toda lattice, Physical Review B 9 (1974) 1921-1923",
-            "H. Flaschka, The Toda lattice II, Physical Review B 9 (1974) 1924-1925",
-        ),
-        notes="Integrable: every integral can be watched. Exponential forces.",
     )

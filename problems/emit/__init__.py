@@ -11,16 +11,18 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from problems import limits
-from problems.calculus.functions import Function
-from problems.calculus.gradient import reachable
+from problems.calculus.function import Function
+from problems.calculus.jacobian import Jacobian
 from problems.emit import cache
-from problems.emit.array import jax_text, numpy_text
+from problems.emit.array_text import jax_text, numpy_text
+from problems.emit.code_digest import code_digest
+from problems.emit.heyoka_text import heyoka_text
+from problems.emit.numba_text import numba_text
 from problems.emit.plan import SMALL, make_plan
-from problems.emit.scalar import numba_text
-from problems.emit.symbolic import heyoka_text
 from problems.errors import MissingLibraryError, unknown
-from problems.systems.hamiltonian import System
+from problems.systems.base import System
 from problems.systems.untraced import Foreign
+from problems.trace.graph import reachable
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
@@ -54,28 +56,24 @@ class Source:
     sha256: str
 
 
-_texts: WeakKeyDictionary[System, dict[tuple[str, str, int | None], Source]] = WeakKeyDictionary()
+_texts: WeakKeyDictionary[System, dict[tuple[str | Jacobian, str, int | None], Source]] = WeakKeyDictionary()
+_fingerprints: WeakKeyDictionary[System, str] = WeakKeyDictionary()
 _compiled: dict[tuple[str, str], Any] = {}
 
 
-def function_name(system: System, what: str) -> str:
-    """Return the name of an emitted function."""
-    name = re.sub(r"\W+", "_", f"{system.name}_{what}")
-    return name if name.isidentifier() else f"_{name}"
-
-
-def source(system: System, what: str, backend: str, *, limit: int | None = SMALL) -> Source:
+def source(system: System, what: str | Jacobian, backend: str, *, limit: int | None = SMALL) -> Source:
     """Return the source of one of a system's functions.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str
-        ``"field"`` (dim outputs: q' then p'), ``"force"`` (dof outputs -dH/dq from
-        positions alone; separable systems), ``"velocity_scale"`` (dof outputs c
-        with q'_i = c_i p_i; separable systems), ``"hamiltonian"``,
-        ``"invariant:<name>"``, ``"guard:<name>"``, ``"domain"``.
+    what : str or Jacobian
+        A name that `System.function` knows: ``"field"`` (dim outputs: q' then p'),
+        ``"force"`` (dof outputs -dH/dq from positions alone; separable systems),
+        ``"velocity_scale"`` (dof outputs c with q'_i = c_i p_i; separable systems),
+        ``"hamiltonian"``, ``"invariant:<name>"``, ``"guard:<name>"``, ``"domain"``.
+        Or what `System.jacobian` returns.
     backend : {"numpy", "numba", "jax", "heyoka"}
         numba: ``def name(t, y, par, out)`` on scalars, with the functions of
         `math` as globals; works unchanged on lanes. numpy: the same signature
@@ -96,11 +94,40 @@ def source(system: System, what: str, backend: str, *, limit: int | None = SMALL
     texts = _texts.setdefault(system, {})
     key = (what, backend, limit)
     if key not in texts:
-        function = system.function(what)
-        name = function_name(system, what)
-        text = _WRITERS[backend](make_plan(function, limit=limit), name)
-        texts[key] = Source(text, name, hashlib.sha256(text.encode()).hexdigest())
+        function = _function(system, what)
+        name = re.sub(r"\W+", "_", f"{system.name}_{_name(what)}")
+        texts[key] = _written(function, name if name.isidentifier() else f"_{name}", backend, limit)
     return texts[key]
+
+
+def _function(system: System, what: str | Jacobian) -> Function:
+    return what.function if isinstance(what, Jacobian) else system.function(what)
+
+
+def _name(what: str | Jacobian) -> str:
+    return what.name if isinstance(what, Jacobian) else what
+
+
+def _written(function: Function, name: str, backend: str, limit: int | None) -> Source:
+    text = _WRITERS[backend](make_plan(function, limit=limit), name)
+    return Source(text, name, hashlib.sha256(text.encode()).hexdigest())
+
+
+def fingerprint(system: System) -> str:
+    """Return the SHA-256 of a system's field: its structure, not its parameters' values.
+
+    Of a `Foreign` system it is that of its function's code, and of what that takes from around it.
+    """
+    if system not in _fingerprints:
+        if isinstance(system, Foreign):
+            found = code_digest(system.f, system.dim, system.name)
+        else:
+            made = source(system, "field", "numba")
+            body = made.text.replace(made.name, "field")
+            head = f"{system.kind} {system.dim} {system.dof}\n"
+            found = hashlib.sha256((head + body).encode()).hexdigest()
+        _fingerprints[system] = found
+    return _fingerprints[system]
 
 
 def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
@@ -109,7 +136,7 @@ def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
     return namespace[made.name]
 
 
-def numpy(system: System, what: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
+def numpy(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
 
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
@@ -118,14 +145,12 @@ def numpy(system: System, what: str, *, limit: int | None = SMALL) -> Callable[.
     if isinstance(system, Foreign) and what == "field":
         return partial(_foreign_on_arrays, system)
     made = source(system, what, "numpy", limit=limit)
-    return _on_arrays(made, len(system.function(what).outputs))
+    return _on_arrays(made, len(_function(system, what).outputs))
 
 
 def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return a function that is none of a system's own, such as one of `System.trace`, like `numpy`."""
-    text = numpy_text(make_plan(function, limit=limit), name)
-    made = Source(text, name, hashlib.sha256(text.encode()).hexdigest())
-    return _on_arrays(made, len(function.outputs))
+    return _on_arrays(_written(function, name, "numpy", limit), len(function.outputs))
 
 
 def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
@@ -158,7 +183,7 @@ def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
     return _compiled[key]
 
 
-def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
+def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Any:
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
@@ -178,7 +203,7 @@ def numba(system: System, what: str, *, limit: int | None = SMALL) -> Any:
     return _compiled[key]
 
 
-def compilable(system: System, what: str) -> None:
+def compilable(system: System, what: str | Jacobian) -> None:
     """Refuse a function that would be compiled for minutes; see `problems.limits`.
 
     Raises
@@ -186,12 +211,9 @@ def compilable(system: System, what: str) -> None:
     problems.errors.InputError
         For too many operations, or too many that wait for one another.
     """
-    function = system.function(what)
-    roots = [term.node for terms in function.outputs for term in terms]
-    roots += [entry.node for _, entries in function.loops for entry in entries]
-    nodes = reachable(roots)
+    nodes = reachable(_function(system, what).roots)
     cost = sum(SLOW if node.op in _SLOW else 1 for node in nodes)
-    name = f"the {what} of {system.name}"
+    name = f"the {_name(what)} of {system.name}"
     limits.check(f"{name}, with each sine or exponential as {SLOW},", "OPERATIONS", cost, limits.WRITTEN_OUT)
     depth: dict[int, int] = {}
     for node in nodes:  # arguments come first
@@ -199,7 +221,7 @@ def compilable(system: System, what: str) -> None:
     limits.check(name, "DEPTH", max(depth.values(), default=0), "nest fewer, or write long sums with m.sum")
 
 
-def jax(system: System, what: str, *, limit: int | None = SMALL) -> Callable[..., Any]:
+def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Callable[..., Any]:
     """Return ``f(t, y, par)`` on JAX arrays; y is (dim,); switches JAX to double precision.
 
     ``limit`` as in `source`.
@@ -222,7 +244,7 @@ def jax(system: System, what: str, *, limit: int | None = SMALL) -> Callable[...
     return _compiled[key]
 
 
-def heyoka(system: System, what: str = "field") -> list[Any]:
+def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
     """Return heyoka expressions: pairs of variable and right-hand side for ``"field"``.
 
     Variables are ``q0.., p0..`` (``y0..`` for a vector field), parameters
@@ -261,7 +283,7 @@ __all__ = [
     "SMALL",
     "Source",
     "compilable",
-    "function_name",
+    "fingerprint",
     "heyoka",
     "jax",
     "numba",

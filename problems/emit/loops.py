@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from problems.trace.sums import Affine, Loop
+from problems.trace.graph import Affine, Loop
 
 _SEGMENTS = 4  # at most as many ranges for one list; longer patchworks read a table
 

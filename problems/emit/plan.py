@@ -5,16 +5,14 @@ become products; statements are ordered so that one pair of bodies is finished
 before the next begins. The order of additions is the same in all cases.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from problems.calculus.functions import Function
-from problems.calculus.gradient import LoopTerm, Term, reachable
-from problems.emit.rewrite import Rewriter, body_of
-from problems.trace.graph import Graph, Node
-from problems.trace.sums import Loop
+from problems.calculus.function import Function, LoopTerm, Term
+from problems.trace.graph import Graph, Loop, Node, reachable
 
 # Loops of at most this many operations in all are written out: 15 pairs of bodies are, 45 are not.
 SMALL = 700
@@ -75,7 +73,7 @@ class Plan:
         Outputs that the loops add to, so that they start from (negative) zero.
     scatters : list of Scatter
         The loops that add onto outputs.
-    uses : dict
+    uses : Counter
         How often each node is used; one used once is printed in place.
     spare : dict
         For each declared sum, an output that is not yet in use when the sum is computed.
@@ -86,8 +84,72 @@ class Plan:
     zeros: list[int] = field(default_factory=list)
     scatters: list[Scatter] = field(default_factory=list)
     last: list[Let | Reduce | Store] = field(default_factory=list)
-    uses: dict[int, int] = field(default_factory=dict)
+    uses: Counter[int] = field(default_factory=Counter)
     spare: dict[int, int] = field(default_factory=dict)
+
+
+class _Expansion:
+    """Expands powers, and the declared sums that are small enough."""
+
+    def __init__(self, graph: Graph, limit: int | None, roots: Sequence[Node]) -> None:
+        self.graph = graph
+        self.limit = limit
+        self.done: dict[int, Node] = {}
+        nodes = reachable(roots)
+        self._uses = Counter(root.id for root in roots)
+        self._uses.update(arg.id for node in nodes for arg in node.args)
+        for node in nodes:
+            if node.loop is None:
+                self.done[node.id] = self._sum(node) if node.op == "sum" else self._apply(node, self.done)
+
+    def small(self, loop: Loop, roots: Sequence[Node]) -> bool:
+        # A root that does not vary in the loop still stands in each of its terms.
+        operations = max(len(reachable(roots, loop)), len(roots))
+        return self.limit is None or len(loop) * operations <= self.limit
+
+    def _apply(self, node: Node, done: dict[int, Node]) -> Node:
+        args = tuple(done[arg.id] if arg.id in done else self.done[arg.id] for arg in node.args)
+        if node.op == "pow":
+            return self.graph.expanded(args[0], node.data)
+        if node.op == "neg" and args[0].op == "sub" and self._uses[node.args[0].id] == 1:
+            return self.graph.sub(*args[0].args[::-1])  # -(a - b), used here only
+        return self.graph.apply(node, args)
+
+    def _sum(self, node: Node) -> Node:
+        loop, root = node.data, node.args[0]
+        if not self.small(loop, [root]):
+            return self.graph.sum(self.inside([root], loop)[0], loop)
+        total: Node | None = None
+        for (term,) in self.written_out([root], loop):
+            total = term if total is None else total + term
+        assert total is not None
+        return total
+
+    def inside(self, roots: Sequence[Node], loop: Loop) -> list[Node]:
+        """Rewrite nodes inside a loop that stays one."""
+        done: dict[int, Node] = {}
+        for node in reachable(roots, loop):
+            done[node.id] = node if node.op in ("symbol", "index") else self._apply(node, done)
+        return [done[root.id] if root.id in done else self.done[root.id] for root in roots]
+
+    def written_out(self, roots: Sequence[Node], loop: Loop) -> list[list[Node]]:
+        """Return the roots at every term of a loop."""
+        body = reachable(roots, loop)
+        places = {n.id: n.data[1].values(loop) for n in body if n.op == "symbol"}
+        places |= {n.id: n.data.values(loop) for n in body if n.op == "index"}
+        rows: list[list[Node]] = []
+        for k in range(len(loop)):
+            done: dict[int, Node] = {}
+            for node in body:
+                if node.op == "symbol":
+                    place = int(places[node.id][k])
+                    done[node.id] = self.graph.symbol(node.data[0], place, flags=node.flags)
+                elif node.op == "index":
+                    done[node.id] = self.graph.const(float(places[node.id][k]))
+                else:
+                    done[node.id] = self._apply(node, done)
+            rows.append([done[root.id] if root.id in done else self.done[root.id] for root in roots])
+        return rows
 
 
 def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
@@ -102,26 +164,24 @@ def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:
         ``None`` writes out all of them, 0 none.
     """
     graph = function.graph
-    loop_roots = [entry.node for _, entries in function.loops for entry in entries]
-    scalar_roots = [term.node for terms in function.outputs for term in terms]
-    rewriter = Rewriter(graph, limit, loop_roots + scalar_roots)
+    expansion = _Expansion(graph, limit, function.roots)
 
     chains: list[list[Term]] = [[] for _ in function.outputs]
     kept: list[tuple[Loop, list[LoopTerm]]] = []
     step = -1_000_000_000  # written-out loops come before the other summands
     for loop, entries in function.loops:
         roots = [entry.node for entry in entries]
-        if not rewriter.small(loop, roots):
-            inside = rewriter.inside(roots, loop)
+        if not expansion.small(loop, roots):
+            inside = expansion.inside(roots, loop)
             kept.append((loop, [LoopTerm(e.index, n) for e, n in zip(entries, inside, strict=True)]))
             continue
         places = [entry.index.values(loop) for entry in entries]
-        for k, nodes in enumerate(rewriter.written_out(roots, loop)):
+        for k, nodes in enumerate(expansion.written_out(roots, loop)):
             for place, node in zip(places, nodes, strict=True):
                 step += 1
                 chains[int(place[k])].append(Term(node, step))
     for chain, terms in zip(chains, function.outputs, strict=True):
-        chain.extend(Term(rewriter.done[term.node.id], term.key) for term in terms)
+        chain.extend(Term(expansion.done[term.node.id], term.key) for term in terms)
 
     plan = Plan(len(chains))
     covered = _scatters(plan, kept)
@@ -137,7 +197,7 @@ def _scatters(plan: Plan, kept: list[tuple[Loop, list[LoopTerm]]]) -> set[int]:
             np.add.at(hits, entry.index.values(loop), 1)
     for loop, entries in kept:
         unique = tuple(bool((hits[entry.index.values(loop)] == 1).all()) for entry in entries)
-        body = body_of([entry.node for entry in entries], loop)
+        body = reachable([entry.node for entry in entries], loop)
         plan.scatters.append(Scatter(loop, tuple(body), tuple(entries), unique))
         for entry, alone in zip(entries, unique, strict=True):
             if not alone:
@@ -175,7 +235,7 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
         for root in roots:
             for node in _demanded(root, done):
                 if node.op == "sum":
-                    statements.append(Reduce(node, node.data, tuple(body_of(node.args, node.data))))
+                    statements.append(Reduce(node, node.data, tuple(reachable(node.args, node.data))))
                 else:
                     statements.append(Let(node))
                 for place in outputs.pop(node.id, ()):
@@ -199,20 +259,19 @@ def _schedule(plan: Plan, finals: list[tuple[int, Node]], hints: list[Node]) -> 
     uses = plan.uses
     for statement in plan.first + plan.last:
         if isinstance(statement, Let):
-            for arg in statement.node.args:
-                uses[arg.id] = uses.get(arg.id, 0) + 1
+            uses.update(arg.id for arg in statement.node.args)
         elif isinstance(statement, Store):
-            uses[statement.node.id] = uses.get(statement.node.id, 0) + 1
+            uses[statement.node.id] += 1
         else:
             _count_body(uses, statement.body, [statement.node.args[0]])
     for scatter in plan.scatters:
         _count_body(uses, scatter.body, [entry.node for entry in scatter.entries])
 
 
-def _count_body(uses: dict[int, int], body: Sequence[Node], roots: Sequence[Node]) -> None:
+def _count_body(uses: Counter[int], body: Sequence[Node], roots: Sequence[Node]) -> None:
     for arg in [arg for node in body for arg in node.args] + list(roots):
         # What a loop takes from outside is computed once, before the loop.
-        uses[arg.id] = uses.get(arg.id, 0) + (1 if arg.loop is not None else 2)
+        uses[arg.id] += 1 if arg.loop is not None else 2
 
 
 def _demanded(root: Node, done: set[int]) -> list[Node]:
@@ -229,7 +288,7 @@ def _demanded(root: Node, done: set[int]) -> list[Node]:
             continue
         stack.append((node, True))
         if node.op == "sum":
-            inner = body_of(node.args, node.data)
+            inner = reachable(node.args, node.data)
             needed = [arg for n in inner for arg in n.args if arg.loop is None]
         else:
             needed = list(node.args)

@@ -1,10 +1,8 @@
 """What all systems have in common: a traced graph, parameters, invariants, guards."""
 
-import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -12,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
-from problems.calculus import functions
-from problems.calculus.functions import Function
-from problems.calculus.stacked import energy_gradient, gradients, stacked
+from problems.calculus.function import Function, function_of, stacked
+from problems.calculus.gradient import gradient
+from problems.calculus.jacobian import Jacobian, jacobian
 from problems.errors import InputError, shown, unknown
 from problems.trace import arguments
-from problems.trace.graph import Graph, Node
+from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
 
@@ -81,6 +79,8 @@ class System:
             raise InputError(f"name={shown(name)} of a system must be a text.")
         for what, given in (("parameters", parameters), ("invariants", invariants), ("guards", guards)):
             check_names(what, given)
+        if self.kind != "vector_field" and "energy" in invariants:
+            raise InputError("the invariant 'energy' is H itself; give the others only.")
         self.dim = dim
         self.dof = dof
         self.name = name
@@ -97,35 +97,45 @@ class System:
         self._layout = layout
         self.n_par = offset
         self._graph = Graph(dof)
-        self._functions: dict[str, Function | None] = {}
-        self._derived: dict[str, Function] = {}
-        self._vector_valued: dict[str, bool] = {}
+        self._functions: dict[str, Function | None] = {}  # None: it has none of this name
+        self._jacobians: dict[str, Jacobian | None] = {}
+        self._vectors: set[str] = set()  # invariants that are lists
         self.invariant_names: tuple[str, ...] = tuple(invariants)
         self.guard_names: tuple[str, ...] = tuple(guards)
-        self._declared = (dict(invariants), dict(guards))
 
-    def _trace_declared(self) -> None:
-        invariants, guards = self._declared
+    def _set_energy(self, energy: Node) -> None:
+        self._functions["hamiltonian"] = function_of(self._graph, [energy])
+        if not energy.flags & T:  # with explicit time it is not kept
+            self._functions["invariant:energy"] = self._functions["hamiltonian"]
+            self.invariant_names = ("energy", *self.invariant_names)
+
+    def _trace_declared(
+        self, invariants: Mapping[str, Callable[..., Any]], guards: Mapping[str, Callable[..., Any]]
+    ) -> None:
         for key, function in invariants.items():
             what = f"invariant {key!r}"
             value = self._call(function, what)
-            listed = isinstance(value, list | tuple | arguments.Vector)
-            values = list(value) if listed else [value]
-            nodes = [arguments.scalar(v, graph=self._graph, function=function, what=what) for v in values]
+            if arguments.is_list(value):
+                self._vectors.add(key)
+            else:
+                value = [value]
+            nodes = [self._node(v, function, what) for v in value]
             if not nodes:
                 raise InputError(f"{what} returns an empty list; return a number or a list of numbers.")
-            self._functions[f"invariant:{key}"] = functions.plain(self._graph, nodes)
-            self._vector_valued[f"invariant:{key}"] = listed
+            self._functions[f"invariant:{key}"] = function_of(self._graph, nodes)
         for key, function in guards.items():
-            self._functions[f"guard:{key}"] = functions.plain(
+            self._functions[f"guard:{key}"] = function_of(
                 self._graph, [self._scalar(function, f"guard {key!r}")]
             )
 
     def _call(self, function: Callable[..., Any], what: str) -> Any:
         return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, what=what)
 
+    def _node(self, value: Any, function: Callable[..., Any], what: str) -> Node:
+        return arguments.scalar(value, graph=self._graph, function=function, what=what)
+
     def _scalar(self, function: Callable[..., Any], what: str) -> Node:
-        return arguments.scalar(self._call(function, what), graph=self._graph, function=function, what=what)
+        return self._node(self._call(function, what), function, what)
 
     def trace(self, function: Callable[..., Any], what: str) -> Function:
         """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
@@ -144,7 +154,7 @@ class System:
         """
         graph = Graph(self.dof)
         value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
-        return functions.plain(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
+        return function_of(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
 
     @property
     def separable(self) -> bool:
@@ -161,72 +171,81 @@ class System:
             ``"invariant:<name>"``, ``"guard:<name>"``; ``"gradient:<invariant>"`` (dim
             outputs for each component of the invariant); ``"invariant:<name>[i]"`` and
             ``"gradient:<name>[i]"`` for one component; for Poisson systems ``"gradient"``
-            (of H) and ``"structure"`` (B row by row); ``"jacobian"`` and
-            ``"jacobian:force"`` (the entries that `problems.calculus.jacobian` lists). Several,
-            separated by ``", "``, are one function with all their outputs.
+            (of H) and ``"structure"`` (B row by row). Several, separated by ``", "``, are
+            one function with all their outputs: what they share is computed once.
 
         Raises
         ------
         problems.errors.InputError
             If the system has no such function.
         """
-        if not isinstance(what, str):
+        if not self._has(what):
             raise unknown(f"function of {self.name}", what, self.offered())
-        found = self._derived.get(what)
-        if found is None:
-            found = self._derive(what)
-            if found is not None:
-                self._derived[what] = found
-        if found is None and self._known(what):
-            found = self._functions[what]
-        if found is None:
-            raise unknown(f"function of {self.name}", what, self.offered())
+        found = self._functions[what]
+        assert found is not None
         return found
 
-    def _derive(self, what: str) -> Function | None:
-        """Return functions made of others: several as one, gradients, single components."""
-        if ", " in what:
-            return stacked([self.function(part) for part in what.split(", ")])
-        if what in ("jacobian", "jacobian:force"):
-            from problems.calculus.jacobian import jacobian  # it knows systems
-
-            made = jacobian(self, what)
-            return None if made is None else made.function
-        if (part := _COMPONENT.fullmatch(what)) is not None:
-            kind, name, place = part["kind"], part["name"], int(part["place"])
-            whole = self._functions.get(f"invariant:{name}")
-            if whole is None or place >= len(whole.outputs):
-                return None
-            if kind == "invariant":
-                return Function(whole.graph, (whole.outputs[place],))
-            return gradients(self._graph, [whole.outputs[place][0].node], self.dim)
-        if not what.startswith("gradient:"):
-            return None
-        if what == "gradient:energy" and self.dof is not None:
-            return energy_gradient(self.function("field"), self.dof)
-        whole = self._functions.get(f"invariant:{what.removeprefix('gradient:')}")
-        if whole is None:
-            return None
-        return gradients(self._graph, [terms[0].node for terms in whole.outputs], self.dim)
-
-    def offered(self) -> list[str]:
-        """Return the names that `function` knows."""
-        names = ["field", "hamiltonian", "force", "velocity_scale"]
-        return [name for name in names if self._known(name)] + [
-            name for name in self._functions if ":" in name and self._functions[name] is not None
-        ]
-
-    def _known(self, what: str) -> bool:
+    def _has(self, what: str) -> bool:
+        if not isinstance(what, str):
+            return False
         if what not in self._functions:
-            self._functions[what] = self._build(what)
+            self._functions[what] = self._derived(what)
         return self._functions[what] is not None
 
-    def _build(self, what: str) -> Function | None:
-        raise NotImplementedError
+    def _derived(self, what: str) -> Function | None:
+        """Return a function made of others: several as one, a gradient, a single component."""
+        if ", " in what:
+            return stacked([self.function(part) for part in what.split(", ")])
+        if (part := _COMPONENT.fullmatch(what)) is not None:
+            place, whole = int(part["place"]), self._functions.get(f"invariant:{part['name']}")
+            if whole is None or place >= len(whole.outputs):
+                return None
+            one = whole.part(place, place + 1)
+            return one if part["kind"] == "invariant" else self._gradients(one)
+        kind, _, name = what.partition(":")
+        whole = self._functions.get(f"invariant:{name}") if kind == "gradient" else None
+        return None if whole is None else self._gradients(whole)
 
-    def is_vector(self, what: str) -> bool:
-        """Whether the invariant ``what`` is a vector."""
-        return self._vector_valued.get(what, False)
+    def _gradients(self, scalars: Function) -> Function:
+        """Return the gradients of scalars with respect to the state, one after another."""
+        return stacked([gradient(node, self.dim) for node in scalars.roots])
+
+    def offered(self) -> list[str]:
+        """Return the names that `function` knows, but for gradients and components."""
+        known = [name for name in ("field", "hamiltonian", "force", "velocity_scale") if self._has(name)]
+        invariants = [f"invariant:{name}" for name in self.invariant_names]
+        return known + invariants + [f"guard:{name}" for name in self.guard_names]
+
+    def jacobian(self, what: str = "field") -> Jacobian | None:
+        """Return the Jacobian of the field, or of the force, or ``None`` where none is written down.
+
+        Parameters
+        ----------
+        what : {"field", "force"}
+            The field with respect to the state, or (separable systems) the force with
+            respect to the positions.
+
+        Returns
+        -------
+        Jacobian or None
+            ``None`` for a system that is not traced, and where the list of entries would
+            be too long; the derivatives must then be taken by differences.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For another name, or a system that has no such function.
+        """
+        if what not in ("field", "force"):
+            raise unknown("Jacobian", what, ("field", "force"))
+        if what not in self._jacobians:
+            name = "jacobian" if what == "field" else f"jacobian_{what}"
+            self._jacobians[what] = jacobian(self.function(what), name) if self.traced else None
+        return self._jacobians[what]
+
+    def is_vector(self, invariant: str) -> bool:
+        """Whether an invariant is a list of numbers."""
+        return invariant in self._vectors
 
     def pack(self, values: Mapping[str, Value] = MappingProxyType({})) -> NDArray[np.float64]:
         """Return the flat parameter vector, defaults filled in.
@@ -266,15 +285,6 @@ class System:
             key: float(par[offset]) if size is None else par[offset : offset + size].copy()
             for key, (offset, size) in self._layout.items()
         }
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """SHA-256 of the traced field: its structure, not its parameters' values."""
-        from problems import emit  # the emitters know systems; a system needs them for its name only
-
-        text = emit.source(self, "field", "numba").text
-        body = text.replace(emit.function_name(self, "field"), "field")
-        return hashlib.sha256(f"{self.kind} {self.dim} {self.dof}\n{body}".encode()).hexdigest()
 
 
 def name_of(function: Callable[..., Any]) -> str:

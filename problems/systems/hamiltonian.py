@@ -1,19 +1,16 @@
-"""Systems written once in ordinary Python arithmetic: `Hamiltonian`, `VectorField`."""
+"""Canonical systems, from their energy written once in ordinary Python arithmetic."""
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus import functions
-from problems.calculus.functions import Function
-from problems.calculus.gradient import Gradient, gradient
+from problems.calculus.function import Function, LoopTerm, Term, function_of, joined, stacked
+from problems.calculus.gradient import gradient
 from problems.calls import checked
 from problems.errors import InputError, shown, unknown
-from problems.systems.base import Bodies, System, Value, check_count, check_names, name_of
-from problems.trace import arguments
-from problems.trace.graph import T
-from problems.trace.lines import line_of_function
+from problems.systems.base import Bodies, System, Value, check_count, name_of
+from problems.trace.graph import PAR, Loop, Node, P
 
 
 class Hamiltonian(System):
@@ -63,8 +60,6 @@ class Hamiltonian(System):
         name: str | None = None,
     ) -> None:
         dof = check_count("dof", dof)
-        if "energy" in check_names("invariants", invariants):
-            raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=2 * dof,
             dof=dof,
@@ -77,36 +72,115 @@ class Hamiltonian(System):
             bodies = _checked_bodies(bodies, self.parameters)
         self.bodies = bodies
         self._energy = self._scalar(H, "H")
-        self._functions["hamiltonian"] = functions.plain(self._graph, [self._energy])
-        if not self._energy.flags & T:  # with explicit time the energy is not kept
-            self._functions["invariant:energy"] = self._functions["hamiltonian"]
-            self.invariant_names = ("energy", *self.invariant_names)
-        self._trace_declared()
+        self._set_energy(self._energy)
+        self._trace_declared(invariants, guards)
         if domain is not None:
-            self._functions["domain"] = functions.plain(self._graph, [self._scalar(domain, "domain")])
+            self._functions["domain"] = function_of(self._graph, [self._scalar(domain, "domain")])
 
     def __repr__(self) -> str:
         return f"Hamiltonian({self.name}, dof={self.dof})"
 
-    @cached_property
-    def _gradient(self) -> Gradient:
-        return gradient(self._energy)
-
     @property
     def separable(self) -> bool:
         """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""
-        return self._known("velocity_scale")
+        return self._has("velocity_scale")
 
-    def _build(self, what: str) -> Function | None:
+    @cached_property
+    def _gradient(self) -> Function:
+        return gradient(self._energy, self.dim)
+
+    def _derived(self, what: str) -> Function | None:
         dof = self.dim // 2
-        if what == "velocity_scale":
-            return functions.velocity_scale(self._graph, self._gradient, dof)
-        scale = self._functions.get("velocity_scale") if self.separable else None
-        if what == "field":
-            return functions.hamiltonian_field(self._graph, self._gradient, dof, scale)
-        if what == "force" and scale is not None:
-            return functions.force(self._graph, self._gradient, dof)
-        return None
+        match what:
+            case "velocity_scale":
+                return _velocity_scale(self._gradient.part(dof, 2 * dof), dof)
+            case "force":
+                return -self._gradient.part(0, dof) if self.separable else None
+            case "field":
+                scale = self._functions["velocity_scale"] if self.separable else None
+                force = -self._gradient.part(0, dof)
+                if scale is None:
+                    return stacked([self._gradient.part(dof, 2 * dof), force])
+                return stacked([_times_momentum(scale, dof), force])
+            case "gradient:energy":
+                return _energy_gradient(self.function("field"), dof)
+        return super()._derived(what)
+
+
+def _velocity_scale(velocity: Function, dof: int) -> Function | None:
+    """Return c with dH/dp_i = c_i p_i and c_i a function of parameters, or ``None``.
+
+    Found from the structure of dH/dp: products and quotients of p_i with
+    parameters and constants, and sums of these.
+    """
+    outputs: list[tuple[Term, ...]] = []
+    for i, terms in enumerate(velocity.outputs):
+        total: Node | None = None
+        for term in terms:
+            scale = _coefficient(term.node, ("y", dof + i))
+            if scale is None:
+                return None
+            total = scale if total is None else total + scale
+        outputs.append(() if total is None else (Term(total, terms[0].key),))
+    loops: list[tuple[Loop, tuple[LoopTerm, ...]]] = []
+    for loop, entries in velocity.loops:
+        scaled: list[LoopTerm] = []
+        for entry in entries:
+            scale = _coefficient(entry.node, ("y", entry.index.shifted(dof)))
+            if scale is None:
+                return None
+            scaled.append(LoopTerm(entry.index, scale))
+        loops.append((loop, tuple(scaled)))
+    return Function(velocity.graph, tuple(outputs), tuple(loops))
+
+
+def _coefficient(node: Node, momentum: tuple[str, object]) -> Node | None:
+    """Return c, free of state and time, with ``node = c * momentum``; ``None`` if it has not this form."""
+    graph = node.graph
+    if node.op == "symbol":
+        return graph.const(1.0) if node.data == momentum else None
+    if node.op == "neg":
+        inner = _coefficient(node.args[0], momentum)
+        return None if inner is None else -inner
+    if node.op in ("add", "sub"):
+        a, b = (_coefficient(arg, momentum) for arg in node.args)
+        return None if a is None or b is None else graph.apply(node, (a, b))
+    if node.op in ("mul", "div"):
+        a, b = node.args
+        if not b.flags & ~PAR:
+            inner = _coefficient(a, momentum)
+            return None if inner is None else graph.apply(node, (inner, b))
+        if node.op == "mul" and not a.flags & ~PAR:
+            inner = _coefficient(b, momentum)
+            return None if inner is None else a * inner
+    return None
+
+
+def _times_momentum(scale: Function, dof: int) -> Function:
+    """Return c_i p_i from c."""
+    graph = scale.graph
+    outputs = tuple(
+        tuple(Term(term.node * graph.symbol("y", dof + i, flags=P), term.key) for term in terms)
+        for i, terms in enumerate(scale.outputs)
+    )
+    loops = tuple(
+        (
+            loop,
+            tuple(
+                LoopTerm(e.index, e.node * graph.symbol("y", e.index.shifted(dof), flags=P, loop=loop))
+                for e in entries
+            ),
+        )
+        for loop, entries in scale.loops
+    )
+    return Function(graph, outputs, loops)
+
+
+def _energy_gradient(field: Function, dof: int) -> Function:
+    """Return grad H from the field (dH/dp, -dH/dq), with the very same roundings."""
+    velocity, slope = field.part(0, dof), -field.part(dof, 2 * dof)
+    loops = joined([(dof, velocity.loops), (0, slope.loops)])
+    return Function(field.graph, slope.outputs + velocity.outputs, loops)
 
 
 def _checked_bodies(bodies: Any, parameters: Mapping[str, Value]) -> Bodies:
@@ -116,62 +190,3 @@ def _checked_bodies(bodies: Any, parameters: Mapping[str, Value]) -> Bodies:
         if name not in parameters:
             raise unknown("parameter in bodies", name, parameters)
     return bodies
-
-
-class VectorField(System):
-    """Any first-order system y' = f(t, y).
-
-    Parameters
-    ----------
-    f : callable
-        Returns the list of derivatives; names the arguments it needs among ``t, y, par, m``.
-    dim : int
-        Length of the state.
-    parameters, invariants, guards, name
-        As for `Hamiltonian`; there is no energy unless it is given as an invariant.
-    """
-
-    kind = "vector_field"
-
-    @checked
-    def __init__(
-        self,
-        f: Callable[..., Any],
-        *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        name: str | None = None,
-    ) -> None:
-        dim = check_count("dim", dim)
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(f),
-        )
-        value = self._call(f, "f")
-        if not isinstance(value, list | tuple | arguments.Vector) or len(value) != dim:
-            got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"
-            raise InputError(
-                f"{line_of_function(f)}: f returns {got}, not a list of dim={dim}; "
-                "return one derivative for each component of y."
-            )
-        nodes = [
-            arguments.scalar(v, graph=self._graph, function=f, what=f"f's component {i}")
-            for i, v in enumerate(value)
-        ]
-        self._functions["field"] = functions.plain(self._graph, nodes)
-        self._trace_declared()
-
-    def __repr__(self) -> str:
-        return f"VectorField({self.name}, dim={self.dim})"
-
-    def _build(self, what: str) -> Function | None:
-        return None
-
-
-__all__ = ["Bodies", "Hamiltonian", "System", "Value", "VectorField"]

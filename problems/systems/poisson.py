@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from problems.calculus import functions
-from problems.calculus.functions import Function
+from problems.calculus.function import function_of
 from problems.calculus.gradient import gradient
 from problems.calls import checked
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, check_names, name_of
+from problems.systems.base import System, Value, check_count, name_of
 from problems.trace import arguments
-from problems.trace.graph import Node, T
-from problems.trace.lines import line_of_function
+from problems.trace.graph import Node
+from problems.trace.source_line import line_of_function
 
 
 class Poisson(System):
@@ -66,8 +65,6 @@ class Poisson(System):
         name: str | None = None,
     ) -> None:
         dim = check_count("dim", dim)
-        if "energy" in check_names("invariants", invariants):
-            raise InputError("the invariant 'energy' is H itself; give the others only.")
         super().__init__(
             dim=dim,
             dof=None,
@@ -77,31 +74,28 @@ class Poisson(System):
             name=name or name_of(H),
         )
         energy = self._scalar(H, "H")
-        self._functions["hamiltonian"] = functions.plain(self._graph, [energy])
-        if not energy.flags & T:
-            self._functions["invariant:energy"] = self._functions["hamiltonian"]
-            self.invariant_names = ("energy", *self.invariant_names)
+        self._set_energy(energy)
         slope = self._gradient(energy, H)
         matrix = self._matrix(B)
-        self._functions["gradient"] = functions.plain(self._graph, slope)
-        self._functions["structure"] = functions.plain(self._graph, [b for row in matrix for b in row])
-        self._functions["field"] = functions.plain(self._graph, [_product(row, slope) for row in matrix])
-        self._trace_declared()
+        self._functions["gradient"] = function_of(self._graph, slope)
+        self._functions["structure"] = function_of(self._graph, [b for row in matrix for b in row])
+        self._functions["field"] = function_of(self._graph, [_product(row, slope) for row in matrix])
+        self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:
         return f"Poisson({self.name}, dim={self.dim})"
 
     def _gradient(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
-        found = gradient(energy)
+        found = gradient(energy, self.dim)
         if found.loops:
             raise InputError(
                 f"{line_of_function(H)}: H of a Poisson system uses m.sum; write the sum in Python, "
                 "such as sum(y[i]**2 for i in range(n))."
             )
         slope = []
-        for place in range(self.dim):
+        for terms in found.outputs:
             total = self._graph.const(0.0)
-            for term in found.terms.get(place, ()):
+            for term in terms:
                 total = total + term.node
             slope.append(total)
         return slope
@@ -109,18 +103,14 @@ class Poisson(System):
     def _matrix(self, B: Callable[..., Any]) -> list[list[Node]]:
         rows = self._call(B, "B")
         line = line_of_function(B)
-        listed = list | tuple | arguments.Vector
         if (
-            not isinstance(rows, listed)
+            not arguments.is_list(rows)
             or len(rows) != self.dim
-            or not all(isinstance(row, listed) and len(row) == self.dim for row in rows)
+            or not all(arguments.is_list(row) and len(row) == self.dim for row in rows)
         ):
             raise InputError(f"{line}: B must return {self.dim} lists of {self.dim} entries.")
         matrix = [
-            [
-                arguments.scalar(b, graph=self._graph, function=B, what=f"B's entry [{i}][{j}]")
-                for j, b in enumerate(row)
-            ]
+            [self._node(b, B, f"B's entry [{i}][{j}]") for j, b in enumerate(row)]
             for i, row in enumerate(rows)
         ]
         for i in range(self.dim):
@@ -133,9 +123,6 @@ class Poisson(System):
                         f"[{j}][{i}]; write the one as minus the other, and 0 on the diagonal."
                     )
         return matrix
-
-    def _build(self, what: str) -> Function | None:
-        return None
 
 
 def _product(row: list[Node], slope: list[Node]) -> Node:

@@ -9,7 +9,7 @@ from problems import limits
 from problems.errors import InputError, shown, unknown
 from problems.trace import sums
 from problems.trace.graph import FUNCTIONS, PAR, Graph, Node, P, Q, T
-from problems.trace.lines import line_of_function, line_of_traceback, refuse
+from problems.trace.source_line import line_of_function, line_of_traceback, refuse
 
 # Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
 Layout = Mapping[str, tuple[int, int | None]]
@@ -97,6 +97,11 @@ class Vector:
     __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
 
 
+def is_list(value: Any) -> bool:
+    """Whether a function returned several numbers."""
+    return isinstance(value, list | tuple | Vector)
+
+
 class Parameters:
     """The parameters as attributes: scalars are symbols, sequences are vectors of symbols."""
 
@@ -142,30 +147,21 @@ class Mathematics:
             refuse("m.sum needs a term and an index list", "write m.sum(lambda i: q[i]**2, range(n))")
         return sums.declare(self._graph, term, index)
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> Callable[[Any], Node]:
         if name.startswith("__"):
             raise AttributeError(name)
-        refuse(
-            str(unknown("function", f"m.{name}", [f"m.{f}" for f in (*_PUBLIC, "sum", "pi")])).rstrip("."),
-            "write it with these functions",
-        )
+        if name not in _PUBLIC:
+            known = [f"m.{function}" for function in (*_PUBLIC, "sum", "pi")]
+            refuse(str(unknown("function", f"m.{name}", known)).rstrip("."), "write it with these functions")
+
+        def function(x: Any) -> Node:
+            return self._graph.call(name, self._graph.node(x))
+
+        function.__qualname__ = f"m.{name}"  # as Python's messages call it
+        return function
 
 
 _PUBLIC = tuple(name for name in FUNCTIONS if name != "sign")
-
-
-def _function(name: str) -> Callable[[Mathematics, Any], Any]:
-    def call(self: Mathematics, x: Any) -> Any:
-        graph = self._graph
-        return graph.call(name, graph.node(x))
-
-    call.__name__ = name
-    call.__doc__ = f"Return {name}(x) of a symbol or a number."
-    return call
-
-
-for _name in _PUBLIC:
-    setattr(Mathematics, _name, _function(_name))
 
 
 def call(
@@ -198,7 +194,6 @@ def call(
     """
     if not callable(function):
         raise InputError(f"{what} must be a function, not {shown(function)}.")
-    place = line_of_function(function)
     offered: dict[str, Callable[[], Any]] = {
         "t": lambda: graph.symbol("t", 0, flags=T),
         "y": lambda: Vector(graph, "y", "y", 0, dim),
@@ -231,6 +226,7 @@ def call(
                 if parameter.name in layout
                 else "name those it needs among " + ", ".join(sorted(offered))
             )
+            place = line_of_function(function)
             raise InputError(f"{place}: {what} asks for an argument {parameter.name!r}; {remedy}.")
         if parameter.kind is parameter.POSITIONAL_ONLY:
             arguments.append(value)
@@ -255,7 +251,7 @@ def call(
             f"{line_of_traceback(error.__traceback__)}: the name {name!r} is not known here; {remedy}."
         ) from error
     except Exception as error:
-        line = line_of_traceback(error.__traceback__) or place
+        line = line_of_traceback(error.__traceback__) or line_of_function(function)
         raise InputError(f"{line}: {what} failed with {type(error).__name__}: {error}") from error
     finally:
         graph.limit = None
@@ -263,18 +259,16 @@ def call(
 
 def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str) -> Node:
     """Return what a function returned as one node, or raise when it is not one number."""
-    place = line_of_function(function)
     if value is None:
-        raise InputError(f"{place}: {what} returns nothing; end it with a return statement.")
-    if isinstance(value, list | tuple | Vector | dict) or getattr(value, "shape", ()) != ():
-        raise InputError(
-            f"{place}: {what} returns {len(value)} values, not one number; return one scalar, "
-            "such as the sum of its terms."
-        )
-    try:
-        node = graph.node(value)
-    except InputError as error:
-        raise InputError(f"{place}: {what} returns {value!r}, which is not a number.") from error
-    if node.loop is not None:
-        raise InputError(f"{place}: {what} returns a symbol of an m.sum's term; return the sum itself.")
-    return node
+        wrong = "nothing; end it with a return statement"
+    elif is_list(value) or isinstance(value, dict) or getattr(value, "shape", ()) != ():
+        wrong = f"{len(value)} values, not one number; return one scalar, such as the sum of its terms"
+    else:
+        try:
+            node = graph.node(value)
+            if node.loop is None:
+                return node
+            wrong = "a symbol of an m.sum's term; return the sum itself"
+        except InputError:
+            wrong = f"{value!r}, which is not a number"
+    raise InputError(f"{line_of_function(function)}: {what} returns {wrong}.")

@@ -17,15 +17,20 @@ products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``
 
 import math
 import numbers
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
 
 from problems import limits
-from problems.trace.lines import refuse, users_line
-from problems.trace.node import FUNCTIONS, PAR, STATE, Node, P, Q, T
+from problems.trace.source_line import refuse, users_line
 
-_EVALUATE: dict[str, Callable[[float], float]] = {
+T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
+STATE = Q | P
+FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "sin": math.sin,
     "cos": math.cos,
@@ -35,6 +40,7 @@ _EVALUATE: dict[str, Callable[[float], float]] = {
     "abs": math.fabs,
     "sign": lambda x: math.copysign(1.0, x),
 }
+"""What a node may be of one argument, and its value at a constant."""
 
 
 def is_power_of_two(value: float) -> bool:
@@ -45,6 +51,195 @@ def is_power_of_two(value: float) -> bool:
 def _described(value: Any) -> str:
     shape = getattr(value, "shape", None)
     return f"an array of shape {shape}" if shape else f"{value!r:.40}"
+
+
+class Loop:
+    """The index list of a declared sum; one object per graph and list.
+
+    Attributes
+    ----------
+    rows : ndarray of int64, shape (n, width)
+        The indices, one row per term.
+    id : int
+        Ordinal number in its graph.
+    """
+
+    def __init__(self, rows: NDArray[np.int64], number: int) -> None:
+        self.rows = rows
+        self.id = number
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __repr__(self) -> str:
+        return f"Loop({len(self.rows)}x{self.rows.shape[1]})"
+
+    @property
+    def width(self) -> int:
+        """Number of integers that a term is called with."""
+        return self.rows.shape[1]
+
+
+@dataclass(frozen=True)
+class Affine:
+    """An index that is an affine function of a loop's integers.
+
+    Attributes
+    ----------
+    coefficients : tuple of int
+        One per integer of the loop.
+    offset : int
+        The constant part.
+    """
+
+    coefficients: tuple[int, ...]
+    offset: int
+
+    def values(self, loop: Loop) -> NDArray[np.int64]:
+        """Return the index of every term, shape (n,)."""
+        return loop.rows @ np.array(self.coefficients, dtype=np.int64) + self.offset
+
+    def shifted(self, by: int) -> "Affine":
+        """Return the index plus a constant."""
+        return Affine(self.coefficients, self.offset + by)
+
+
+class Node:
+    """One operation of a graph; what a user's function sees as a number.
+
+    Attributes
+    ----------
+    graph : Graph
+        The graph that the node belongs to.
+    id : int
+        Position in the graph; arguments always come before their users.
+    op : str
+        ``"const"``, ``"symbol"``, ``"index"``, ``"add"``, ``"sub"``, ``"mul"``, ``"div"``,
+        ``"neg"``, ``"pow"``, ``"sum"`` or one of `FUNCTIONS`.
+    args : tuple of Node
+        The arguments, in the user's order.
+    data : Any
+        The value of a constant; (space, index) of a symbol; the affine index of
+        ``"index"``; the exponent of ``"pow"``; the loop of ``"sum"``.
+    flags : int
+        What the node depends on, of `T`, `Q`, `P`, `PAR`.
+    loop : Loop or None
+        The declared sum's loop inside which the node lives, or ``None``.
+    """
+
+    __slots__ = ("args", "data", "flags", "graph", "id", "loop", "op")
+
+    def __init__(
+        self, graph: "Graph", op: str, args: "tuple[Node, ...]", data: Any, flags: int, loop: Loop | None
+    ) -> None:
+        self.graph = graph
+        self.id = len(graph.nodes)
+        self.op = op
+        self.args = args
+        self.data = data
+        self.flags = flags
+        self.loop = loop
+
+    def __repr__(self) -> str:
+        inside = ", ".join([f"#{arg.id}" for arg in self.args] + ([repr(self.data)] if self.data else []))
+        return f"#{self.id}={self.op}({inside})"
+
+    def __add__(self, other: Any) -> "Node":
+        return self.graph.add(self, self.graph.node(other))
+
+    def __radd__(self, other: Any) -> "Node":
+        return self.graph.add(self.graph.node(other), self)
+
+    def __sub__(self, other: Any) -> "Node":
+        return self.graph.sub(self, self.graph.node(other))
+
+    def __rsub__(self, other: Any) -> "Node":
+        return self.graph.sub(self.graph.node(other), self)
+
+    def __mul__(self, other: Any) -> "Node":
+        return self.graph.mul(self, self.graph.node(other))
+
+    def __rmul__(self, other: Any) -> "Node":
+        return self.graph.mul(self.graph.node(other), self)
+
+    def __truediv__(self, other: Any) -> "Node":
+        return self.graph.div(self, self.graph.node(other))
+
+    def __rtruediv__(self, other: Any) -> "Node":
+        return self.graph.div(self.graph.node(other), self)
+
+    def __neg__(self) -> "Node":
+        return self.graph.neg(self)
+
+    def __pos__(self) -> "Node":
+        return self
+
+    def __abs__(self) -> "Node":
+        return self.graph.call("abs", self)
+
+    def __pow__(self, exponent: Any) -> "Node":
+        if isinstance(exponent, Node):
+            refuse("a symbol stands in an exponent", "write x**y as m.exp(y*m.log(x))")
+        if not isinstance(exponent, numbers.Real) or isinstance(exponent, bool):
+            refuse(f"the exponent {exponent!r} is not a number", "give an integer or half an integer")
+        twice = 2 * float(exponent)
+        if not twice.is_integer() or abs(twice) > 2000:
+            refuse(
+                f"the exponent {exponent!r} is not an integer or half an integer (up to 1000)",
+                "write x**a as m.exp(a*m.log(x))",
+            )
+        return self.graph.power(self, int(twice))
+
+    def __rpow__(self, base: Any) -> NoReturn:
+        refuse("a symbol stands in an exponent", "write a**x as m.exp(x*m.log(a))")
+
+    # What a traced function cannot do. Comparisons refuse by themselves: `==` falling
+    # back to identity would take one branch in silence.
+    def _branch(self, *_: Any) -> NoReturn:
+        refuse(
+            "this compares or branches on a symbol",
+            "the function is run once, on symbols, so write one formula for all states "
+            "(m.abs(x) for the absolute value)",
+        )
+
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _branch  # type: ignore[assignment]
+
+    def __hash__(self) -> int:
+        return hash((id(self.graph), self.id))
+
+    def _number(self, *_: Any) -> NoReturn:
+        refuse(
+            "this needs the value of a symbol",
+            "declare the argument m and use m.sqrt, m.sin, m.cos, m.tan, m.exp, m.log, m.abs",
+        )
+
+    __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
+
+    def _whole(self, *_: Any) -> NoReturn:
+        refuse("this takes // or % of a symbol", "write a smooth formula: m.sin and m.cos are periodic")
+
+    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = __rdivmod__ = _whole
+
+    def __array__(self, *_: Any, **__: Any) -> NoReturn:
+        refuse(
+            "this makes a numpy array of symbols",
+            "write the formula in components, with Python lists and loops and the functions of m",
+        )
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **_: Any) -> Any:
+        # numpy scalars are ordinary numbers: np.float64(2.0)*q[0] arrives here.
+        binary = {
+            "add": self.graph.add,
+            "subtract": self.graph.sub,
+            "multiply": self.graph.mul,
+            "divide": self.graph.div,
+        }.get(ufunc.__name__)
+        if binary is not None and method == "__call__" and len(inputs) == 2:
+            return binary(self.graph.node(inputs[0]), self.graph.node(inputs[1]))
+        name = ufunc.__name__
+        better = {"absolute": "abs"}.get(name, name)
+        remedy = f"use m.{better}" if better in FUNCTIONS else "write it with + - * / and the functions of m"
+        return refuse(f"this applies numpy's {name} to a symbol", f"declare the argument m and {remedy}")
 
 
 class Graph:
@@ -60,7 +255,7 @@ class Graph:
     def __init__(self, dof: int | None = None) -> None:
         self.dof = dof
         self.nodes: list[Node] = []
-        self.loops: dict[Hashable, Any] = {}
+        self._loops: dict[Hashable, Loop] = {}
         self.in_term = False  # whether the term of a declared sum is being traced
         self.limit: int | None = None  # number of nodes, while a user's function makes them
         self._table: dict[Hashable, Node] = {}
@@ -73,7 +268,7 @@ class Graph:
         *,
         key: Hashable = None,
         flags: int = 0,
-        loop: Any = None,
+        loop: Loop | None = None,
     ) -> Node:
         if key is None:
             key = (op, *(arg.id for arg in args))
@@ -96,21 +291,25 @@ class Graph:
         self._table[key] = node
         return node
 
+    def loop(self, rows: NDArray[np.int64]) -> Loop:
+        """Return the loop over a list of indices, shape (n, width); one object per list."""
+        return self._loops.setdefault((rows.shape, rows.tobytes()), Loop(rows, len(self._loops)))
+
     def const(self, value: float) -> Node:
         """Return the node of a literal."""
         # repr tells 0.0 from -0.0, which compare equal.
         return self._intern("const", (), value, key=("const", repr(value)))
 
-    def symbol(self, space: str, index: Any, *, flags: int, loop: Any = None) -> Node:
+    def symbol(self, space: str, index: int | Affine, *, flags: int, loop: Loop | None = None) -> Node:
         """Return the node of one input: ``space`` is "t", "y", "par" or "out"."""
         key = ("symbol", space, index, None if loop is None else loop.id)
         return self._intern("symbol", (), (space, index), key=key, flags=flags, loop=loop)
 
-    def index(self, affine: Any, loop: Any) -> Node:
+    def index(self, affine: Affine, loop: Loop) -> Node:
         """Return the node of a loop index used as a number."""
         return self._intern("index", (), affine, key=("index", affine, loop.id), loop=loop)
 
-    def sum(self, body: Node, loop: Any) -> Node:
+    def sum(self, body: Node, loop: Loop) -> Node:
         """Return the node of a declared sum of ``body`` over ``loop``, in the loop's order."""
         key = ("sum", body.id, loop.id)
         found = self._table.get(key)
@@ -248,7 +447,7 @@ class Graph:
         """Return the function ``name`` of ``a``."""
         if a.op == "const":
             try:
-                return self.node(_EVALUATE[name](a.data))
+                return self.node(FUNCTIONS[name](a.data))
             except ValueError:
                 refuse(f"{name}({a.data!r}) is not defined", "keep to the function's domain")
         return self._intern(name, (a,))
@@ -256,16 +455,8 @@ class Graph:
     def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
         """Return the operation of ``node`` on other arguments."""
         match node.op:
-            case "add":
-                return self.add(*args)
-            case "sub":
-                return self.sub(*args)
-            case "mul":
-                return self.mul(*args)
-            case "div":
-                return self.div(*args)
-            case "neg":
-                return self.neg(*args)
+            case "add" | "sub" | "mul" | "div" | "neg":
+                return getattr(self, node.op)(*args)
             case "pow":
                 return self.int_power(args[0], node.data)
             case "sum":
@@ -276,4 +467,13 @@ class Graph:
                 return self.call(node.op, args[0])
 
 
-__all__ = ["FUNCTIONS", "PAR", "STATE", "Graph", "Node", "P", "Q", "T", "is_power_of_two"]
+def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:
+    """Return all nodes that ``roots`` depend on, arguments first; of a loop, those inside it only."""
+    seen: dict[int, Node] = {}
+    stack = list(roots)
+    while stack:
+        node = stack.pop()
+        if node.id not in seen and (within is None or node.loop is within):
+            seen[node.id] = node
+            stack.extend(node.args)
+    return [seen[key] for key in sorted(seen)]

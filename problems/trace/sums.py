@@ -9,7 +9,6 @@ terms are added one after the other, in the order of ``index``.
 import numbers
 import sys
 from collections.abc import Callable, Iterable, Sized
-from dataclasses import dataclass
 from itertools import islice
 from typing import Any, NoReturn
 
@@ -18,59 +17,8 @@ from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import shown
-from problems.trace.graph import Graph, Node
-from problems.trace.lines import refuse, users_line
-
-
-class Loop:
-    """The index list of a declared sum; one object per graph and list.
-
-    Attributes
-    ----------
-    rows : ndarray of int64, shape (n, width)
-        The indices, one row per term.
-    id : int
-        Ordinal number in its graph.
-    """
-
-    def __init__(self, rows: NDArray[np.int64], number: int) -> None:
-        self.rows = rows
-        self.id = number
-
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __repr__(self) -> str:
-        return f"Loop({len(self.rows)}x{self.rows.shape[1]})"
-
-    @property
-    def width(self) -> int:
-        """Number of integers that a term is called with."""
-        return self.rows.shape[1]
-
-
-@dataclass(frozen=True)
-class Affine:
-    """An index that is an affine function of a loop's integers.
-
-    Attributes
-    ----------
-    coefficients : tuple of int
-        One per integer of the loop.
-    offset : int
-        The constant part.
-    """
-
-    coefficients: tuple[int, ...]
-    offset: int
-
-    def values(self, loop: Loop) -> NDArray[np.int64]:
-        """Return the index of every term, shape (n,)."""
-        return loop.rows @ np.array(self.coefficients, dtype=np.int64) + self.offset
-
-    def shifted(self, by: int) -> "Affine":
-        """Return the index plus a constant."""
-        return Affine(self.coefficients, self.offset + by)
+from problems.trace.graph import Affine, Graph, Loop, Node
+from problems.trace.source_line import refuse, users_line
 
 
 class Index:
@@ -166,14 +114,12 @@ def _rows(index: Iterable[Any]) -> NDArray[np.int64]:
     except TypeError:
         refuse(f"the index of m.sum is {shown(index)}", "give a range or a list of integers")
     limits.check(f"{users_line()}: this", "TERMS", len(listed))
+    if not listed:
+        return np.zeros((0, 1), dtype=np.int64)
     try:
         rows = np.array([row if isinstance(row, tuple | list) else (row,) for row in listed])
     except (TypeError, ValueError):
         rows = np.array(None)
-    if len(rows.shape) == 2 and rows.shape[0] == 0:
-        return rows.astype(np.int64)
-    if rows.shape == (0,):
-        return np.zeros((0, 1), dtype=np.int64)
     if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
         refuse(
             "the index of m.sum is not a list of integers or of equally long tuples of integers",
@@ -209,10 +155,7 @@ def declare(graph: Graph, term: Callable[..., Any], index: Iterable[Any]) -> Nod
     rows = _rows(index)
     if len(rows) == 0:
         return graph.const(0.0)
-    key = (rows.shape, rows.tobytes())
-    loop = graph.loops.get(key)
-    if loop is None:
-        loop = graph.loops[key] = Loop(rows, len(graph.loops))
+    loop = graph.loop(rows)
     unit = np.eye(loop.width, dtype=int)
     indices = [Index(graph, loop, Affine(tuple(int(c) for c in row), 0)) for row in unit]
     graph.in_term = True

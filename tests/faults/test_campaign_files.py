@@ -4,7 +4,9 @@ import re
 
 import pytest
 
-from hbvm_bench import campaign, cli, runner
+from hbvm_bench import cli
+from hbvm_bench.campaign import file as campaign
+from hbvm_bench.run import loop
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -64,7 +66,7 @@ PROBLEMS\nproblems = [{use = "kepler(e={e})"}]               => unknown value in
 PROBLEMS\nproblems = [{use = "kepler()", sweep = {e = [0.1]}}] => kepler(): the sweep gives values of 'e',
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = []}}] => Expected `array` of length >= 1, at
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = 3}}] => Expected `array`, got `int`, at
-PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = ["a"]}}] => e='a' of kepler must be a finite
+PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = ["a"]}}] => e='a' of kepler must be an eccentr
 PROBLEMS\nproblems = [{use = "kepler(e={e*2})", sweep = {e = ["a"]}}] => kepler(e={e*2}): {e*2} multiplies
 PROBLEMS\nproblems = [{use = "kepler(e={e+2})", sweep = {e = [0.1]}}] => kepler(e={e+2}): the sweep gives
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = [nan]}}] => cannot read 'kepler(e=nan)': a value
@@ -84,7 +86,7 @@ METHODS\nmethods = [{use = "HBVM(kk=3)"}]                    => HBVM(kk=3): unkn
 METHODS\nmethods = [{use = "HBVM(1,2)"}]                     => cannot read 'HBVM(1,2)': arguments are given
 METHODS\nmethods = [{use = "Gauss(h=0.1)"}]                  => Gauss(h=0.1): Gauss needs s; give a value as
 METHODS\nmethods = [{use = "HBVM(k=2000,s=2,h=0.1)"}]        => the limit is
-METHODS\nmethods = [{use = "HBVM(k=4,s=2,h=-1)"}]            => HBVM(k=4, s=2, h=-1): HBVM needs a finite
+METHODS\nmethods = [{use = "HBVM(k=4,s=2,h=-1)"}]            => HBVM(k=4, s=2, h=-1): h=-1 of HBVM must be
 METHODS\nmethods = [{use = "HBVM(k=4,s=2,h={h})"}]           => unknown value in HBVM(k=4,s=2,h={h}) 'h';
 METHODS\nmethods = [{use = "HBVM()"}, {use = "HBVM()"}]      => HBVM(tol=3e-16) on kepler(e=0.6) is given
 METHODS\nmethods = [{use = "HBVM()", settings = "best"}]     => unknown settings 'best'; known: as published,
@@ -190,7 +192,7 @@ def written(text: str) -> str:
 def fault(line: str) -> Fault:
     """Return a row of the table."""
     text, says = (part.strip() for part in line.split(" => "))
-    return Fault(text, lambda: runner.plan(campaign.parse(written(text))), re.escape(says))
+    return Fault(text, lambda: loop.plan(campaign.parse(written(text))), re.escape(says))
 
 
 @pytest.mark.parametrize("row", [fault(line) for line in TABLE.strip("\n").splitlines()], ids=str)

@@ -95,11 +95,11 @@ run -p "kepler()" -m "Gauss(h=0.1)"                        | Gauss(h=0.1): Gauss
 run -p "kepler()" -m "Gauss(s=2000,h=0.1)"                 | the limit is
 run -p "kepler()" -m "HBVM(k=2000,s=2,h=0.1)"              | the limit is
 run -p "kepler()" -m "HBVM(k=4,s=2,h=1e999)"               | cannot read 'HBVM(k=4,s=2,h=1e999)': the number
-run -p "kepler()" -m "HBVM(k=4,s=2,h='a')"                 | HBVM(k=4, s=2, h='a'): HBVM needs a finite step
-run -p "kepler()" -m "HBVM(k=4,s=2,h=[0.1])"               | HBVM(k=4, s=2, h=(0.1,)): HBVM needs a finite
+run -p "kepler()" -m "HBVM(k=4,s=2,h='a')"                 | HBVM(k=4, s=2, h='a'): h='a' of HBVM must be a
+run -p "kepler()" -m "HBVM(k=4,s=2,h=[0.1])"               | HBVM(k=4, s=2, h=(0.1,)): h=(0.1,) of HBVM must
 run -p "kepler()" -m "HBVM(k=4,s=2,h={})"                  | cannot read 'HBVM(k=4,s=2,h={})': a value is a
 run -p "kepler()" -m "HBVM(k=[[[[[[[[[[4]]]]]]]]]],s=2,h=0.1)" | cannot read
-run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): WHFast needs a number 0 < h <
+run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): h=-1 of WHFast must be a finite
 run -p "kepler()" -m "sys.exit()"                          | cannot read 'sys.exit()': the name must be one
 run -p "expression(H='p^2/2 +')" -m "IAS15()"              | cannot read the formula 'p^2/2 +': this is not
 run -p "expression(H='q^10000000000')" -m "HBVM(k=4,s=2,h=0.1)" | cannot read the formula 'q^10000000000':

@@ -8,7 +8,7 @@ import pytest
 
 import integrators
 import problems
-from hbvm_bench.spec import parse_spec
+from hbvm_bench.campaign.spec import parse_spec
 from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
 from problems import Foreign, Hamiltonian, Problem, VectorField
@@ -19,11 +19,11 @@ from .fault import Fault, is_met, sentence
 WELL = problems.load("rigid_body")
 
 FAULTS = [
-    Fault("HBVM(max_step=0)", lambda: HBVM(max_step=0.0), r"finite step max_step > 0, not max_step=0\.0"),
+    Fault("HBVM(max_step=0)", lambda: HBVM(max_step=0.0), r"max_step=0\.0 of HBVM must be a finite step"),
     Fault("HBVM(max_step=nan)", lambda: HBVM(max_step=math.nan), "max_step=nan"),
-    Fault("HBVM(max_steps=0)", lambda: HBVM(max_steps=0), "whole number max_steps >= 1, not max_steps=0"),
-    Fault("HBVM(breakpoints=3)", lambda: HBVM(breakpoints=3.0), r"finite times, not breakpoints=3\.0"),  # pyright: ignore
-    Fault("HBVM(breakpoints=[nan])", lambda: HBVM(breakpoints=[1.0, math.nan]), "finite times, not"),
+    Fault("HBVM(max_steps=0)", lambda: HBVM(max_steps=0), "max_steps=0 of HBVM must be a whole number"),
+    Fault("HBVM(breakpoints=3)", lambda: HBVM(breakpoints=3.0), "must be a list of finite times"),  # pyright: ignore
+    Fault("HBVM(breakpoints=[nan])", lambda: HBVM(breakpoints=[1.0, math.nan]), "list of finite times"),
     Fault(
         "HBVM(k=4, s=2, h=0.1, breakpoints=[1])",
         lambda: HBVM(k=4, s=2, h=0.1, breakpoints=[1.0]),

@@ -31,7 +31,7 @@ class Typed:
 )
 def test_the_command_says_what_is_wrong_and_writes_nothing(typed, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("hbvm_bench.doctor.examine", dict)  # nothing is looked at before that is said
+    monkeypatch.setattr("hbvm_bench.measure.doctor.examine", dict)  # nothing is looked at before that is said
     assert cli.main(list(typed.words)) == 2
     sentence(capsys.readouterr().err, typed.says)
     assert not list(tmp_path.iterdir())

@@ -11,16 +11,16 @@ load(3)                                                      | unknown problem 3
 load(None)                                                   | unknown problem None; did you mean
 load(['kepler'])                                             | unknown problem ['kepler']; did you mean
 load('kepler', ee=.6)                                        | unknown argument of kepler 'ee'; did you mean
-load('kepler', e='0.6')                                      | e='0.6' of kepler must be a finite number
-load('kepler', e=None)                                       | e=None of kepler must be a finite number
-load('kepler', e=nan)                                        | e=nan of kepler must be a finite number
+load('kepler', e='0.6')                                      | e='0.6' of kepler must be an eccentricity, 0
+load('kepler', e=None)                                       | e=None of kepler must be an eccentricity, 0
+load('kepler', e=nan)                                        | e=nan of kepler must be an eccentricity, 0
 load('kepler', e=1.0)                                        | e=1.0 of kepler must be an eccentricity, 0 <=
 load('kepler', e=-.1)                                        | e=-0.1 of kepler must be an eccentricity, 0
-load('kepler', e=huge)                                       | e=about 1e400 of kepler must be a finite
-load('kepler', e=True)                                       | e=True of kepler must be a finite number
-load('kepler', e=[.6])                                       | e=[0.6] of kepler must be a finite number
-load('kepler', e=np.array([.6, .7]))                         | e=[0.6, 0.7] of kepler must be a finite
-load('kepler', e=1j)                                         | e=1j of kepler must be a finite number
+load('kepler', e=huge)                                       | e=about 1e400 of kepler must be an
+load('kepler', e=True)                                       | e=True of kepler must be an eccentricity, 0
+load('kepler', e=[.6])                                       | e=[0.6] of kepler must be an eccentricity, 0
+load('kepler', e=np.array([.6, .7]))                         | e=[0.6, 0.7] of kepler must be an
+load('kepler', e=1j)                                         | e=1j of kepler must be an eccentricity, 0 <=
 load('kepler', t_end=0)                                      | t_end=0 must differ from t0=0.0
 load('kepler', t_end='100')                                  | t_end='100' of kepler must be a finite number
 load('kepler', t_end=nan)                                    | t_end=nan of kepler must be a finite number
@@ -43,9 +43,9 @@ load('fput', start='modes')                                  | unknown start of 
 load('fput', start=3)                                        | unknown start of fput 3; known: mode, thermal
 load('fput', start=None)                                     | unknown start of fput None; did you mean
 load('fput', start=['mode'])                                 | unknown start of fput ['mode']; did you mean
-load('fput', temperature=0)                                  | temperature=0 of fput must be positive
-load('fput', temperature=-1)                                 | temperature=-1 of fput must be positive
-load('fput', temperature=nan, start='thermal')               | temperature=nan of fput must be a finite
+load('fput', temperature=0)                                  | temperature=0 of fput must be a positive
+load('fput', temperature=-1)                                 | temperature=-1 of fput must be a positive
+load('fput', temperature=nan, start='thermal')               | temperature=nan of fput must be a positive
 load('fput', temperature=1e308, start='thermal')             | p0 must be finite, not [-inf, -inf, -inf,
 load('fput', amplitude=inf)                                  | amplitude=inf of fput must be a finite number
 load('fput', seed=-1)                                        | seed=-1 of fput must be a whole number of at
@@ -57,8 +57,8 @@ load('cluster', n=10**7)                                     | HBVM_BENCH_MAX_CO
 load('cluster', n=10**4)                                     | HBVM_BENCH_MAX_TERMS
 load('cluster', n=1)                                         | n=1 of cluster must be a whole number of at
 load('cluster', n=2.0)                                       | n=2.0 of cluster must be a whole number of at
-load('cluster', softening=0)                                 | softening=0 of cluster must be positive
-load('cluster', softening=-1)                                | softening=-1 of cluster must be positive
+load('cluster', softening=0)                                 | softening=0 of cluster must be a positive
+load('cluster', softening=-1)                                | softening=-1 of cluster must be a positive
 load('cluster', seed=None)                                   | seed=None of cluster must be a whole number
 load('lennard_jones', rings=1000)                            | HBVM_BENCH_MAX_COMPONENTS
 load('lennard_jones', rings=0)                               | rings=0 of lennard_jones must be a whole
@@ -67,13 +67,13 @@ load('lennard_jones', temperature=0)                         | temperature=0 of 
 load('lennard_jones', temperature='x')                       | temperature='x' of lennard_jones must be a
 load('toda', n=10**9)                                        | HBVM_BENCH_MAX_COMPONENTS
 load('toda', n=2)                                            | n=2 of toda must be a whole number of at
-load('toda', spread=0)                                       | spread=0 of toda must be positive
+load('toda', spread=0)                                       | spread=0 of toda must be a positive number.
 load('toda', spread=1e308)                                   | p0 must be finite, not
 load('sine_gordon', n=10**9)                                 | HBVM_BENCH_MAX_COMPONENTS
 load('sine_gordon', n=2)                                     | n=2 of sine_gordon must be a whole number of
-load('sine_gordon', gamma=0)                                 | gamma=0 of sine_gordon must be positive
+load('sine_gordon', gamma=0)                                 | gamma=0 of sine_gordon must be a positive
 load('sine_gordon', gamma=1e-320)                            | p0 must be finite, not [0.0, 0.0, 0.0, 0.0,
-load('sine_gordon', length=-1)                               | length=-1 of sine_gordon must be positive
+load('sine_gordon', length=-1)                               | length=-1 of sine_gordon must be a positive
 load('sine_gordon', length=1e-320)                           | parameter 'stiffness' is inf; give one finite
 load('nonlinear_wave', n=10**9)                              | HBVM_BENCH_MAX_COMPONENTS
 load('nonlinear_wave', mass='a')                             | mass='a' of nonlinear_wave must be a finite
@@ -81,24 +81,24 @@ load('nonlinear_wave', kappa=nan)                            | kappa=nan of nonl
 load('nonlinear_wave', amplitude=huge)                       | amplitude=about 1e400 of nonlinear_wave must
 load('stiff_chain', springs=10**9)                           | HBVM_BENCH_MAX_COMPONENTS
 load('stiff_chain', springs=1)                               | springs=1 of stiff_chain must be a whole
-load('stiff_chain', omega=0)                                 | omega=0 of stiff_chain must be positive
+load('stiff_chain', omega=0)                                 | omega=0 of stiff_chain must be a positive
 load('stiff_chain', omega=1e-320)                            | q0 must be finite, not [1.0, 0.0, 0.0, inf,
 load('cr3bp', loops=5)                                       | loops=5 of cr3bp must be one of 4, 3, 2
 load('cr3bp', loops='4')                                     | loops='4' of cr3bp must be one of 4, 3, 2
 load('cr3bp', loops=4.0)                                     | loops=4.0 of cr3bp must be one of 4, 3, 2
 load('cr3bp', loops=True)                                    | loops=True of cr3bp must be one of 4, 3, 2
-load('cr3bp', mu=2)                                          | mu=2 of cr3bp must lie between 0 and 1
-load('cr3bp', mu=0)                                          | mu=0 of cr3bp must lie between 0 and 1
-load('cr3bp', mu='a')                                        | mu='a' of cr3bp must be a finite number
-load('cr3bp', mu=nan)                                        | mu=nan of cr3bp must be a finite number
+load('cr3bp', mu=2)                                          | mu=2 of cr3bp must be a number between 0 and
+load('cr3bp', mu=0)                                          | mu=0 of cr3bp must be a number between 0 and
+load('cr3bp', mu='a')                                        | mu='a' of cr3bp must be a number between 0
+load('cr3bp', mu=nan)                                        | mu=nan of cr3bp must be a number between 0
 load('sitnikov', e=1.5)                                      | e=1.5 of sitnikov must be an eccentricity, 0
 load('sitnikov', e=1)                                        | e=1 of sitnikov must be an eccentricity, 0 <=
-load('sitnikov', d=0)                                        | d=0 and m3=1e-05 of sitnikov must be positive
-load('sitnikov', d=-5)                                       | d=-5 and m3=1e-05 of sitnikov must be
-load('sitnikov', d='a')                                      | d='a' of sitnikov must be a finite number
-load('sitnikov', d=nan)                                      | d=nan of sitnikov must be a finite number
-load('sitnikov', m3=-1)                                      | d=5.0 and m3=-1 of sitnikov must be positive
-load('sitnikov', m3=0)                                       | d=5.0 and m3=0 of sitnikov must be positive
+load('sitnikov', d=0)                                        | d=0 of sitnikov must be a positive number.
+load('sitnikov', d=-5)                                       | d=-5 of sitnikov must be a positive number.
+load('sitnikov', d='a')                                      | d='a' of sitnikov must be a positive number.
+load('sitnikov', d=nan)                                      | d=nan of sitnikov must be a positive number.
+load('sitnikov', m3=-1)                                      | m3=-1 of sitnikov must be a positive number.
+load('sitnikov', m3=0)                                       | m3=0 of sitnikov must be a positive number.
 load('sitnikov', v3='fast')                                  | v3='fast' of sitnikov must be a finite number
 load('sitnikov', v3=huge)                                    | v3=about 1e400 of sitnikov must be a finite
 load('sitnikov', z3=None)                                    | z3=None of sitnikov must be a finite number
@@ -112,26 +112,26 @@ load('henon_heiles', direction='up')                         | direction='up' of
 load('henon_heiles', direction=nan)                          | direction=nan of henon_heiles must be a
 load('pendulum', q='a')                                      | q='a' of pendulum must be a finite number
 load('pendulum', p=inf)                                      | p=inf of pendulum must be a finite number
-load('double_pendulum', m1=0)                                | m1=0 of double_pendulum must be positive
-load('double_pendulum', l1=-1)                               | l1=-1 of double_pendulum must be positive
+load('double_pendulum', m1=0)                                | m1=0 of double_pendulum must be a positive
+load('double_pendulum', l1=-1)                               | l1=-1 of double_pendulum must be a positive
 load('double_pendulum', g='a')                               | g='a' of double_pendulum must be a finite
 load('double_pendulum', q1=nan)                              | q1=nan of double_pendulum must be a finite
-load('spring_pendulum', k=0)                                 | k=0 of spring_pendulum must be positive
-load('spring_pendulum', m=-1)                                | m=-1 of spring_pendulum must be positive
-load('spring_pendulum', l0=0)                                | l0=0 of spring_pendulum must be positive
+load('spring_pendulum', k=0)                                 | k=0 of spring_pendulum must be a positive
+load('spring_pendulum', m=-1)                                | m=-1 of spring_pendulum must be a positive
+load('spring_pendulum', l0=0)                                | l0=0 of spring_pendulum must be a positive
 load('spring_pendulum', x='a')                               | x='a' of spring_pendulum must be a finite
 load('spring_pendulum', g=nan)                               | g=nan of spring_pendulum must be a finite
-load('morse', D=0)                                           | D=0 of morse must be positive
-load('morse', a=-1)                                          | a=-1 of morse must be positive
-load('morse', m='a')                                         | m='a' of morse must be a finite number
+load('morse', D=0)                                           | D=0 of morse must be a positive number.
+load('morse', a=-1)                                          | a=-1 of morse must be a positive number.
+load('morse', m='a')                                         | m='a' of morse must be a positive number.
 load('morse', q=nan)                                         | q=nan of morse must be a finite number
-load('diatomic', r=0)                                        | r=0 of diatomic must be positive
-load('diatomic', r='a')                                      | r='a' of diatomic must be a finite number
+load('diatomic', r=0)                                        | r=0 of diatomic must be a positive number.
+load('diatomic', r='a')                                      | r='a' of diatomic must be a positive number.
 load('diatomic', vr=nan)                                     | vr=nan of diatomic must be a finite number
 load('charged_particle', charge='a')                         | charge='a' of charged_particle must be a
 load('charged_particle', x=nan)                              | x=nan of charged_particle must be a finite
 load('charged_particle', x=0, y=0)                           | x=0 and y=0 of charged_particle are the
-load('penning_trap', omega_c=0)                              | omega_c=0 of penning_trap must be positive
+load('penning_trap', omega_c=0)                              | omega_c=0 of penning_trap must be a positive
 load('penning_trap', omega_z=10)                             | omega_c=5.0 of penning_trap does not hold the
 load('penning_trap', c4='a')                                 | c4='a' of penning_trap must be a finite
 load('rigid_body', quartic='a')                              | quartic='a' of rigid_body must be a finite
@@ -174,21 +174,21 @@ load('expression', H='q^1e9')                                | cannot read the f
 load('expression', H='q^1000000000')                         | cannot read the formula 'q^1000000000': the
 load('expression', H='q^(1/3)')                              | cannot read the formula 'q^(1/3)': an
 load('expression', H='p9999999^2/2 + q9999999')              | the formula 'p9999999^2/2 + q9999999' has
-load('expression', H='p2^2/2 + q2', q0=[1], p0=[2])          | q0=[1] of expression must be a list of 2
-load('expression', q0='a')                                   | q0='a' of expression must be a list of 1
-load('expression', q0=[nan])                                 | q0=[nan] of expression must be a list of 1
-load('expression', q0=3)                                     | q0=3 of expression must be a list of 1 finite
-load('expression', q0=None)                                  | q0=None of expression must be a list of 1
-load('expression', q0=[1, 2])                                | q0=[1, 2] of expression must be a list of 1
+load('expression', H='p2^2/2 + q2', q0=[1], p0=[2])          | q0=[1.0] of expression must be a list of 2
+load('expression', q0='a')                                   | q0='a' of expression must be a list of
+load('expression', q0=[nan])                                 | q0=[nan] of expression must be a list of
+load('expression', q0=3)                                     | q0=3 of expression must be a list of finite
+load('expression', q0=None)                                  | q0=None of expression must be a list of
+load('expression', q0=[1, 2])                                | q0=[1.0, 2.0] of expression must be a list
 load('expression', p0=[])                                    | p0=[] of expression must be a list of 1
 load('expression', parameters='k')                           | cannot read 'k'; write parameters as "k=2,
 load('expression', parameters='k=a')                         | cannot read 'k=a'; write parameters as "k=2,
 load('expression', parameters='k=1, k=2')                    | the parameter 'k' is given twice
-load('expression', parameters=3)                             | parameters=3 must be text, such as "k=2,
+load('expression', parameters=3)                             | parameters=3 of expression must be text,
 load('expression', parameters='k=1e999')                     | cannot read 'k=1e999'; write parameters as
 load('expression', parameters='k=2')                         | unknown parameter, not in the formula, 'k';
 load('expression', parameters='import=2')                    | unknown parameter, not in the formula,
-load('expression', t_end='a')                                | t0 and t_end must be numbers, not [0.0, 'a']
+load('expression', t_end='a')                                | t_end='a' of expression must be a finite
 """
 
 SYSTEMS = r"""

@@ -6,15 +6,16 @@ from typing import Any
 import msgspec
 import pytest
 
-from hbvm_bench import automatic, cli
-from hbvm_bench.endure import runs as endure
-from hbvm_bench.race import results
-from hbvm_bench.race.contests import CONTESTS
-from hbvm_bench.records import printable
+from hbvm_bench import cli
 from hbvm_bench.report.markdown import code
+from hbvm_bench.store.records import printable
+from hbvm_bench.studies.automatic import runs as automatic
+from hbvm_bench.studies.endure import runs as endure
+from hbvm_bench.studies.race import results
+from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
-from tests.hbvm_bench.race.conftest import made_up as a_race
-from tests.hbvm_bench.test_endure import made as an_endurance
+from tests.hbvm_bench.studies.race.conftest import made_up as a_race
+from tests.hbvm_bench.studies.test_endure import made as an_endurance
 
 ENSEMBLE = """
 name = "both"

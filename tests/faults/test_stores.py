@@ -16,15 +16,16 @@ import pytest
 
 import problems
 from hbvm_bench import cli
-from hbvm_bench.campaign import Campaign, Case, Limits, MethodEntry
-from hbvm_bench.identity import resolve
-from hbvm_bench.measure import measure
-from hbvm_bench.metrics import evaluate
-from hbvm_bench.records import Compile, Record, Result, Timing, TimingRound
-from hbvm_bench.runner import is_kept
-from hbvm_bench.store import NAME_LENGTH, Index, Store, decode_series, encode_series, write_all
-from integrators.integrate import Solution
+from hbvm_bench.campaign.file import Campaign, Case, Limits, MethodEntry
+from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.measure.measured import measure
+from hbvm_bench.measure.metrics import evaluate
+from hbvm_bench.run.loop import is_kept
+from hbvm_bench.store.files import write_all
+from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
+from hbvm_bench.store.store import NAME_LENGTH, Index, Store, decode_series, encode_series
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 
 from .fault import Fault, is_met, sentence
 

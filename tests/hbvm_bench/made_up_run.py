@@ -5,15 +5,15 @@ import dataclasses
 import numpy as np
 
 import problems
-from hbvm_bench import reference
-from hbvm_bench.campaign import Campaign, Case, Grid, MethodEntry
-from hbvm_bench.identity import is_ours, resolve
-from hbvm_bench.measure import measure
-from hbvm_bench.metrics import evaluate, guard_violation
-from hbvm_bench.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.store import Index
-from integrators.integrate import Solution
+from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry
+from hbvm_bench.campaign.identity import is_ours, resolve
+from hbvm_bench.measure.measured import measure
+from hbvm_bench.measure.metrics import evaluate, guard_violation
+from hbvm_bench.reference import solutions
+from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.store import Index
 from integrators.protocol import Stats, Status
+from integrators.solution import Solution
 
 HOSTILE = '<script>alert("1")</script> | `code` *bold* \\ [x](javascript:1) ' + "very long " * 50 + "\n# head"
 METHODS = (
@@ -29,7 +29,7 @@ METHODS = (
 def made_up(method, number):
     """Return a record with the reference's own states, spoilt in a way that depends on the method."""
     problem = problems.load("sitnikov")
-    known = reference.find(problem)
+    known = solutions.find(problem)
     assert known is not None
     resolved = resolve(Case(problem="sitnikov()", method=method, grid=Grid(step=25.0)))
     stalled, lost = method == "IAS15()", method.startswith("Radau")

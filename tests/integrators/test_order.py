@@ -4,31 +4,20 @@ import numpy as np
 import pytest
 
 import integrators
-from integrators import HBVM, Gauss
+from integrators import HBVM, Gauss, testing
+from integrators.testing.convergence import PLATEAU
 
 E = 0.3
 SPAN = 4.0
 
-PLATEAU = 3e-13  # below, the error is rounding
 ASYMPTOTIC = 1e-3  # above, the next term of the error still counts
 COUNTS = np.unique(np.rint(4 * 1.3 ** np.arange(25)).astype(int))  # steps: 4 .. 2169
 
 
 def measured_order(method_of, problem, exact):
-    """Slope of log(error) over log(h), from the last points before the plateau."""
-    points = []
-    for n in COUNTS:
-        solution = integrators.integrate(problem, method_of(SPAN / n), [SPAN])
-        if solution.status.failed:  # a step too large for the iteration
-            continue
-        error = np.abs(solution.y[-1] - exact).max()
-        if error < PLATEAU:
-            break
-        if error < ASYMPTOTIC:
-            points.append((np.log(SPAN / n), np.log(error)))
-    assert len(points) >= 3, f"only {len(points)} points outside the plateau"
-    h, error = np.array(points[-5:]).T
-    return np.polyfit(h, error, 1)[0]
+    return testing.measured_order(
+        method_of, problem, [SPAN / n for n in COUNTS], exact, end=SPAN, asymptotic=ASYMPTOTIC
+    )
 
 
 PAIRS = [(2, 1), (6, 1), (3, 2), (18, 2), (4, 3), (9, 3), (6, 4), (16, 4), (8, 5), (15, 5)]

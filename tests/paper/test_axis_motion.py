@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.paper import axis_motion
-from hbvm_bench.paper.sitnikov_claims import chaotic_from
+from hbvm_bench.studies.paper import axis_motion
+from hbvm_bench.studies.paper.sitnikov_claims import chaotic_from
 from integrators import integrate
 from integrators.hbvm import HBVM
 

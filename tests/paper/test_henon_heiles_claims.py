@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hbvm_bench.paper import henon_heiles as experiment
-from hbvm_bench.paper.henon_heiles_part import kept
+from hbvm_bench.studies.paper import henon_heiles as experiment
+from hbvm_bench.studies.paper.henon_heiles_part import kept
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
 

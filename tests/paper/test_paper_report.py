@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from hbvm_bench.cli import main
-from hbvm_bench.paper import command, others, page, tasks
-from hbvm_bench.paper.departure import departure
-from hbvm_bench.paper.document import Claim, Part, Table, number, sheet
-from hbvm_bench.paper.henon_heiles_figures import fates
-from hbvm_bench.report.canvas import picture
-from hbvm_bench.report.png import small
+from hbvm_bench.commands import paper as command
+from hbvm_bench.report.figures.canvas import picture
+from hbvm_bench.report.figures.png import small
+from hbvm_bench.studies.paper import others, page, tasks
+from hbvm_bench.studies.paper.departure import departure
+from hbvm_bench.studies.paper.document import Claim, Part, Table, number, sheet
+from hbvm_bench.studies.paper.henon_heiles_figures import fates
 from integrators.gauss import Gauss
 from integrators.protocol import Samples, Status
 from problems import Hamiltonian

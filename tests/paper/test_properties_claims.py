@@ -2,8 +2,8 @@
 
 import pytest
 
-from hbvm_bench.paper import properties
-from hbvm_bench.paper.properties_part import COLLOCATED, MAPPED, PAIRS, REVERSED
+from hbvm_bench.studies.paper import properties
+from hbvm_bench.studies.paper.properties_part import COLLOCATED, MAPPED, PAIRS, REVERSED
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.paper import sitnikov
-from hbvm_bench.paper.axis_motion import Growth
-from hbvm_bench.paper.sitnikov_claims import beat, claims, kept, oscillates
-from hbvm_bench.paper.sitnikov_figures import apocentres
+from hbvm_bench.studies.paper import sitnikov
+from hbvm_bench.studies.paper.axis_motion import Growth
+from hbvm_bench.studies.paper.sitnikov_claims import beat, claims, kept, oscillates
+from hbvm_bench.studies.paper.sitnikov_figures import apocentres
 from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM

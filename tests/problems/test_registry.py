@@ -1,5 +1,7 @@
-"""Names under which two distributions offer problems."""
+"""Problems by name: the files of the catalogue, and what other packages offer."""
 
+import subprocess
+import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 
@@ -8,13 +10,28 @@ import pytest
 from problems import registry
 from problems.errors import InputError
 
+GUEST = """
+from problems import Hamiltonian, Problem
+from problems.calls import Positive
+from problems.entry import entry
+
+
+@entry(title="a rotor", references=("somebody",), notes="Turns.", shows=("p",))
+def rotor(*, p: Positive = 1.0, t_end: float = 10.0) -> Problem:
+    return Problem(Hamiltonian(lambda p: p[0] ** 2 / 2, dof=1), q0=[0.0], p0=[p], t_end=t_end)
+
+
+def plain(*, t_end: float = 10.0):
+    return Problem(Hamiltonian(lambda p: p[0] ** 2 / 2, dof=1), q0=[0.0], p0=[1.0], t_end=t_end, name="plain")
+"""
+
 
 @dataclass
 class Distribution:
     name: str
 
 
-def entry(name, value, distribution):
+def offer(name, value, distribution):
     made = EntryPoint(name, value, registry.GROUP)
     vars(made)["dist"] = Distribution(distribution)
     return made
@@ -30,18 +47,55 @@ def offered(monkeypatch):
     registry._entries.cache_clear()
 
 
+@pytest.fixture
+def guest(tmp_path, monkeypatch):
+    (tmp_path / "guest_rotor.py").write_text(GUEST)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield "guest_rotor"
+    sys.modules.pop("guest_rotor", None)
+
+
+def test_every_file_of_the_catalogue_is_a_problem_and_no_package_has_to_say_so(offered):
+    assert len(registry.built_in()) >= 26
+    assert registry.names() == registry.built_in()
+    for name in registry.built_in():
+        make = registry.factory(name)
+        assert (make.__module__, make.__name__) == (f"problems.catalogue.{name}", name)
+        assert registry.entry(name).picture is not None
+        assert registry.entry(name).expected is not None
+
+
+def test_a_problem_is_loaded_without_the_others():
+    code = (
+        "import sys, problems; problems.names(); problems.load('kepler')\n"
+        "print(*(name for name in sys.modules if name.startswith('problems.catalogue.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["problems.catalogue.kepler"]
+
+
 def test_a_name_that_two_offer_is_refused_with_both(offered):
-    offered += [
-        entry("kepler", "problems.catalogue.kepler:kepler", "hbvm-bench"),
-        entry("kepler", "guest.orbits:kepler", "hbvm-guest"),
-        entry("pendulum", "problems.catalogue.pendulum:pendulum", "hbvm-bench"),
-    ]
+    offered.append(offer("kepler", "guest.orbits:kepler", "hbvm-guest"))
     with pytest.raises(InputError, match=r"offered by hbvm-bench \(.*\) and hbvm-guest \(.*\); un"):
         registry.load("kepler")
-    assert registry.names() == ["kepler", "pendulum"]
+    assert registry.names() == registry.built_in()
     assert registry.load("pendulum").system.name == "pendulum"
 
 
-def test_the_same_problem_found_twice_is_one(offered):
-    offered += [entry("pendulum", "problems.catalogue.pendulum:pendulum", "hbvm-bench")] * 2
-    assert registry.load("pendulum").system.name == "pendulum"
+def test_the_same_problem_found_twice_is_one(offered, guest):
+    offered += [offer("plain", f"{guest}:plain", "hbvm-guest")] * 2
+    assert repr(registry.load("plain")) == "plain()"
+
+
+def test_a_guest_may_be_described_like_a_built_in_problem_or_not(offered, guest):
+    offered += [offer(name, f"{guest}:{name}", "hbvm-guest") for name in ("rotor", "plain")]
+    assert repr(registry.load("rotor", t_end=3.0)) == "rotor(p=1.0, t_end=3.0)"
+    assert registry.entry("rotor").title == registry.load("rotor").title == "a rotor"
+    assert registry.entry("plain") is None
+    for name, message in (
+        ("rotor", "unknown argument of rotor 'pp'"),
+        ("plain", "unknown argument of plain 'pp'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            registry.load(name, pp=1.0)
+    assert not {"rotor", "plain"} & set(registry.built_in())

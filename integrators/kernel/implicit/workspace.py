@@ -14,7 +14,7 @@ from integrators.kernel.native import field as fields
 from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table
 from integrators.kernel.tables import packed
 from problems import emit
-from problems.calculus.jacobian import Jacobian, jacobian
+from problems.calculus.jacobian import Jacobian
 from problems.errors import InputError
 from problems.systems.base import System
 
@@ -54,18 +54,17 @@ class Linearization:
 
 def linearization(system: System, *, second: bool) -> Linearization:
     """Compile the Jacobian of a system's field, or of its force, or load it."""
-    what = "jacobian:force" if second else "jacobian"
-    found = jacobian(system, what)
+    found = system.jacobian("force" if second else "field")
     if found is None:
         return Linearization(None, None)
     try:
-        emit.compilable(system, what)
+        emit.compilable(system, found)
     except InputError:  # differences take the field alone
         return Linearization(None, None)
-    text = emit.source(system, what, "numba").text
+    text = emit.source(system, found, "numba").text
     name = store.key("jacobian", text, binary.sources(*fields.SOURCES))
     made = binary.obtain(
-        name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, what).py_func, 1))
+        name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, found).py_func, 1))
     )
     return Linearization(found, made)
 

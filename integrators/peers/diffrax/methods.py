@@ -2,15 +2,14 @@
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from integrators.peers.options import UNTRACED, number
+from integrators.options import NotNegative, Share, Step
+from integrators.peers import UNTRACED
+from integrators.peers.diffrax.steps import DiffraxProgram
 from integrators.protocol import MethodBase
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-if TYPE_CHECKING:
-    from integrators.peers.diffrax.steps import DiffraxProgram
 
 NO_FMA = ("xla_cpu_max_isa=AVX ", "xla_cpu_max_isa=SSE4_2 ")
 """Settings of XLA_FLAGS, followed by a space, with which XLA has no instruction that fuses."""
@@ -58,15 +57,20 @@ class DiffraxMethod(MethodBase):
             "breaks the problem's symmetry; XLA_FLAGS=--xla_cpu_max_isa=AVX in the environment prevents it."
         )
 
-    def compile(self, system: System) -> "DiffraxProgram":
+    def compile(self, system: System) -> DiffraxProgram:
         """Have JAX compile the solve for ``system``."""
-        from integrators.peers.diffrax.steps import DiffraxProgram
-
         return DiffraxProgram(system, self)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class SemiImplicitEuler(DiffraxMethod):
+class _FixedMethod(DiffraxMethod):
+    h: Step
+
+    evaluations = 1
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class SemiImplicitEuler(_FixedMethod):
     """diffrax's semi-implicit Euler method, its only symplectic one: q from p, then p from the new q.
 
     Parameters
@@ -75,18 +79,8 @@ class SemiImplicitEuler(DiffraxMethod):
         Length of a step, > 0.
     """
 
-    h: float
-
-    evaluations = 1
+    order = 1
     family = "splitting"
-
-    def __post_init__(self) -> None:
-        number(self, "h")
-
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 1
 
     def refuses(self, system: System) -> str | None:
         """Return None for H = sum of c p^2/2 + V(q, t), else the reason."""
@@ -98,7 +92,7 @@ class SemiImplicitEuler(DiffraxMethod):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class LeapfrogMidpoint(DiffraxMethod):
+class LeapfrogMidpoint(_FixedMethod):
     """diffrax's leapfrog/midpoint method, y_{n+1} = y_{n-1} + 2 h f(y_n): order 2, not symplectic.
 
     A sample between steps uses the same formula with a shorter last step.
@@ -109,9 +103,7 @@ class LeapfrogMidpoint(DiffraxMethod):
         Length of a step, > 0.
     """
 
-    h: float
-
-    evaluations = 1
+    order = 2
     family = "multistep"
     citation = (
         KIDGER
@@ -128,17 +120,9 @@ class LeapfrogMidpoint(DiffraxMethod):
 """
     )
 
-    def __post_init__(self) -> None:
-        number(self, "h")
-
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 2
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class ReversibleHeun(DiffraxMethod):
+class ReversibleHeun(_FixedMethod):
     """diffrax's reversible Heun method: order 2, algebraically reversible in its pair of states.
 
     Parameters
@@ -147,9 +131,7 @@ class ReversibleHeun(DiffraxMethod):
         Length of a step, > 0.
     """
 
-    h: float
-
-    evaluations = 1
+    order = 2
     family = "reversible"
     citation = (
         KIDGER
@@ -162,14 +144,6 @@ class ReversibleHeun(DiffraxMethod):
 }
 """
     )
-
-    def __post_init__(self) -> None:
-        number(self, "h")
-
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 2
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -192,10 +166,11 @@ class Dopri8(DiffraxMethod):
     steps that are taken without samples.
     """
 
-    h: float | None = None
-    rtol: float | None = None
-    atol: float | None = None
+    h: Step | None = None
+    rtol: Share | None = None
+    atol: NotNegative | None = None
 
+    order = 8
     evaluations = 13
     family = "runge-kutta"
     citation = (
@@ -214,19 +189,10 @@ class Dopri8(DiffraxMethod):
     )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         tolerances = self.rtol is not None or self.atol is not None
         if (self.h is None) != tolerances or (tolerances and (self.rtol is None or self.atol is None)):
             raise InputError(
                 "Dopri8 needs either h, as in Dopri8(h=0.1), or both tolerances, as in "
                 f"Dopri8(rtol=1e-9, atol=1e-12), not h={self.h!r}, rtol={self.rtol!r}, atol={self.atol!r}."
             )
-        if self.h is not None:
-            number(self, "h")
-        else:
-            number(self, "rtol", below=1.0)
-            number(self, "atol", strict=False)
-
-    @property
-    def order(self) -> int:
-        """Order of convergence."""
-        return 8

@@ -4,12 +4,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from integrators.peers.diffrax.methods import DiffraxMethod, Dopri8
-from integrators.peers.options import load
-from integrators.protocol import Array, Status, Stepper
-from integrators.stepping import FixedStepper, PeerProgram, PeerStepper
+from integrators.peers import load
+from integrators.protocol import Array, MethodBase, Status
+from integrators.stepping import FixedStepper, ProgramBase, StepperBase
 from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.errors import InputError
 from problems.problem import System
@@ -18,22 +16,22 @@ CHUNK = 1 << 18
 """Fixed steps between two looks at Ctrl-C: so many that the 0.1 ms of a call into JAX is nothing."""
 
 
-class DiffraxProgram(PeerProgram):
+class DiffraxProgram(ProgramBase):
     """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
 
     Compiled code is kept while the process lives; ``from_cache`` says whether it was there.
+    The method is one of `integrators.peers.diffrax.methods`, named as diffrax's solver.
     """
 
-    def __init__(self, system: System, method: DiffraxMethod):
+    def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
-        reason = method.refuses(system)
+        reason = self.method.refuses(system)
         if reason is not None:
             raise InputError(f"{method!r} cannot integrate {system.name}: {reason}")
         load("diffrax", "diffrax", "jax")
         from integrators.peers.diffrax import solve
 
-        self.method, self.solve = method, solve
-        self.adaptive = isinstance(method, Dopri8) and method.h is None
+        self.solve, self.adaptive = solve, self.method.h is None
         made, self.from_cache = self.made(1)
         self.compile_seconds = 0.0 if self.from_cache else made.seconds
 
@@ -41,17 +39,15 @@ class DiffraxProgram(PeerProgram):
         """Return the compiled solve for a direction of time, and whether it was there already."""
         return self.solve.made(self.system, type(self.method).__name__, sign, self.adaptive)
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
-        """Return a stepper at ``t0``; see the protocol."""
-        arguments = self.arguments(y0, par, t0)
-        kind = AdaptiveStepper if self.adaptive else DiffraxStepper
-        return self.started(kind(self, *arguments), arguments[1])
+    def stepper(self, y: Array, par: Array, t: float) -> StepperBase:
+        """Return a trajectory."""
+        return (AdaptiveStepper if self.adaptive else DiffraxStepper)(self, y, par, t)
 
 
 class _Direction:
     """The compiled solve for one direction of time; what it cost to compile is noted with the statistics."""
 
-    def __init__(self, stepper: PeerStepper, program: DiffraxProgram, sign: int):
+    def __init__(self, stepper: StepperBase, program: DiffraxProgram, sign: int):
         self.sign = sign
         self.solve, known = program.made(sign)
         if not known:
@@ -72,11 +68,8 @@ class DiffraxStepper(FixedStepper):
     samplings = (*FixedStepper.samplings, "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
-        h = float(program.method.h)  # pyright: ignore[reportAttributeAccessIssue]
-        super().__init__(y, t, h)
-        self._program, self._par = program, par
-        self._restart(t, y, h)
-        self._stats.evaluations = 0
+        super().__init__(program, y, par, t)
+        self._restart(t, y, self._h)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         self._way = _Direction(self, self._program, 1 if h > 0.0 else -1)
@@ -93,8 +86,7 @@ class DiffraxStepper(FixedStepper):
             t, y = end, np.asarray(found) if arrived else np.full(y.size, np.nan)
             states[i] = y
             self._stats.steps += int(accepted)
-            work = int(accepted) * self._program.method.evaluations
-            self._stats.evaluations = (self._stats.evaluations or 0) + work
+            self._evaluated(int(accepted))
             self._t0, self._n, self._states, self._inner = t, 0, y, None
             if not math.isfinite(y.sum()):
                 return grid[: i + 1], states[: i + 1]
@@ -119,7 +111,7 @@ class DiffraxStepper(FixedStepper):
         end = self._n + count
         for n in range(self._n, end, CHUNK):
             self._states, self._inner = self._solve(self._t0, self._h, n, min(n + CHUNK, end))
-        self._stats.evaluations = (self._stats.evaluations or 0) + count * self._program.method.evaluations
+        self._evaluated(count)
 
     def _state(self) -> Array:
         return self._states.copy()
@@ -129,7 +121,7 @@ class DiffraxStepper(FixedStepper):
 
     def _shorten(self, part: float) -> None:
         self._states, self._inner = self._solve(self._time(), part, 0, 1)
-        self._stats.evaluations = (self._stats.evaluations or 0) + self._program.method.evaluations
+        self._evaluated(1)
 
     def _save_steps(self) -> Any:
         # JAX's arrays are immutable.
@@ -139,7 +131,7 @@ class DiffraxStepper(FixedStepper):
         self._way, self._states, self._inner = steps
 
 
-class AdaptiveStepper(PeerStepper):
+class AdaptiveStepper(StepperBase):
     """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
 
     ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain
@@ -151,7 +143,7 @@ class AdaptiveStepper(PeerStepper):
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._program, self._par = program, par
-        self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)  # pyright: ignore[reportAttributeAccessIssue]
+        self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)
         self._stats.rejections = self._stats.evaluations = 0
         self._begin(1)
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.peers.options import load
-from integrators.protocol import Array, Status, check_batch, check_times
-from integrators.trajectories import Counts, Trajectories
+from integrators.peers import load
+from integrators.protocol import Array, Status, Trajectories, check_batch, check_times
+from integrators.times import Counts
 from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems import emit
 from problems.systems.base import System

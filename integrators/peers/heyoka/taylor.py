@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.caveats import unseen
+from integrators.options import Share
+from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
-from integrators.peers.options import UNTRACED, flag, load, number
-from integrators.protocol import Array, MethodBase, Status
-from integrators.stepping import PeerProgram, PeerStepper
-from integrators.trajectories import Trajectories
+from integrators.protocol import Array, MethodBase, Status, Trajectories
+from integrators.stepping import ProgramBase, StepperBase
 from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.problem import Problem, System
 
@@ -72,7 +72,7 @@ class Taylor(MethodBase):
     heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
     """
 
-    tol: float = EPS
+    tol: Share = EPS
     high_accuracy: bool = False
     compact_mode: bool = False
     fast_math: bool = False
@@ -81,15 +81,6 @@ class Taylor(MethodBase):
     citation = CITATION
     family = "taylor"
     to_end = "land"
-
-    def __post_init__(self) -> None:
-        number(self, "tol", below=1.0)
-        flag(self, "high_accuracy", "compact_mode", "fast_math")
-
-    @property
-    def order(self) -> None:
-        """The order varies with the tolerance."""
-        return None
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system that is traced."""
@@ -104,7 +95,7 @@ class Taylor(MethodBase):
         return TaylorProgram(system, self)
 
 
-class TaylorProgram(PeerProgram):
+class TaylorProgram(ProgramBase):
     """A heyoka integrator, compiled for one system; each start has a copy, or one that another is done with.
 
     heyoka keeps compiled code in memory and on disk (``~/.cache/heyoka``).
@@ -174,13 +165,12 @@ class TaylorProgram(PeerProgram):
             self.compile_seconds += self._lanes.compile_seconds
         return self._lanes.prepare(Y0, par, times, t0)
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> "TaylorStepper":
-        """Return a stepper at ``t0``; see the protocol."""
-        arguments = self.arguments(y0, par, t0)
+    def stepper(self, y: Array, par: Array, t: float) -> "TaylorStepper":
+        """Return a trajectory."""
         integrator = self._spare.pop() if self._spare else copy.copy(self.template)
-        stepper = TaylorStepper(integrator, *arguments)
+        stepper = TaylorStepper(integrator, y, par, t)
         weakref.finalize(stepper, self._spare.append, integrator).atexit = False
-        return self.started(stepper, arguments[1])
+        return stepper
 
 
 @contextmanager
@@ -198,7 +188,7 @@ def _caches(hy: Any) -> Iterator[bool]:
         hy.llvm_state.set_diskcache_enabled(enabled)
 
 
-class TaylorStepper(PeerStepper):
+class TaylorStepper(StepperBase):
     """A trajectory of heyoka's; ``"side"`` (default), ``"steps"`` or ``"land"``, see `Taylor`."""
 
     samplings = ("side", "steps", "land")

@@ -1,21 +1,22 @@
 """REBOUND's methods of fixed step: WHFast and the leapfrogs."""
 
-import operator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from integrators.peers.options import choice, flag, number, whole_choice
+from integrators.options import Step
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.protocol import Array
 from integrators.stepping import FixedStepper
+from problems.checks import refusal, whole
 from problems.errors import InputError
 from problems.problem import Problem, System
 
-COORDINATES = ("jacobi", "democraticheliocentric", "whds", "barycentric")
-KERNELS = ("default", "modifiedkick", "composition", "lazy")
-CORRECTORS = (0, 3, 5, 7, 11, 17)
+Coordinates = Literal["jacobi", "democraticheliocentric", "whds", "barycentric"]
+Kernel = Literal["default", "modifiedkick", "composition", "lazy"]
+Corrector = Literal[0, 3, 5, 7, 11, 17]
 EVALUATIONS = {2: 1, 4: 3, 6: 9, 8: 17}
 """Force evaluations in a step of the leapfrog of each order."""
 
@@ -71,8 +72,28 @@ LEAPFROG = """\
 """
 
 
+class _Permutation:
+    def checked(self, owner: str, name: str, value: Any) -> tuple[int, ...]:
+        places = [whole(i) for i in value] if isinstance(value, Sequence | np.ndarray) else []
+        found = tuple(i for i in places if i is not None)
+        if not found or sorted(found) != list(range(len(places))):
+            raise refusal(owner, name, value, "a list that names each body from 0 once, as in (2, 0, 1)")
+        return found
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class WHFast(ReboundMethod):
+class FixedMethod(ReboundMethod):
+    """What REBOUND's methods of fixed step share."""
+
+    h: Step
+
+    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
+        """Return a trajectory."""
+        return ReboundStepper(program, layout, y, t)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WHFast(FixedMethod):
     """REBOUND's WHFast: the symplectic Wisdom-Holman splitting into Kepler orbits and a perturbation.
 
     Made for planets about one dominant body; `caveat` says where a problem is not that.
@@ -100,23 +121,19 @@ class WHFast(ReboundMethod):
     (``keep_unsynchronized``), so that samples do not change the trajectory.
     """
 
-    h: float
-    coordinates: str = "jacobi"
-    corrector: int = 0
+    coordinates: Coordinates = "jacobi"
+    corrector: Corrector = 0
     corrector2: bool = False
-    kernel: str = "default"
-    body_order: tuple[int, ...] | None = None
+    kernel: Kernel = "default"
+    body_order: Annotated[tuple[int, ...], _Permutation()] | None = None
 
+    order = 2  # in h, at a fixed perturbation
     citation = REBOUND + WHFAST
     family = "wisdom-holman"
     to_end = "land"
 
     def __post_init__(self) -> None:
-        number(self, "h")
-        choice(self, "coordinates", COORDINATES)
-        choice(self, "kernel", KERNELS)
-        whole_choice(self, "corrector", CORRECTORS)
-        flag(self, "corrector2")
+        super().__post_init__()
         jacobi = self.coordinates == "jacobi"
         if self.kernel != "default" and not jacobi:
             raise InputError(f'WHFast has kernel={self.kernel!r} in coordinates="jacobi" only.')
@@ -126,13 +143,6 @@ class WHFast(ReboundMethod):
             )
         if self.corrector2 and not jacobi:
             raise InputError('WHFast has corrector2=True in coordinates="jacobi" only.')
-        if self.body_order is not None:
-            object.__setattr__(self, "body_order", _permutation(self.body_order))
-
-    @property
-    def order(self) -> int:
-        """Order of convergence in h at a fixed perturbation."""
-        return 2
 
     def refuses(self, system: System, par: Array) -> str | None:
         """Return why not: it needs gravitating bodies, as many as ``body_order`` has."""
@@ -148,10 +158,6 @@ class WHFast(ReboundMethod):
     def order_of_bodies(self, n: int) -> list[int]:
         """Return which body is REBOUND's first, second, ..."""
         return list(range(n)) if self.body_order is None else list(self.body_order)
-
-    def compile(self, system: System) -> ReboundProgram:
-        """Prepare for ``system``; nothing of REBOUND's is compiled."""
-        return ReboundProgram(system, self)
 
     def caveat(self, problem: Problem) -> str | None:
         """Say why a problem is outside what WHFast was made for, although it runs."""
@@ -183,13 +189,9 @@ class WHFast(ReboundMethod):
         chosen.corrector, chosen.corrector2 = self.corrector, int(self.corrector2)
         chosen.safe_mode, chosen.keep_unsynchronized = 0, 1
 
-    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
-        """Return a trajectory."""
-        return ReboundStepper(program, layout, y, t, self.h)
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Leapfrog(ReboundMethod):
+class Leapfrog(FixedMethod):
     """REBOUND's leapfrog, drift-kick-drift, and its compositions of order 4, 6 and 8; symplectic.
 
     Parameters
@@ -200,38 +202,25 @@ class Leapfrog(ReboundMethod):
         Order of convergence; a step takes 1, 3, 9 or 17 force evaluations.
     """
 
-    h: float
-    order: int = 2  # pyright: ignore[reportIncompatibleMethodOverride, reportAssignmentType]
+    order: Literal[2, 4, 6, 8] = 2
 
     citation = REBOUND + LEAPFROG
     family = "splitting"
     to_end = "land"
 
-    def __post_init__(self) -> None:
-        number(self, "h")
-        whole_choice(self, "order", EVALUATIONS)
-
-    def compile(self, system: System) -> ReboundProgram:
-        """Compile the forces of ``system``, unless REBOUND has them."""
-        return ReboundProgram(system, self)
-
     def set_up(self, simulation: Any) -> None:
         """Choose the leapfrog and its order."""
         choose(simulation, "leapfrog").order = self.order
-
-    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
-        """Return a trajectory."""
-        return ReboundStepper(program, layout, y, t, self.h)
 
 
 class ReboundStepper(FixedStepper):
     """A trajectory with fixed steps; see `integrators.stepping.FixedStepper` for the sampling."""
 
-    def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float, h: float):
-        super().__init__(y, t, h)
-        self._program, self._layout = program, layout
+    def __init__(self, program: ReboundProgram, layout: Layout, y: Array, t: float):
+        super().__init__(program, y, layout.par, t)
+        self._layout = layout
         self._block, self._spare = (program.hooks.Block(layout.numbers) for _ in range(2))
-        self._restart(t, y, h)
+        self._restart(t, y, self._h)
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         simulation = self._program.simulation(self._layout, t, y)
@@ -283,19 +272,6 @@ class ReboundStepper(FixedStepper):
 
     def _load_steps(self, steps: bytes) -> None:
         self._use(self._program.rebound.Simulation(steps))
-
-
-def _permutation(order: Any) -> tuple[int, ...]:
-    """Return a body order as a tuple, or refuse it."""
-    try:
-        places = tuple(operator.index(i) for i in order)
-    except TypeError:
-        places = ()
-    if not places or sorted(places) != list(range(len(places))):
-        raise InputError(
-            f"body_order must name each body from 0 once, as in (2, 0, 1), not body_order={order!r}."
-        )
-    return places
 
 
 def _radial(layout: Layout, y: Array) -> list[int]:

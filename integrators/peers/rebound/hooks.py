@@ -17,7 +17,7 @@ from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from integrators.peers.options import load
+from integrators.peers import load
 from integrators.protocol import Array
 from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
 

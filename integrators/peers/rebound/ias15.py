@@ -2,19 +2,19 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from integrators.peers.options import choice, number
+from integrators.options import NotNegative, Step
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.protocol import Array, Status
-from integrators.stepping import PeerStepper
+from integrators.stepping import StepperBase
 from integrators.watchdog import CRAWL_STEPS
 from problems.errors import InputError
-from problems.problem import Problem, System
+from problems.problem import Problem
 
-MODES = ("prs23", "global", "individual", "aarseth85")
+Mode = Literal["prs23", "global", "individual", "aarseth85"]
 
 CITATION = """\
 @article{ReinSpiegel2015,
@@ -68,31 +68,19 @@ class IAS15(ReboundMethod):
     more than three the criteria that go by particle depend on this grouping.
     """
 
-    epsilon: float = 1e-9
-    mode: str = "prs23"
-    min_dt: float = 0.0
-    h: float | None = None
+    epsilon: NotNegative = 1e-9
+    mode: Mode = "prs23"
+    min_dt: NotNegative = 0.0
+    h: Step | None = None
 
+    order = 15  # at a fixed step
     citation = REBOUND + CITATION
     family = "gauss-radau"
 
     def __post_init__(self) -> None:
-        number(self, "epsilon", strict=False)
-        number(self, "min_dt", strict=False)
-        choice(self, "mode", MODES)
-        if self.h is not None:
-            number(self, "h")
-        elif self.epsilon == 0.0:
+        super().__post_init__()
+        if self.h is None and self.epsilon == 0.0:
             raise InputError("IAS15 with epsilon=0 takes fixed steps; give their length, h=...")
-
-    @property
-    def order(self) -> int:
-        """Order of convergence at a fixed step."""
-        return 15
-
-    def compile(self, system: System) -> ReboundProgram:
-        """Compile the callbacks for ``system``."""
-        return ReboundProgram(system, self)
 
     def caveat(self, problem: Problem) -> str | None:
         """Say where the step criterion goes by particles that the problem does not have."""
@@ -123,7 +111,7 @@ class IAS15(ReboundMethod):
         return IAS15Stepper(program, layout, self, y, t)
 
 
-class IAS15Stepper(PeerStepper):
+class IAS15Stepper(StepperBase):
     """A trajectory of IAS15: ``"land"`` (default) or ``"steps"``."""
 
     samplings = ("land", "steps")

@@ -10,11 +10,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from integrators.peers.options import load
-from integrators.protocol import Array, MethodBase, Stats, Stepper
-from integrators.stepping import PeerProgram, PeerStepper
+from integrators.peers import load
+from integrators.protocol import Array, MethodBase, Stats
+from integrators.stepping import ProgramBase, StepperBase
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -57,6 +57,10 @@ class ReboundMethod(MethodBase):
             )
         return None
 
+    def compile(self, system: System) -> "ReboundProgram":
+        """Compile the callbacks, and the forces of ``system`` unless REBOUND has them."""
+        return ReboundProgram(system, self)
+
     def set_up(self, simulation: Any) -> None:
         """Choose REBOUND's integrator and its options; the name first, which resets the options."""
         raise NotImplementedError
@@ -65,12 +69,12 @@ class ReboundMethod(MethodBase):
         """Return which body is REBOUND's first, second, ..."""
         return list(range(n))
 
-    def stepper(self, program: "ReboundProgram", layout: "Layout", y: Array, t: float) -> PeerStepper:
+    def stepper(self, program: "ReboundProgram", layout: "Layout", y: Array, t: float) -> StepperBase:
         """Return a trajectory."""
         raise NotImplementedError
 
 
-class ReboundProgram(PeerProgram):
+class ReboundProgram(ProgramBase):
     """How one system becomes a REBOUND simulation.
 
     Gravitating bodies are left to REBOUND's own direct summation; each start checks
@@ -98,22 +102,21 @@ class ReboundProgram(PeerProgram):
             self.from_cache = hooks.forces.cache_info().hits > known
         self.compile_seconds = perf_counter() - started
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> Stepper:
-        """Return a stepper at ``t0``; see the protocol.
+    def stepper(self, y: Array, par: Array, t: float) -> StepperBase:
+        """Return a trajectory.
 
         Raises
         ------
         problems.errors.InputError
-            Also if the system declares bodies whose gravity its forces are not.
+            If the system declares bodies whose gravity its forces are not.
         """
-        y, values, t = self.arguments(y0, par, t0)
-        reason = self.method.refuses(self.system, values)
+        reason = self.method.refuses(self.system, par)
         if reason is not None:
             raise InputError(f"{self.method!r} cannot integrate {self.system.name}: {reason}")
-        layout = Layout(self.system, values, self.method)
+        layout = Layout(self.system, par, self.method)
         if layout.bodies is not None:
             self._check_gravity(layout, t, y)
-        return self.started(self.method.stepper(self, layout, y, t), values)
+        return self.method.stepper(self, layout, y, t)
 
     def simulation(self, layout: "Layout", t: float, y: Array) -> Any:
         """Return a simulation at ``t`` in the state ``y``, without callbacks."""

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
-from integrators.peers.options import load, number, whole_choice
-from integrators.peers.rebound.fixed import WHFAST, ReboundStepper, WHFast
-from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
+from integrators.peers import load
+from integrators.peers.rebound.fixed import WHFAST, FixedMethod, ReboundStepper, WHFast
+from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, calls, choose
 from integrators.protocol import Array
 from problems.problem import Problem, System
 
@@ -24,7 +24,7 @@ ROOM = 64
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class WHFast512(ReboundMethod):
+class WHFast512(FixedMethod):
     """REBOUND's WHFast512: the Wisdom-Holman splitting in Jacobi coordinates, on AVX-512 registers.
 
     Parameters
@@ -43,20 +43,11 @@ class WHFast512(ReboundMethod):
     correction is off. `WHFast.caveat` says where a problem is outside its domain.
     """
 
-    h: float
-    corrector: int = 0
+    corrector: Literal[0, 17] = 0
 
+    order = 2  # in h, at a fixed perturbation
     citation = REBOUND + WHFAST
     family = "wisdom-holman"
-
-    def __post_init__(self) -> None:
-        number(self, "h")
-        whole_choice(self, "corrector", (0, 17))
-
-    @property
-    def order(self) -> int:
-        """Order of convergence in h at a fixed perturbation."""
-        return 2
 
     def refuses(self, system: System, par: Array) -> str | None:
         """Return why not: too many bodies, none, or a processor without AVX-512."""
@@ -83,7 +74,7 @@ class WHFast512(ReboundMethod):
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "Stepper512":
         """Return a trajectory."""
-        return Stepper512(program, layout, y, t, self.h)
+        return Stepper512(program, layout, y, t)
 
 
 class ScaledProgram(ReboundProgram):

@@ -20,8 +20,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from integrators.legendre import tables
-from integrators.peers.options import load
+from integrators.legendre import polynomials, tables
+from integrators.peers import load
 from problems.errors import InputError
 
 load("diffrax", "diffrax", "equinox", "jax", "lineax", "optimistix")
@@ -33,9 +33,9 @@ import jax.numpy as jnp  # noqa: E402
 import lineax as lx  # noqa: E402
 import optimistix as optx  # noqa: E402
 
+from integrators.plugins.diffrax.arithmetic import add, apply, real  # noqa: E402
 from integrators.plugins.diffrax.fixed_point import FixedPoint  # noqa: E402
 from integrators.plugins.diffrax.interpolation import LegendreInterpolation  # noqa: E402
-from integrators.plugins.diffrax.legendre import add, apply, basis, real  # noqa: E402
 
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
@@ -121,7 +121,7 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         guessed = (ratio > 0.0) & (ratio <= FARTHEST) & ~jnp.asarray(made_jump)
         ratio = jnp.where(guessed, ratio, 0.0)
         nodes, projection = (jnp.asarray(x.hi, ratio.dtype) for x in (table.nodes, table.projection))
-        beyond = jnp.stack(basis(1.0 + ratio * nodes, modes), axis=1)
+        beyond = jnp.stack(polynomials(1.0 + ratio * nodes, modes), axis=1)
         matrix = jnp.where(guessed, ratio * (projection @ beyond), 0.0)
         guess = jax.tree.map(lambda G: apply(matrix, G[:modes]), before.coefficients)
         return jax.lax.stop_gradient(guess), guessed
@@ -138,7 +138,7 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
             next_row = tables(self.k, self.s + 1).projection.hi[self.s]
             beyond = jax.tree.map(lambda f: apply(next_row[None], f)[0], values)
         else:
-            start = np.array([(-1.0) ** j * np.sqrt(2.0 * j + 1.0) for j in range(self.s + 1)])
+            start = np.array(polynomials(0.0, self.s + 1))
             field = terms.vf_prod(t0, y0, args, control)
             beyond = jax.tree.map(
                 lambda f, g: (f - apply(start[None, :-1], g)[0]) / float(start[-1]), field, G

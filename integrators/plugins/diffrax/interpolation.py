@@ -6,7 +6,8 @@ import diffrax as dx
 import jax
 import jax.numpy as jnp
 
-from integrators.plugins.diffrax.legendre import apply, integrals
+from integrators.legendre import integrated, polynomials
+from integrators.plugins.diffrax.arithmetic import apply
 
 
 class LegendreInterpolation(dx.AbstractLocalInterpolation):
@@ -26,9 +27,9 @@ class LegendreInterpolation(dx.AbstractLocalInterpolation):
         if t1 is not None:
             return jax.tree.map(lambda b, a: b - a, self.evaluate(t1), self.evaluate(t0))
         span = self.t1 - self.t0
-        c = (t0 - self.t0) / jnp.where(span == 0.0, 1.0, span)
+        c = jnp.asarray((t0 - self.t0) / jnp.where(span == 0.0, 1.0, span))
 
         def value(y: Any, G: Any) -> Any:
-            return y + apply(jnp.stack(integrals(c, G.shape[0]))[None], G)[0]
+            return y + apply(jnp.stack(integrated(polynomials(c, G.shape[0] + 1)))[None], G)[0]
 
         return jax.tree.map(value, self.y0, self.coefficients)

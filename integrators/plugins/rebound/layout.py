@@ -2,7 +2,7 @@
 
 import ctypes
 
-from integrators.peers.options import load
+from integrators.peers import load
 
 rebound = load("rebound")
 

@@ -11,154 +11,40 @@ of a problem, the steps are the kernel's.
 """
 
 import warnings
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
-from scipy.integrate._ivp import common
 
-from integrators.options import length, whole
+from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
+from problems.checks import checked
 from problems.errors import InputError
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
 
+FLOOR = 100.0 * float(np.finfo(float).eps)
+"""The smallest ``rtol``, as of SciPy's own methods."""
+
 Array = NDArray[Any]
 
 
-class _Steps(Protocol):
-    """What takes the steps: compiled code, or Python."""
+def _counter(name: str) -> Any:
+    """Return a property for a counter of SciPy's: what Python has counted, and what the kernel has so far."""
 
-    k: int
+    def get(solver: "HBVM") -> int:
+        return solver._counted.get(name, 0) + getattr(solver._steps, name, 0)
 
-    @property
-    def evaluations(self) -> int: ...
-    @property
-    def jacobians(self) -> int: ...
-    @property
-    def factorizations(self) -> int: ...
-    def take(self, t: float, y: Array) -> tuple[float, Array] | str: ...
-    def dense_output(self) -> DenseOutput: ...
+    def put(solver: "HBVM", count: int) -> None:
+        solver._counted[name] = count - getattr(solver._steps, name, 0)
+
+    return property(get, put)
 
 
-class _LineIntegral(OdeSolver):
-    """What HBVM and Gauss share: options, counters, and the choice of what takes the steps."""
-
-    def __init__(
-        self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: Any, rtol: Any, atol: Any, jac: Any,
-        jac_sparsity: Any, vectorized: bool, first_step: float | None, k: int | None, s: int,
-        h: float | None, every: int, interpolant: str,
-    ) -> None:  # fmt: skip
-        self._steps: _Steps | None = None
-        self._calls = 0
-        real = not np.iscomplexobj(y0)
-        compiled = recognised(fun, np.size(y0), vectorized=vectorized) if real else None
-        super().__init__(compiled or fun, t0, y0, t_bound, vectorized, support_complex=True)
-        name = type(self).__name__
-        self.s, every = whole(name, "s", s), whole(name, "every", every)
-        k = None if k is None else whole(name, "k", k)
-        if k is not None and k < self.s:
-            raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
-        if interpolant not in ("step", "polynomial"):
-            raise InputError(f"interpolant must be 'step' or 'polynomial', not {interpolant!r}.")
-        self.max_step = common.validate_max_step(max_step)
-        self.rtol, self.atol = common.validate_tol(rtol, atol, self.n)
-        if first_step is not None:
-            first_step = common.validate_first_step(first_step, t0, t_bound)
-        if h is not None:
-            h = length(name, h)
-            if k is None:
-                raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
-            if first_step is not None or self.max_step < np.inf:
-                raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
-        one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
-        if compiled is not None and t0 != t_bound and not one_stage:
-            if interpolant != "step":
-                raise InputError(
-                    "interpolant='polynomial' is for functions in Python; with a compiled field states "
-                    "between the steps come from the kernel's own steps: leave it out."
-                )
-            self._steps = self._native(fun, compiled, k, h, first_step, every)
-        if self._steps is None:
-            if every != 1:
-                raise InputError(
-                    f"every={every} is for compiled fields, whose steps cost less than SciPy's loop over "
-                    "them; leave it out, or compile the function with numba."
-                )
-            self._steps = PythonSteps(
-                self, compiled or fun, k=k, s=self.s, h=h, first_step=first_step, jac=jac,
-                jac_sparsity=jac_sparsity, interpolant=interpolant,
-            )  # fmt: skip
-
-    def _native(
-        self, fun: Any, compiled: Field, k: int | None, h: float | None, first_step: float | None, every: int
-    ) -> NativeSteps | None:
-        """Return steps in compiled code; ``None``, with a warning, if numba cannot compile the function."""
-        from numba.core.errors import NumbaError
-
-        try:
-            return NativeSteps(
-                compiled, self.t, self.y, self.t_bound, k=k, s=self.s, h=h, tol=float(np.min(self.rtol)),
-                first_step=first_step, max_step=self.max_step, every=every,
-            )  # fmt: skip
-        except NumbaError as error:
-            reason = str(error).strip().splitlines()[0]
-            message = f"{fun!r} cannot be compiled for an array of {self.n} numbers: {reason}"
-            if compiled is fun or getattr(compiled.system, "in_place", False):
-                raise InputError(message) from error
-            warnings.warn(f"{message} Its steps are taken in Python.", stacklevel=4)
-            return None
-
-    @property
-    def k(self) -> int:
-        """Nodes of the quadrature in use."""
-        assert self._steps is not None
-        return self._steps.k
-
-    @property
-    def nfev(self) -> int:
-        """States at which the function was evaluated."""
-        return self._calls + (0 if self._steps is None else self._steps.evaluations)
-
-    @nfev.setter
-    def nfev(self, count: int) -> None:
-        self._calls += count - self.nfev
-
-    @property
-    def njev(self) -> int:
-        """Evaluations of the Jacobian."""
-        return 0 if self._steps is None else self._steps.jacobians
-
-    @njev.setter
-    def njev(self, count: int) -> None:
-        """Leave it to the steps to count."""
-
-    @property
-    def nlu(self) -> int:
-        """Factorisations."""
-        return 0 if self._steps is None else self._steps.factorizations
-
-    @nlu.setter
-    def nlu(self, count: int) -> None:
-        """Leave it to the steps to count."""
-
-    def _step_impl(self) -> tuple[bool, str | None]:
-        assert self._steps is not None
-        made = self._steps.take(self.t, self.y)
-        if isinstance(made, str):
-            return False, made
-        self.t, self.y = made
-        return True, None
-
-    def _dense_output_impl(self) -> DenseOutput:
-        assert self._steps is not None
-        return self._steps.dense_output()
-
-
-class HBVM(_LineIntegral):
+class HBVM(OdeSolver):
     """HBVM(k, s), which conserves the energy: ``solve_ivp(fun, t_span, y0, method=HBVM)``.
 
     Equations and properties: see `integrators.HBVM`.
@@ -188,8 +74,8 @@ class HBVM(_LineIntegral):
     h : float, optional
         Length of all steps but the last, > 0, whatever the tolerances; k is then to be given.
     every : int
-        Of a compiled field's steps every which is one for SciPy. A step of the kernel costs less
-        than SciPy's loop over them; states between them are still to be had by ``t_eval`` and
+        How many steps of the kernel SciPy sees as one, for compiled fields: SciPy's loop costs more
+        than such a step does. States between them are still to be had by ``t_eval`` and
         ``dense_output``, but an event that happens and is undone again within one is missed.
     interpolant : {"step", "polynomial"}
         How states between the steps (``t_eval``, ``dense_output``, ``events``) are made: by
@@ -202,20 +88,110 @@ class HBVM(_LineIntegral):
         States at which ``fun`` was evaluated, also where one call evaluates several.
     """
 
+    nfev, njev, nlu = map(_counter, ("nfev", "njev", "nlu"))
+
     def __init__(
         self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: float = np.inf, rtol: Any = 1e-3,
         atol: Any = 1e-6, jac: Any = None, jac_sparsity: Any = None, vectorized: bool = False,
         first_step: float | None = None, k: int | None = None, s: int = 6, h: float | None = None,
         every: int = 1, interpolant: str = "step", **extraneous: Any,
     ) -> None:  # fmt: skip
-        common.warn_extraneous(extraneous)
-        super().__init__(
-            fun, t0, y0, t_bound, max_step, rtol, atol, jac, jac_sparsity, vectorized, first_step,
-            k, s, h, every, interpolant,
-        )  # fmt: skip
+        name = type(self).__name__
+        if extraneous:
+            warnings.warn(f"{name} has no option {', '.join(extraneous)}: it has no effect.", stacklevel=2)
+        self._steps: NativeSteps | PythonSteps | None = None
+        self._counted: dict[str, int] = {}
+        real = not np.iscomplexobj(y0)
+        compiled = recognised(fun, np.size(y0), vectorized=vectorized) if real else None
+        super().__init__(compiled or fun, t0, y0, t_bound, vectorized, support_complex=True)
+        self.s, every = checked(name, "s", s, Stages), checked(name, "every", every, Count)
+        k = checked(name, "k", k, Stages | None)
+        if k is not None and k < self.s:
+            raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
+        if interpolant not in ("step", "polynomial"):
+            raise InputError(f"interpolant must be 'step' or 'polynomial', not {interpolant!r}.")
+        self._bound(max_step, first_step, rtol, atol)
+        if h is not None:
+            h = checked(name, "h", h, Step)
+            if k is None:
+                raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
+            if first_step is not None or self.max_step < np.inf:
+                raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
+        one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
+        if compiled is not None and t0 != t_bound and not one_stage:
+            if interpolant != "step":
+                raise InputError(
+                    "interpolant='polynomial' is for functions in Python; with a compiled field states "
+                    "between the steps come from the kernel's own steps: leave it out."
+                )
+            self._steps = self._native(fun, compiled, k, h, first_step, every)
+        if self._steps is None:
+            if every != 1:
+                raise InputError(
+                    f"every={every} is for compiled fields, whose steps cost less than SciPy's loop over "
+                    "them; leave it out, or compile the function with numba."
+                )
+            self._steps = PythonSteps(
+                self, k=k, s=self.s, h=h, first_step=first_step, jac=jac, jac_sparsity=jac_sparsity,
+                interpolant=interpolant,
+            )  # fmt: skip
+
+    def _bound(self, max_step: float, first_step: float | None, rtol: Any, atol: Any) -> None:
+        """Keep the bounds of steps and errors, or refuse them."""
+        span = abs(self.t_bound - self.t)
+        if not max_step > 0.0:
+            raise InputError(f"max_step={max_step!r} must be > 0; leave it out for steps of any length.")
+        if first_step is not None and not 0.0 < first_step <= span:
+            raise InputError(
+                f"first_step={first_step!r} must be > 0 and not beyond the end, {span!r} from the start."
+            )
+        if np.any(np.asarray(rtol) < FLOOR):
+            warnings.warn(
+                f"At least one element of rtol={rtol!r} is too small: {FLOOR:.3g} takes its place.",
+                stacklevel=3,
+            )
+        self.max_step, self.rtol, self.atol = max_step, np.maximum(rtol, FLOOR), np.asarray(atol)
+        if self.atol.ndim > 0 and self.atol.shape != (self.n,):
+            raise InputError(f"atol of shape {self.atol.shape} must be a number, or have shape ({self.n},).")
+        if not np.all(self.atol >= 0.0):
+            raise InputError(f"atol={atol!r} must be >= 0.")
+
+    def _native(
+        self, fun: Any, compiled: Field, k: int | None, h: float | None, first_step: float | None, every: int
+    ) -> NativeSteps | None:
+        """Return steps in compiled code; ``None``, with a warning, if numba cannot compile the function."""
+        from numba.core.errors import NumbaError
+
+        try:
+            return NativeSteps(self, compiled, k=k, s=self.s, h=h, first_step=first_step, every=every)
+        except NumbaError as error:
+            reason = str(error).strip().splitlines()[0]
+            message = f"{fun!r} cannot be compiled for an array of {self.n} numbers: {reason}"
+            if compiled is fun or getattr(compiled.system, "in_place", False):
+                raise InputError(message) from error
+            warnings.warn(f"{message} Its steps are taken in Python.", stacklevel=3)
+            return None
+
+    @property
+    def k(self) -> int:
+        """Nodes of the quadrature in use."""
+        assert self._steps is not None
+        return self._steps.k
+
+    def _step_impl(self) -> tuple[bool, str | None]:
+        assert self._steps is not None
+        made = self._steps.take(self.t, self.y)
+        if isinstance(made, str):
+            return False, made
+        self.t, self.y = made
+        return True, None
+
+    def _dense_output_impl(self) -> DenseOutput:
+        assert self._steps is not None
+        return self._steps.dense_output()
 
 
-class Gauss(_LineIntegral):
+class Gauss(HBVM):
     """Gauss(s), collocation at the Gauss nodes, which is HBVM(s, s): ``solve_ivp(..., method=Gauss)``.
 
     Symplectic with constant steps, ``h=...``; with adaptive ones it keeps the energy no
@@ -224,14 +200,7 @@ class Gauss(_LineIntegral):
     Python function as in the kernel. Parameters as for `HBVM`, without k.
     """
 
-    def __init__(
-        self, fun: Any, t0: float, y0: Any, t_bound: float, max_step: float = np.inf, rtol: Any = 1e-3,
-        atol: Any = 1e-6, jac: Any = None, jac_sparsity: Any = None, vectorized: bool = False,
-        first_step: float | None = None, s: int = 6, h: float | None = None, every: int = 1,
-        interpolant: str = "step", **extraneous: Any,
-    ) -> None:  # fmt: skip
-        common.warn_extraneous(extraneous)
-        super().__init__(
-            fun, t0, y0, t_bound, max_step, rtol, atol, jac, jac_sparsity, vectorized, first_step,
-            s, s, h, every, interpolant,
-        )  # fmt: skip
+    def __init__(self, fun: Any, t0: float, y0: Any, t_bound: float, *, s: int = 6, **options: Any) -> None:
+        if "k" in options:
+            raise InputError(f"Gauss has s={s!r} nodes, no k: leave out k={options['k']!r}, or take HBVM.")
+        super().__init__(fun, t0, y0, t_bound, k=s, s=s, **options)

@@ -30,12 +30,10 @@ class NativeSteps:
 
     Parameters
     ----------
+    solver : OdeSolver
+        At its start, with ``rtol`` and ``max_step``.
     field : Field
         The field and its parameters.
-    t, y : float, ndarray of shape (n,)
-        The start.
-    t_bound : float
-        Where it ends.
     k : int or None
         Nodes of the quadrature; ``None``: a multiple of the stages that the field takes at a
         time, and steps short enough for them to see the energy to round-off.
@@ -43,12 +41,8 @@ class NativeSteps:
         Degree.
     h : float or None
         Length of all steps; ``None``: as long as the tolerance allows.
-    tol : float
-        Local error of a step, relative to the size of each block of the state.
     first_step : float or None
         Length of the first step to try.
-    max_step : float
-        Length that no step exceeds.
     every : int
         Steps of the kernel that count as one.
 
@@ -59,15 +53,17 @@ class NativeSteps:
     """
 
     def __init__(
-        self, field: Field, t: float, y: Array, t_bound: float, *, k: int | None, s: int, h: float | None,
-        tol: float, first_step: float | None, max_step: float, every: int,
+        self, solver: Any, field: Field, *, k: int | None, s: int, h: float | None,
+        first_step: float | None, every: int,
     ) -> None:  # fmt: skip
+        t, y, t_bound = solver.t, solver.y, solver.t_bound
         defect = None
         if k is None:
             k, defect = nodes(field.system, s)
-        self.k, self._field, self._every, self._longest = k, field, every, max_step
+        self.k, self._field, self._every, self._longest = k, field, every, solver.max_step
         self._t_bound = t_bound
         if h is None:
+            tol = float(np.min(solver.rtol))
             program = _program(field.system, k, s, first_step, tol, defect)
             self._program_between = _program(field.system, k, s, BEYOND, None, None)
         else:
@@ -81,18 +77,18 @@ class NativeSteps:
         self._made = Samples(np.empty(0), np.empty((0, y.size)), Status.RUNNING)
 
     @property
-    def evaluations(self) -> int:
+    def nfev(self) -> int:
         """States at which the field was evaluated."""
         between = 0 if self._between is None else self._between.evaluations
         return self._chosen + int(self._stepper.stats.evaluations) + between
 
     @property
-    def jacobians(self) -> int:
+    def njev(self) -> int:
         """Evaluations of the Jacobian."""
         return int(self._stepper.stats.extra.get("implicit", {}).get("jacobians", 0))
 
     @property
-    def factorizations(self) -> int:
+    def nlu(self) -> int:
         """Factorisations."""
         return int(self._stepper.stats.extra.get("implicit", {}).get("factorizations", 0))
 

@@ -1,24 +1,30 @@
-"""Steps in Python for a function in Python: length, solver and number of nodes are found as they go."""
+"""Steps in Python for a function in Python: length, solver and number of nodes are found as they go.
 
-from functools import partial
+The kernel can call such a function back (`problems.systems.untraced.Foreign`), and these steps stay apart
+from it because that was measured. For the same call the kernel takes 1.3 to 2.5 times as long on ten
+periods of Kepler's orbit (with the leanest callback that can be written, two thirds), 4 to 6 times on a
+short integration, since each new function makes a new program, 2 to 3 times for 1,000 components, whose
+stages a vectorized function takes in one call, and 10 to 20 times for stiff problems, whose Jacobian the
+user may know. Besides, in the kernel states are real, tolerances are relative to the state, and what the
+function raises does not arrive as it is.
+"""
+
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
-from scipy.integrate._ivp import common
 
-from integrators.legendre import x_matrix
-from integrators.plugins.scipy.jacobian import Jacobian, size
-from integrators.plugins.scipy.output import PolynomialOutput, StepOutput
-from integrators.plugins.scipy.stages import Newton, Solved, Stages
+from integrators.legendre import legendre_integrals
+from integrators.plugins.scipy.newton import Newton
+from integrators.plugins.scipy.stages import Solved, Stages
 
 SAFETY = 0.9
 SHRINK, GROW = 0.2, 10.0  # bounds of the change of the step
 CONTRACTION = 0.35  # of the fixed-point iteration: beyond it, shorter steps cost less
 STIFF = 4.0  # Newton when the tolerance permits steps so much longer than the fixed point does
 STIFF_STEPS = 3  # for so many steps in a row
-MILD = 0.25  # the fixed point again when h ||J|| times the largest eigenvalue of X_s is below
+MILD = 0.25  # the fixed point again when it contracts by this at least
 SLOW = 0.1  # rate of Newton's iteration above which the Jacobian is too old
 KEEP = 1.2  # Newton's factorisations are kept when the step could only grow by less
 NEWTON_ITERATIONS = 12
@@ -36,9 +42,7 @@ class PythonSteps:
     Parameters
     ----------
     solver : OdeSolver
-        At its start, with ``rtol``, ``atol`` and ``max_step``.
-    fun : callable
-        As the user gave it.
+        At its start, with ``rtol``, ``atol`` and ``max_step``; its counters count.
     k : int or None
         Nodes of the quadrature; ``None``: 2s, and more as soon as that would not see the
         energy to round-off.
@@ -50,87 +54,55 @@ class PythonSteps:
         As for `scipy.integrate.Radau`.
     interpolant : {"step", "polynomial"}
         How states between the steps are made.
-
-    Attributes
-    ----------
-    k : int
-        Nodes in use.
     """
 
     def __init__(
-        self, solver: Any, fun: Any, *, k: int | None, s: int, h: float | None, first_step: float | None,
+        self, solver: Any, *, k: int | None, s: int, h: float | None, first_step: float | None,
         jac: Any, jac_sparsity: Any, interpolant: str,
     ) -> None:  # fmt: skip
-        t, y = solver.t, solver.y
-        self.k, self._s, self._automatic, self._interpolant = (
-            2 * s if k is None else k,
-            s,
-            k is None,
-            interpolant,
-        )
-        self._given, self._fun, self._vectorized = fun, solver.fun, solver.vectorized
-        self._direction, self._t_bound, self._max_step = solver.direction, solver.t_bound, solver.max_step
-        self._rtol, self._atol = solver.rtol, solver.atol
-        self._dtype = complex if np.iscomplexobj(y) else float
-        self._start, self._count = t, 0
-        self._constant = 0.0 if h is None else h * self._direction
-        self._f: Array | None = self._fun(t, y)
-        if h is not None:
-            self.h_abs = h
-        elif first_step is None:
-            self.h_abs = common.select_initial_step(
-                self._fun, t, y, self._t_bound, self._max_step, self._f, self._direction, 2 * s,
-                self._rtol, self._atol,
-            )  # fmt: skip
-        else:
-            self.h_abs = first_step
+        self._solver, self._s, self._automatic = solver, s, k is None
+        self._by_a_step = interpolant == "step"
+        self._stages = Stages(solver, 2 * s if k is None else k, s)
         # Of the estimate of a step's error; without gamma_s it is one of a lower order.
-        self._order = 2 * s - 1 if self.k == s > 1 else 2 * s + 1
-        self._stages: Stages | None = None
-        self._jacobian = Jacobian(solver.fun_vectorized, y.size, self._dtype, self._atol, jac, jac_sparsity)
-        self._newton: Newton | None = None
-        self._J: Any = None
-        self._J_current = False
-        self._limited = 0
-        self._radius = float(np.abs(np.linalg.eigvals(x_matrix(s))).max())
-        self._e = np.zeros_like(y)
-        self._G = np.zeros((s, y.size), self._dtype)
-        self._h = 0.0
-        self._error_old = 0.0
-        self._step: tuple[float, float, Array, Array, Array, Array] | None = None
+        self._order = 2 * s - 1 if k == s > 1 else 2 * s + 1
+        self._newton = Newton(solver, s, jac, jac_sparsity)
+        self._stiff = False
+        self._limited = 0  # steps in a row that only the fixed point keeps so short
+        self._constant = None if h is None else h * solver.direction
+        self._start, self._count = solver.t, 0  # of steps of constant length
+        self._length = first_step
+        self._f: Array | None = None
+        self._e = np.zeros_like(solver.y)
+        self._G = np.zeros((s, solver.n), solver.y.dtype)
+        self._h = self._error_old = 0.0
+        self._output: DenseOutput | None = None
 
     @property
-    def evaluations(self) -> int:
-        """States at which the function was evaluated besides those that the solver counts."""
-        return 0 if self._stages is None else self._stages.evaluations
-
-    @property
-    def jacobians(self) -> int:
-        """Evaluations of the Jacobian."""
-        return self._jacobian.evaluations
-
-    @property
-    def factorizations(self) -> int:
-        """Factorisations."""
-        return self._jacobian.factorizations
+    def k(self) -> int:
+        """Nodes in use."""
+        return self._stages.k
 
     def take(self, t: float, y: Array) -> tuple[float, Array] | str:
         """Take a step from (t, y), which is where the last one ended; return time and state, or why not."""
-        e = self._e
-        if self._constant:
-            return self._take_constant(t, y, e)
-        least = 10 * abs(np.nextafter(t, self._direction * np.inf) - t)
-        h_abs = self._max_step if self.h_abs > self._max_step else max(self.h_abs, least)
+        if self._output is None and self._solver.vectorized:
+            self._stages.try_together(t, self._first(t, y), y, self._slope(t, y))
+        made = self._varying(t, y) if self._constant is None else self._of_constant_length(t, y)
+        return made if isinstance(made, str) else (made[0], self._add(t, *made, y))
+
+    def _varying(self, t: float, y: Array) -> tuple[float, Solved] | str:
+        """Solve for a step that the tolerances allow; return its end and solution, or why there is none."""
+        solver = self._solver
+        least = 10 * abs(np.nextafter(t, solver.direction * np.inf) - t)
+        h_abs = self._first(t, y)
+        h_abs = solver.max_step if h_abs > solver.max_step else max(h_abs, least)
         rejected = False
-        while True:
-            if not h_abs >= least:
-                return OdeSolver.TOO_SMALL_STEP
-            t_new = t + h_abs * self._direction
-            if self._direction * (t_new - self._t_bound) > 0.0:
-                t_new = self._t_bound
+        while h_abs >= least:
+            t_new = t + h_abs * solver.direction
+            if solver.direction * (t_new - solver.t_bound) > 0.0:
+                t_new = solver.t_bound
             h = t_new - t
             h_abs = abs(h)
-            solved = self._solve(t, h, y, e)
+            solved = self._solve(t, h, y)
             if not solved.converged:
                 h_abs, rejected = 0.5 * h_abs, True
                 continue
@@ -138,38 +110,59 @@ class PythonSteps:
             if not error <= 1.0:
                 wanted = SAFETY * error ** (-1.0 / self._order) if np.isfinite(error) else SHRINK
                 h_abs, rejected = h_abs * max(SHRINK, wanted), True
-                continue
-            if self._automatic and not self._seen(solved):
-                self._raise_k(t, h)
-                continue
-            break
-        self.h_abs = h_abs * self._factor(h_abs, error, solved.rate, rejected)
-        self._error_old = error
-        return t_new, self._add(t, t_new, y, e, solved)
+            elif self._automatic and not self._seen(solved):
+                self._stages = self._stages.with_nodes(min(self.k + max(2, self.k // 4), MOST_NODES))
+            else:
+                self._length = h_abs * self._factor(h_abs, error, solved.rate, rejected)
+                self._error_old = error
+                return t_new, solved
+        return OdeSolver.TOO_SMALL_STEP
 
-    def _take_constant(self, t: float, y: Array, e: Array) -> tuple[float, Array] | str:
-        """Take a step of the length given, or what is left of it."""
-        t_new = self._start + (self._count + 1) * self._constant
-        if self._direction * (t_new - self._t_bound) > -CLOSE * abs(self._constant):
-            t_new = self._t_bound
-        solved = self._solve(t, t_new - t, y, e)
+    def _of_constant_length(self, t: float, y: Array) -> tuple[float, Solved] | str:
+        """Solve for a step of the length given, or what is left of it; return as `_varying`."""
+        h, bound = self._constant, self._solver.t_bound
+        assert h is not None
+        t_new = self._start + (self._count + 1) * h
+        if self._solver.direction * (t_new - bound) > -CLOSE * abs(h):
+            t_new = bound
+        solved = self._solve(t, t_new - t, y)
         if not solved.converged:
             return (
                 f"the stage equations have not been solved in the step from t = {t!r}, "
-                f"h = {abs(self._constant)!r}; take a smaller h."
+                f"h = {abs(h)!r}; take a smaller h."
             )
         self._count += 1
-        return t_new, self._add(t, t_new, y, e, solved)
+        return t_new, solved
 
-    def _add(self, t: float, t_new: float, y: Array, e: Array, solved: Solved) -> Array:
+    def _add(self, t: float, t_new: float, solved: Solved, y: Array) -> Array:
         """Return the state at the end of a solved step, with what rounding leaves of it kept."""
-        increment = solved.G[0] + e
+        increment = solved.G[0] + self._e
         new = y + increment
         part = new - y
-        self._step = (t, t_new, y, e, solved.G, new)
+        self._output = Output(self._stages, t, t_new, y, self._e, solved.G, new, by_a_step=self._by_a_step)
         self._e = (y - (new - part)) + (increment - part)
         self._G, self._h, self._f = solved.G, t_new - t, None
         return new
+
+    def _first(self, t: float, y: Array) -> float:
+        """Return the length of the next step to try, which at the start is chosen.
+
+        By E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, section II.4.
+        """
+        if self._constant is not None:
+            return abs(self._constant)
+        if self._length is not None:
+            return self._length
+        solver, f = self._solver, self._slope(t, y)
+        span, scale = abs(solver.t_bound - t), solver.atol + np.abs(y) * solver.rtol
+        size, slope = norm(y / scale), norm(f / scale)
+        h = min(0.01 * size / slope if min(size, slope) >= 1e-5 else 1e-6, span)
+        signed = h * solver.direction
+        bend = norm((solver.fun(t + signed, y + signed * f) - f) / scale) / h
+        fastest = max(slope, bend)
+        wanted = (0.01 / fastest) ** (1.0 / (2 * self._s + 1)) if fastest > 1e-15 else max(1e-6, 1e-3 * h)
+        self._length = min(100.0 * h, wanted, span, solver.max_step)
+        return self._length
 
     def _factor(self, h_abs: float, error: float, rate: float, rejected: bool) -> float:
         """Return by how much the next step is longer: predictive control, and what the solver needs."""
@@ -178,85 +171,97 @@ class PythonSteps:
         if self._error_old > 0.0 and error > 0.0 and self._h:
             factor = min(factor, factor * h_abs / abs(self._h) * (self._error_old / error) ** (1.0 / order))
         factor = min(GROW, max(SHRINK, factor), 1.0 if rejected else GROW)
-        if self._newton is not None:
-            self._J_current = self._jacobian.constant
-            if rate > SLOW and not self._jacobian.constant:
-                self._J = None
-            elif 1.0 <= factor < KEEP:
-                factor = 1.0
-            return factor
+        newton = self._newton
+        if self._stiff:
+            newton.current = newton.constant
+            newton.old = rate > SLOW and not newton.constant
+            return 1.0 if not newton.old and 1.0 <= factor < KEEP else factor
         permitted = CONTRACTION / rate if rate > 0.0 else GROW
         self._limited = self._limited + 1 if factor > STIFF * permitted else 0
         return max(SHRINK, min(factor, permitted))
 
-    def _solve(self, t: float, h: float, y: Array, e: Array) -> Solved:
+    def _solve(self, t: float, h: float, y: Array) -> Solved:
         """Solve the stage equations of a step, by the solver that suits."""
-        stages = self._ready(t, h, y)
+        stages, newton, e = self._stages, self._newton, self._e
         guess = stages.guess(self._G, h / self._h if self._h else 0.0)
-        if self._newton is None and self._limited < STIFF_STEPS:
+        if not self._stiff and self._limited < STIFF_STEPS:
             solved = stages.solve(t, h, y, e, guess)
             if solved.converged or not self._h:
                 return solved
             return stages.solve(t, h, y, e, np.zeros_like(guess))
-        if self._newton is None:
-            self._newton, self._J = Newton(self._s, real=self._dtype is float), None
+        newton.old, self._stiff = newton.old or not self._stiff, True
         while True:
-            if self._J is None:
-                self._J, self._J_current = self._jacobian(t, y, self._slope(t, y)), True
-                self._newton.h = 0.0
-            if abs(h) * size(self._J) * self._radius < MILD:
-                self._newton, self._limited = None, 0
+            if newton.old:
+                newton.linearize(t, y, self._slope(t, y), h)
+            if newton.stiffness(h) < MILD:
+                self._stiff, self._limited = False, 0
                 return stages.solve(t, h, y, e, guess)
-            if self._newton.h != h:
-                self._newton.factorize(h, partial(self._jacobian.factorize, self._J))
-            solved = stages.solve(t, h, y, e, guess, self._newton.correct, NEWTON_ITERATIONS)
-            if solved.converged or self._J_current:
+            newton.factorize(h)
+            solved = stages.solve(t, h, y, e, guess, newton.correct, NEWTON_ITERATIONS)
+            if solved.converged or newton.current:
                 return solved
-            self._J = None
-
-    def _ready(self, t: float, h: float, y: Array) -> Stages:
-        """Return the stages, made at the first step, which tells where the function may be tried."""
-        if self._stages is None:
-            self._stages = Stages(self._given, self._dtype, self.k, self._s, vectorized=self._vectorized)
-            if self._vectorized:
-                self._stages.try_together(t, h, y, self._slope(t, y))
-        return self._stages
+            newton.old = True
 
     def _slope(self, t: float, y: Array) -> Array:
         """Return f at the start of the step, evaluated at most once."""
-        f = self._fun(t, y) if self._f is None else self._f
-        self._f = f
+        self._f = f = self._solver.fun(t, y) if self._f is None else self._f
         return f
 
     def _error(self, t: float, h: float, y: Array, solved: Solved) -> float:
         """Return the size of ``h |gamma|^2 / |gamma_0|``, gamma the last known, in units of the tolerance."""
-        stages = self._stages
-        assert stages is not None
-        last = stages.last_coefficient(solved, h * self._slope(t, y) if self.k == 1 else None)
-        scale = self._atol + np.maximum(np.abs(y), np.abs(y + solved.G[0])) * self._rtol
+        last = self._stages.last_coefficient(solved, h * self._slope(t, y) if self.k == 1 else None)
+        largest = np.maximum(np.abs(y), np.abs(y + solved.G[0]))
+        scale = self._solver.atol + largest * self._solver.rtol
         with np.errstate(divide="ignore", invalid="ignore"):
-            top, bottom = common.norm(last / scale), common.norm(solved.G[0] / scale)
-            return 0.0 if top == 0.0 else float(top * top / bottom)
+            top, bottom = norm(last / scale), norm(solved.G[0] / scale)
+            return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
 
     def _seen(self, solved: Solved) -> bool:
         """Whether k nodes see the energy to round-off: the coefficients have decayed to the root of it."""
-        assert self._stages is not None
         if self.k + 2 > MOST_NODES:
             return True
         sizes = np.abs(self._stages.coefficients(solved.values))
         top = sizes.max(axis=0)
         return bool((sizes[-2:] <= UNSEEN * np.maximum(top, 1e-3 * top.max())).all())
 
-    def _raise_k(self, t: float, h: float) -> None:
-        """Go on with more nodes."""
-        assert self._stages is not None
-        self.k = min(self.k + max(2, self.k // 4), MOST_NODES)
-        self._stages = self._stages.with_nodes(self.k)
-
     def dense_output(self) -> DenseOutput:
         """Return the states between the present one and the one before."""
-        assert self._stages is not None
-        assert self._step is not None
-        output = StepOutput if self._interpolant == "step" else PolynomialOutput
-        t_old, t, y, e, G, new = self._step
-        return output(self._stages, t_old, t, y, e, G, new)
+        assert self._output is not None
+        return self._output
+
+
+class Output(DenseOutput):
+    """States within a step from (t_old, y) to (t, end), e the compensation and G the coefficients.
+
+    ``by_a_step``, a throw-away step from the start of the step to each time: order 2s, and the
+    energy is kept. Otherwise the polynomial of the step: free, of order s + 1 inside the step, where it does
+    not keep the energy.
+    """
+
+    def __init__(
+        self, stages: Stages, t_old: float, t: float, y: Array, e: Array, G: Array, end: Array, *,
+        by_a_step: bool,
+    ) -> None:  # fmt: skip
+        super().__init__(t_old, t)
+        self._stages, self._y, self._e, self._G, self._end = stages, y, e, G, end
+        self._by_a_step = by_a_step
+
+    def _call_impl(self, t: Array) -> Array:
+        states = np.array([self._at(time) for time in np.atleast_1d(t).tolist()]).reshape(t.size, -1).T
+        return states[:, 0] if t.ndim == 0 else states
+
+    def _at(self, t: float) -> Array:
+        if t in (self.t_old, self.t):
+            return self._y if t == self.t_old else self._end
+        c = (t - self.t_old) / (self.t - self.t_old)
+        if self._by_a_step:
+            guess = self._stages.within(self._G, c)
+            solved = self._stages.solve(self.t_old, t - self.t_old, self._y, self._e, guess)
+            if solved.converged:
+                return self._y + (self._e + solved.G[0])
+        return self._y + (self._e + (legendre_integrals(np.array([c]), len(self._G)) @ self._G)[0])
+
+
+def norm(x: Array) -> float:
+    """Return the root of the mean square."""
+    return float(np.linalg.norm(x)) / x.size**0.5

@@ -1,4 +1,4 @@
-"""The stage equations of HBVM(k, s) for a function in Python: fixed point, Newton, error estimate.
+"""The stage equations of HBVM(k, s) for a function in Python, solved to round-off.
 
 The unknowns are ``G_j = h gamma_j``, shape (s, n), real or complex, with the stages
 ``Y = y + (e + I G)`` and the equations ``G = h P' Omega f(t + c h, Y)``.
@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import OdeSolver
 
-from integrators.legendre import legendre, tables, x_matrix, xi
+from integrators.legendre import legendre, tables
 
 CONVERGED = 1e-16
 STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
@@ -23,8 +24,7 @@ MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding 
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 SQRT3 = float(np.sqrt(3.0))
 
-Complex = NDArray[Any]
-Function = Callable[[Any, Complex], Complex]
+Array = NDArray[Any]
 
 
 @dataclass
@@ -40,49 +40,41 @@ class Solved:
     converged : bool
         Whether the equations are solved to round-off.
     rate : float
-        By how much a change was smaller than the one before, at best.
+        The largest ratio of a change to the one before it, old ratios counting half as much each time.
     """
 
-    G: Complex
-    values: Complex
+    G: Array
+    values: Array
     converged: bool
     rate: float
 
 
 class Stages:
-    """HBVM(k, s) for one function; counts the states at which it was evaluated.
+    """HBVM(k, s) for the function of a solver.
 
     Parameters
     ----------
-    fun : callable
-        ``fun(t, y) -> (n,)``.
-    dtype : type
-        float or complex.
-    vectorized : bool
-        Whether ``fun`` takes and returns columns, (n, m).
+    solver : OdeSolver
+        Whose function it is; its ``nfev`` counts the states at which it is evaluated.
+    k, s : int
+        Nodes of the quadrature and degree.
+    together : bool
+        Whether the function takes all stages, as columns, and their times in one call.
     """
 
-    def __init__(self, fun: Function, dtype: type, k: int, s: int, *, vectorized: bool = False) -> None:
-        self.fun, self.dtype, self.vectorized, self.together = fun, dtype, vectorized, False
-        self.evaluations = 0
-        self.k, self.s = k, s
+    def __init__(self, solver: OdeSolver, k: int, s: int, *, together: bool = False) -> None:
+        self.solver, self.k, self.s, self.together = solver, k, s, together
         table = tables(k, s)
-        self.nodes, self.integrals, self.projection = (
-            table.nodes.hi,
-            table.integrals.hi,
-            table.projection.hi,
-        )
-        self.modes = min(s, MODES)
-        # P_s at the nodes, where it vanishes with k = s.
-        self.beyond = tables(k, s + 1).projection.hi[s] if k > s else None
+        self.nodes, self.integrals = table.nodes.hi, table.integrals.hi
+        self.projection = table.projection.hi
+        # P_s at the nodes, where it vanishes with k = s; then P_{s-1}.
+        self.beyond = tables(k, min(s + 1, k)).projection.hi[-1]
 
     def with_nodes(self, k: int) -> "Stages":
-        """Return the same with another number of nodes; the count goes on."""
-        other = Stages(self.fun, self.dtype, k, self.s, vectorized=self.vectorized)
-        other.together, other.evaluations = self.together, self.evaluations
-        return other
+        """Return the same with another number of nodes."""
+        return Stages(self.solver, k, self.s, together=self.together)
 
-    def try_together(self, t: float, h: float, y: Complex, f: Complex) -> None:
+    def try_together(self, t: float, h: float, y: Array, f: Array) -> None:
         """Find out whether a vectorized function takes k times with k columns, and use it if so."""
         Y = y + np.outer(self.nodes * h, f)
         apart = self.field(t, h, Y)
@@ -94,23 +86,20 @@ class Stages:
         except Exception:  # whatever the function makes of times that it was not promised
             self.together = False
 
-    def field(self, t: float, h: float, Y: Complex) -> Complex:
+    def field(self, t: float, h: float, Y: Array) -> Array:
         """Return h f at the stages Y, shape (k, n)."""
-        self.evaluations += len(Y)
+        self.solver.nfev += len(Y)
         times = t + self.nodes * h
         if self.together:
-            return h * np.asarray(self.fun(times, np.ascontiguousarray(Y.T)), dtype=self.dtype).T
-        values = np.empty_like(Y)
+            return h * self.solver.fun_vectorized(times, np.ascontiguousarray(Y.T)).T
+        values, fun = np.empty_like(Y), self.solver.fun_single
         for i, time in enumerate(times.tolist()):
-            if self.vectorized:
-                values[i] = np.asarray(self.fun(time, Y[i][:, None]), dtype=self.dtype).ravel()
-            else:
-                values[i] = np.asarray(self.fun(time, Y[i]), dtype=self.dtype)
+            values[i] = fun(time, Y[i])
         return h * values
 
     def solve(
-        self, t: float, h: float, y: Complex, e: Complex, G: Complex,
-        correct: Callable[[Complex], Complex] | None = None, most: int = MAX_ITERATIONS,
+        self, t: float, h: float, y: Array, e: Array, G: Array,
+        correct: Callable[[Array], Array] | None = None, most: int = MAX_ITERATIONS,
     ) -> Solved:  # fmt: skip
         """Solve the stage equations from a first guess ``G``.
 
@@ -125,12 +114,12 @@ class Stages:
         correct : callable, optional
             Newton's correction for a residual (s, n); ``None``: fixed point.
         most : int
-            Iterations after which it has failed.
+            Iterations after which it has failed if changes are still above `STAGNATION`.
         """
         best, last, stalled, rate = np.inf, np.inf, 0, 0.0
-        values = np.empty((self.k, y.size), self.dtype)
+        values = np.empty((self.k, y.size), y.dtype)
         size_y = np.abs(y)
-        for iteration in range(most):
+        for iteration in range(MAX_ITERATIONS):
             values = self.field(t, h, y + (e + self.integrals @ G))
             residual = self.projection @ values - G
             if correct is not None and np.isfinite(residual).all():
@@ -154,95 +143,35 @@ class Stages:
             if best < STAGNATION:
                 if stalled >= PATIENCE + iteration // 16:
                     return Solved(G, values, True, rate)
-            elif stalled >= HOPELESS:
+            elif stalled >= HOPELESS or iteration + 1 == most:
                 return Solved(G, values, False, np.inf)
             if iteration and floored > STAGNATION:
                 rate = floored / last if iteration == 1 else max(0.5 * rate, floored / last)
             last = floored
         return Solved(G, values, False, max(rate, 1.0))
 
-    def guess(self, G: Complex, ratio: float) -> Complex:
+    def guess(self, G: Array, ratio: float) -> Array:
         """Extrapolate the previous step's polynomial (coefficients G) to a step ``ratio`` times as long."""
         if not 0.0 < ratio <= FARTHEST:
             return np.zeros_like(G)
-        beyond = legendre(1.0 + ratio * self.nodes, self.modes)
-        return ratio * (self.projection @ (beyond @ G[: self.modes]))
+        modes = min(self.s, MODES)
+        return ratio * (self.projection @ (legendre(1.0 + ratio * self.nodes, modes) @ G[:modes]))
 
-    def within(self, G: Complex, part: float) -> Complex:
+    def within(self, G: Array, part: float) -> Array:
         """Return the coefficients of the first ``part`` of a step's polynomial, of coefficients G."""
         return part * (self.projection @ (legendre(part * self.nodes, self.s) @ G))
 
-    def last_coefficient(self, solved: Solved, start: Complex | None) -> Complex:
+    def last_coefficient(self, solved: Solved, start: Array | None) -> Array:
         """Return the last Legendre coefficient by which a step may be judged, times h.
 
         gamma_s where k > s. With k = s the nodes do not show it, and gamma_{s-1} serves, as in the kernel:
         what the field at the start tells of gamma_s is too little at long steps. One node leaves nothing
         else: h f at the start of the step is then ``start``, and ``None`` otherwise.
         """
-        if self.beyond is not None:
-            return self.beyond @ solved.values
         if start is None:
-            return solved.G[-1]
+            return self.beyond @ solved.values
         return (solved.G[0] - start) / SQRT3  # P_1 is -sqrt(3) at the start
 
-    def coefficients(self, values: Complex) -> Complex:
+    def coefficients(self, values: Array) -> Array:
         """Return all k Legendre coefficients that k stage values determine, shape (k, n)."""
         return tables(self.k, self.k).projection.hi @ values
-
-
-def polynomial(c: NDArray[np.float64], G: Complex) -> Complex:
-    """Return ``sum_j G_j int_0^c P_j`` for points c, shape (points, n)."""
-    s = len(G)
-    P = legendre(c, s + 1)
-    integrals = np.empty((c.size, s))
-    integrals[:, 0] = c
-    for j in range(1, s):
-        integrals[:, j] = xi(j + 1) * P[:, j + 1] - xi(j) * P[:, j - 1]
-    return integrals @ G
-
-
-class Newton:
-    """Simplified Newton for the stage equations: ``I - h X_s x J``, after diagonalising X_s.
-
-    X_s has conjugate pairs of eigenvalues, so a real problem takes ceil(s/2)
-    factorisations of size n, a complex one s.
-
-    Parameters
-    ----------
-    s : int
-        Degree.
-    real : bool
-        Whether the problem is real.
-
-    Attributes
-    ----------
-    h : float
-        The step of the factorisations, 0 if there are none.
-    """
-
-    def __init__(self, s: int, *, real: bool) -> None:
-        eigenvalues, vectors = np.linalg.eig(x_matrix(s))
-        inverse = np.linalg.inv(vectors)
-        self.real = real
-        if real:
-            # One of each pair; a pair's two terms are conjugate, so it counts twice.
-            kept = np.imag(eigenvalues) >= 0.0
-            weight = np.where(np.imag(eigenvalues)[kept] > 0.0, 2.0, 1.0)
-        else:
-            kept, weight = np.full(s, True), np.ones(s)
-        self.eigenvalues = eigenvalues[kept]
-        self.vectors, self.inverse = vectors[:, kept] * weight, inverse[kept]
-        self._solvers: list[Callable[[Complex], Complex]] = []
-        self.h = 0.0
-
-    def factorize(self, h: float, factor: Callable[[complex], Callable[[Complex], Complex]]) -> None:
-        """Factorise ``I - h lambda J`` for the eigenvalues; ``factor(z)`` solves with ``I - z J``."""
-        self.h = h
-        self._solvers = [factor(h * z) for z in self.eigenvalues.tolist()]
-
-    def correct(self, residual: Complex) -> Complex:
-        """Return the correction of G for a residual (s, n)."""
-        parts = self.inverse @ residual
-        parts = np.array([solve(part) for solve, part in zip(self._solvers, parts, strict=True)])
-        change = self.vectors @ parts
-        return np.real(change) if self.real else change

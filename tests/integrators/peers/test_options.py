@@ -32,9 +32,9 @@ METHODS = [
 @pytest.mark.parametrize(
     ("name", "options", "says"),
     [
-        ("Taylor", {"tol": 0.0}, "0 < tol < 1"),
+        ("Taylor", {"tol": 0.0}, "a number between 0 and 1"),
         ("Taylor", {"tol": "small"}, "tol='small'"),
-        ("Taylor", {"compact_mode": "yes"}, "compact_mode=True or compact_mode=False"),
+        ("Taylor", {"compact_mode": "yes"}, "compact_mode='yes' of Taylor must be True or False"),
         ("IAS15", {"epsilon": -1.0}, "epsilon=-1.0"),
         ("IAS15", {"epsilon": 0}, "give their length, h="),
         ("IAS15", {"mode": "prs25"}, "did you mean 'prs23'"),

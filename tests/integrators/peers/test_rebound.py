@@ -1,5 +1,6 @@
 import signal
 import time
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
-from integrators.peers.rebound.fixed import COORDINATES, CORRECTORS, EVALUATIONS, KERNELS
-from integrators.peers.rebound.ias15 import MODES
+from integrators.peers.rebound.fixed import EVALUATIONS, Coordinates, Corrector, Kernel
+from integrators.peers.rebound.ias15 import Mode
 from integrators.peers.rebound.program import Layout
 from problems import Bodies, Hamiltonian, Problem
 
@@ -46,10 +47,10 @@ def fields_of(name):
 
 
 def test_the_choices_offered_are_those_of_the_library():
-    assert set(MODES) == set(fields_of("ias15")["adaptive_mode"])
+    assert set(get_args(Mode)) == set(fields_of("ias15")["adaptive_mode"])
     whfast = fields_of("whfast")
-    assert set(COORDINATES) == set(whfast["coordinates"])
-    assert set(KERNELS) == set(whfast["kernel"])
+    assert set(get_args(Coordinates)) == set(whfast["coordinates"])
+    assert set(get_args(Kernel)) == set(whfast["kernel"])
     assert {"corrector", "corrector2", "safe_mode", "keep_unsynchronized"} <= set(whfast)
     assert "order" in fields_of("leapfrog")
     assert {"epsilon", "min_dt"} <= set(fields_of("ias15"))
@@ -60,7 +61,7 @@ def made(method, problem):
     return program.simulation(Layout(problem.system, problem.par, method), 0.0, problem.y0)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", get_args(Mode))
 def test_ias15_is_set_up_as_described(mode):
     simulation = made(IAS15(epsilon=1e-8, mode=mode, min_dt=1e-7, h=0.25), planets())
     text = repr(simulation.integrator)
@@ -70,9 +71,9 @@ def test_ias15_is_set_up_as_described(mode):
     assert simulation.dt == 0.25
 
 
-@pytest.mark.parametrize("corrector", CORRECTORS)
+@pytest.mark.parametrize("corrector", get_args(Corrector))
 def test_whfast_is_set_up_as_described_with_safe_mode_off(corrector):
-    for coordinates in COORDINATES:
+    for coordinates in get_args(Coordinates):
         if corrector and coordinates in ("democraticheliocentric", "whds"):
             continue
         text = repr(made(WHFast(h=0.1, coordinates=coordinates, corrector=corrector), planets()).integrator)
@@ -80,7 +81,7 @@ def test_whfast_is_set_up_as_described_with_safe_mode_off(corrector):
         assert f"corrector={corrector}," in text
         assert "safe_mode=0" in text
         assert "keep_unsynchronized=1" in text
-    for kernel in KERNELS:
+    for kernel in get_args(Kernel):
         text = repr(made(WHFast(h=0.1, kernel=kernel, corrector2=True), planets()).integrator)
         assert f"kernel={kernel.upper()}" in text
         assert "corrector2=1" in text

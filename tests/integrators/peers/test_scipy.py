@@ -11,7 +11,6 @@ from integrators import Status, integrate
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
 from problems import emit
-from problems.calculus.jacobian import jacobian
 from problems.problem import Problem
 
 METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]
@@ -19,7 +18,8 @@ METHODS = [DOP853(rtol=1e-10, atol=1e-12), Radau(rtol=1e-8, atol=1e-10)]
 
 def dense(problem):
     """Return the Jacobian of a problem as `solve_ivp` takes it."""
-    found, entries = jacobian(problem.system), emit.numpy(problem.system, "jacobian")
+    found = problem.system.jacobian()
+    entries = emit.numpy(problem.system, found)
 
     def matrix(t, y):
         made = np.zeros((y.size, y.size))

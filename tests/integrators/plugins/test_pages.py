@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hbvm_bench import plugin_costs
+from hbvm_bench.studies.plugins import costs
 from problems.errors import InputError
 
 PAGES = Path(__file__).parents[3] / "docs" / "plugins"
@@ -47,7 +47,7 @@ def test_the_example_for_rebound_keeps_the_energy() -> None:
 
 
 def test_the_energy_of_dop853_leaks_linearly_and_that_of_hbvm_does_not() -> None:
-    rows = list(plugin_costs.leak(400.0, parts=4))
+    rows = list(costs.leak(400.0, parts=4))
     leaks = [errors["DOP853"] for _, errors in rows]
     assert leaks[-1] / leaks[0] == pytest.approx(4.0, rel=0.2)
     assert max(errors["HBVM"] for _, errors in rows) < 1e-2 * leaks[0]  # measured 1e-14 beside 1e-7
@@ -55,4 +55,4 @@ def test_the_energy_of_dop853_leaks_linearly_and_that_of_hbvm_does_not() -> None
 
 def test_a_host_that_is_none_is_refused_with_the_known_ones() -> None:
     with pytest.raises(InputError, match="scipy"):
-        plugin_costs.measure("sipy", 1)
+        costs.measure("sipy", 1)

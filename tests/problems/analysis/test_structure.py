@@ -5,7 +5,9 @@ import json
 import pytest
 
 import problems
-from hbvm_bench import cli, engines, findings
+from hbvm_bench import cli
+from hbvm_bench.commands import findings
+from hbvm_bench.summaries import engines
 from problems import Hamiltonian
 from problems.analysis import structure
 from problems.analysis.latex import latex

@@ -4,42 +4,14 @@ import numpy as np
 import pytest
 
 import problems
-from problems import Problem
-from problems.calculus.gradient import reachable
-
-# Every problem of the catalogue, the large families small enough to be compiled by every engine.
-SMALL = {
-    "charged_particle": {},
-    "cluster": {"n": 5},
-    "cr3bp": {},
-    "diatomic": {},
-    "double_pendulum": {},
-    "figure_eight": {},
-    "fput": {"n": 8, "beta": 0.5},
-    "henon_heiles": {},
-    "kepler": {},
-    "lennard_jones": {},
-    "lotka_volterra": {},
-    "morse": {},
-    "nonlinear_wave": {"n": 8},
-    "outer_solar_system": {},
-    "pendulum": {},
-    "penning_trap": {},
-    "period_annulus": {},
-    "pythagorean": {},
-    "rigid_body": {"quartic": 0.5},
-    "sine_gordon": {"n": 8},
-    "sitnikov": {},
-    "solar_system": {},
-    "spring_pendulum": {},
-    "stiff_chain": {},
-    "toda": {"n": 5},
-}
+from problems import Problem, registry
+from problems.trace.graph import reachable
 
 
-@pytest.fixture(params=SMALL)
+@pytest.fixture(params=registry.built_in())
 def small(request: pytest.FixtureRequest) -> Problem:
-    return problems.load(request.param, **SMALL[request.param])
+    """Every problem, the large families small enough to be compiled by every engine."""
+    return problems.load(request.param, **registry.entry(request.param).expected.small)
 
 
 @pytest.fixture

@@ -1,19 +1,19 @@
 """The pages on problems, engines and compile times are those that the code writes."""
 
+import importlib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
-import problems
 from hbvm_bench import cli
+from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.gallery import compile_times, pages, pictures
-from hbvm_bench.spec import parse_spec
 from problems import registry
+from problems.analysis import structure
 from problems.errors import InputError
 
 DOCS = Path(__file__).parents[3] / "docs"
-OWN = [name for name in problems.names() if registry.factory(name).__module__.startswith("problems.")]
 STALE = "it is out of date: run hbvm-bench gallery docs --no-pictures"
 
 
@@ -29,17 +29,27 @@ def test_the_pages_are_those_that_the_code_writes(written, name):
     assert (DOCS / name).read_text(encoding="utf-8") == (written / name).read_text(encoding="utf-8"), STALE
 
 
+def test_the_problem_that_the_page_shows_does_what_it_says(written, tmp_path, monkeypatch):
+    text = (written / "problems.md").read_text(encoding="utf-8").partition("\n## A problem with a name\n")[2]
+    (tmp_path / "quartic.py").write_text(text.partition("```python\n")[2].partition("```")[0])
+    monkeypatch.syspath_prepend(tmp_path)
+    quartic = importlib.import_module("quartic").quartic
+    assert repr(quartic()) == "quartic(k=1.0)"
+    assert structure.degree(quartic().system, quartic().par) == 4
+    with pytest.raises(InputError, match="k=0 of quartic must be a positive number"):
+        quartic(k=0)
+
+
 def test_every_problem_has_its_section_with_formula_source_and_picture(written):
     text = (written / "problems.md").read_text(encoding="utf-8")
-    assert set(pictures.PICTURES) == set(OWN)
     assert "](problems/expression.svg)" in text.partition("\n## A system of your own\n")[2]
-    for name in set(OWN) - {"expression"}:
+    for name in set(registry.built_in()) - {"expression"}:
         section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
         for part in ("$$H = ", "Tests ", "- source: ", "nvariant", f"](problems/{name}.svg)"):
             assert part in section, (name, part)
 
 
-@pytest.mark.parametrize("name", sorted(pictures.PICTURES))
+@pytest.mark.parametrize("name", registry.built_in())
 def test_every_problem_has_a_picture_with_something_in_it(name):
     path = DOCS / "problems" / f"{name}.svg"
     root = ET.fromstring(path.read_text(encoding="utf-8"))
@@ -52,8 +62,12 @@ def test_every_problem_has_a_picture_with_something_in_it(name):
 def test_a_picture_is_drawn_from_a_run():
     for name in ("kepler", "morse", "expression"):
         assert pictures.draw(name).endswith("</svg>\n")
-    with pytest.raises(InputError, match="has no picture"):
-        pictures.draw("keppler")
+
+
+def test_a_problem_that_does_not_say_how_it_is_drawn_has_no_picture(monkeypatch):
+    monkeypatch.setattr(registry, "entry", lambda name: None)
+    with pytest.raises(InputError, match="kepler has no picture"):
+        pictures.draw("kepler")
 
 
 def test_pages_are_written_all_or_none(tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ import numpy as np
 import sympy
 
 from problems import emit
-from problems.calculus.gradient import reachable
+from problems.trace.graph import reachable
 
 STATES = 3
 

@@ -267,10 +267,10 @@ def test_a_numba_function_that_gives_no_array_of_numbers_is_called_from_python_w
     ("fun", "options", "sentence"),
     [
         (python, {"every": 10}, "compiled fields"),
-        (TRACED, {"every": 0}, "every >= 1"),
+        (TRACED, {"every": 0}, "every=0 of HBVM must be a whole number"),
         (TRACED, {"interpolant": "polynomial"}, "leave it out"),
         (TRACED, {"h": 0.1}, "needs k"),
-        (python, {"h": -0.1, "k": 6}, "h > 0"),
+        (python, {"h": -0.1, "k": 6}, "h=-0.1 of HBVM must be a finite step above 0"),
         (TRACED, {"h": 0.1, "k": 6, "max_step": 0.05}, "leave out first_step and max_step"),
         (field(problems.load("kepler")), {}, "length 4"),
     ],

@@ -1,0 +1,166 @@
+"""What the entries of a campaign file say: problems, methods, ensembles, limits, timing, checks."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from hbvm_bench.campaign.grid import Grid
+from hbvm_bench.campaign.sweep import Scalar
+from problems import limits
+from problems.errors import InputError, shown
+
+Settings = Literal["chosen", "default", "recommended", "as published", "outside its domain"]
+Role = Literal["ours", "peer"]
+
+Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
+Count = Annotated[int, Meta(ge=1)]
+
+
+class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What one case may use before it is ended and reported.
+
+    Attributes
+    ----------
+    wall_seconds : float
+        Wall time of one process, from when the method is compiled.
+    memory_gib : float
+        Resident memory of one process, in GiB.
+    compile_seconds : float
+        Wall time until then: a cold cache on a busy machine says nothing about the method.
+    """
+
+    wall_seconds: Positive = 120.0
+    memory_gib: Positive = 4.0
+    compile_seconds: Positive = 900.0
+
+
+class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The serial timing pass: every round visits every case once, in a fresh process.
+
+    Attributes
+    ----------
+    rounds : int
+        Rounds over all cases; a machine that changes its speed touches all alike. 0: no timing.
+    samples : int
+        Samples of each case in one round.
+    shortest : float
+        A sample repeats the integration until it lasts this many seconds.
+    budget : float
+        Seconds of sampling per case and round; at least one sample is taken.
+    """
+
+    rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
+    samples: Annotated[int, Meta(ge=1, le=10_000)] = 2
+    shortest: Positive = 0.02
+    budget: Positive = 8.0
+
+
+class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What is looked at beside the trajectory itself; each costs further integrations.
+
+    Attributes
+    ----------
+    starts : int
+        Trajectories from which the law of the drift is found: the problem's own start
+        and perturbed ones; see `hbvm_bench.measure.starts`. 0: no law is sought.
+    reversal : float
+        Share of the span that is integrated there and back again; 0: none.
+    """
+
+    starts: Annotated[int, Meta(ge=0, le=1000)] = 0
+    reversal: Annotated[float, Meta(ge=0, le=1)] = 0.0
+
+
+class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Many trajectories at once, through a method's batch path where it has one.
+
+    Attributes
+    ----------
+    count : int
+        Trajectories.
+    spread : float
+        Every number of the start is multiplied by 1 + ``spread`` x, |x| <= 1.
+    """
+
+    count: Count
+    spread: Positive = 1e-2
+
+
+class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One problem of a campaign file, or a grid of them.
+
+    Attributes
+    ----------
+    use : str
+        The problem as it prints; ``{name}`` stands for a value, see `hbvm_bench.campaign.sweep`.
+    values : dict
+        Values that the methods' texts may name, such as the step that suits the problem.
+    sweep : dict of list
+        Values by name; every combination is a problem.
+    grid : Grid, optional
+        Instead of the campaign's.
+    """
+
+    use: str
+    values: dict[str, Scalar] = {}
+    sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
+    grid: Grid | None = None
+
+
+class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One method of a campaign file, or a grid of its settings.
+
+    Attributes
+    ----------
+    use : str
+        The method as it prints, such as ``"Taylor(tol=1e-15)"``; ``{name}`` stands for a
+        value of the sweep or of the problem, see `hbvm_bench.campaign.sweep`.
+    settings : str
+        Whether these are the library's defaults, what its authors recommend for
+        such a problem, the settings of a published experiment, or a use that the
+        method was not made for.
+    note : str
+        A sentence that the report prints beside the row.
+    sweep : dict of list
+        Values by name; every combination is a setting.
+    only : list of str
+        Names of the problems it runs on; all by default.
+    """
+
+    use: str
+    settings: Settings = "chosen"
+    note: str = ""
+    sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
+    only: list[str] = []
+
+
+class EnsembleEntry(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
+    """An ensemble of a campaign file.
+
+    Attributes
+    ----------
+    problem : str
+        The problem as it prints; its start is the centre of the ensemble.
+    count, spread
+        See `Ensemble`.
+    methods : list of MethodEntry
+        Which methods take it.
+    """
+
+    problem: str
+    count: int
+    methods: Annotated[list[MethodEntry], Meta(min_length=1)]
+    spread: Positive = 1e-2
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise InputError(f"count={shown(self.count)} of an ensemble must be at least 1.")
+        limits.check(f"an ensemble with count={shown(self.count)}", "TRAJECTORIES", self.count)
+
+    @property
+    def ensemble(self) -> Ensemble:
+        """What its cases carry."""
+        return Ensemble(count=self.count, spread=self.spread)

@@ -1,0 +1,277 @@
+"""A campaign: a TOML file of problems and methods, and the cases it stands for."""
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+
+from hbvm_bench.campaign.entries import (
+    Checks,
+    Ensemble,
+    EnsembleEntry,
+    Limits,
+    MethodEntry,
+    ProblemEntry,
+    Role,
+    Settings,
+    TimingPlan,
+)
+from hbvm_bench.campaign.grid import Grid
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.campaign.sweep import PLACEHOLDER, Scalar, combinations, fill, names
+from problems import limits
+from problems.errors import InputError, unknown
+
+
+class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a campaign file says; see the files in ``hbvm_bench/campaign/shipped``.
+
+    Attributes
+    ----------
+    name, title, description : str
+        The name is a file name; the other two are for readers.
+    problems : list of str or ProblemEntry
+        Problems as they print, or grids of them.
+    methods : list of MethodEntry
+        Every method runs on every problem, unless the entry says ``only`` where.
+    ensembles : list of EnsembleEntry
+        Many trajectories at once, beside the rest.
+    grid, limits, timing, checks
+        Shared by all cases.
+    """
+
+    name: str
+    problems: list[str | ProblemEntry] = []
+    methods: list[MethodEntry] = []
+    ensembles: list[EnsembleEntry] = []
+    title: str = ""
+    description: str = ""
+    grid: Grid = Grid()
+    limits: Limits = Limits()
+    timing: TimingPlan = TimingPlan()
+    checks: Checks = Checks()
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", self.name):
+            raise InputError(
+                f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
+            )
+
+        if not self.ensembles and not (self.problems and self.methods):
+            missing = "methods" if self.problems else "problems"
+            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
+        if bool(self.problems) != bool(self.methods):
+            missing = "methods" if self.problems else "problems"
+            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
+        known = {_name(entry) for entry in self.entries()}
+        for name in (name for method in self.methods for name in method.only):
+            if name not in known:
+                raise unknown("problem of the campaign", name, known)
+
+    def entries(self) -> list[ProblemEntry]:
+        """Return the problems' entries; one that is a text alone has neither values nor a sweep."""
+        return [
+            entry if isinstance(entry, ProblemEntry) else ProblemEntry(use=entry) for entry in self.problems
+        ]
+
+    def cases(self) -> list["Case"]:
+        """Return the cases, problem by problem, in the order of the file; the ensembles' last.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If a placeholder has no value, or a value no placeholder; for too many cases.
+        """
+        limits.check(f"campaign {self.name!r}", "CASES", self._count(), "give fewer values to its sweeps")
+        made = [
+            Case(
+                problem=fill(entry.use, chosen),
+                method=text,
+                grid=self.grid if entry.grid is None else entry.grid,
+                settings=method.settings,
+                note=method.note,
+                checks=self.checks,
+            )
+            for entry in self.entries()
+            for chosen in _chosen(entry)
+            for method in self.methods
+            for text in _settings(method, entry, chosen)
+        ]
+        return made + [
+            Case(
+                problem=entry.problem,
+                method=text,
+                settings=method.settings,
+                note=method.note,
+                ensemble=entry.ensemble,
+            )
+            for entry in self.ensembles
+            for method in entry.methods
+            for text in _settings(method, ProblemEntry(use=entry.problem), {})
+        ]
+
+    def _count(self) -> int:
+        """Return how many cases there are, without making any."""
+        runs = [
+            _combinations(entry.sweep) * _combinations(method.sweep)
+            for entry in self.entries()
+            for method in self.methods
+            if not method.only or _name(entry) in method.only
+        ]
+        many = [_combinations(method.sweep) for entry in self.ensembles for method in entry.methods]
+        return sum(runs) + sum(many)
+
+
+def _combinations(sweep: Mapping[str, Sequence[object]]) -> int:
+    return math.prod(len(values) for values in sweep.values())
+
+
+def _name(entry: ProblemEntry) -> str:
+    return parse_spec(PLACEHOLDER.sub("0", entry.use)).name
+
+
+def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
+    _all_used(entry.use, entry.sweep, entry.use)
+    return [entry.values | chosen for chosen in combinations(entry.sweep)]
+
+
+def _settings(method: MethodEntry, entry: ProblemEntry, values: Mapping[str, Scalar]) -> list[str]:
+    if method.only and parse_spec(fill(entry.use, values)).name not in method.only:
+        return []
+    _all_used(method.use, method.sweep, method.use)
+    return [fill(method.use, {**values, **chosen}) for chosen in combinations(method.sweep)]
+
+
+def _all_used(text: str, sweep: Mapping[str, object], where: str) -> None:
+    for name in sweep.keys() - names(text):
+        raise InputError(
+            f"{where}: the sweep gives values of {name!r}, which no placeholder {{{name}}} takes."
+        )
+
+
+class Case(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One integration to be measured; plain text, so that it travels to any process or machine.
+
+    Attributes
+    ----------
+    problem, method : str
+        Specifications, see `hbvm_bench.campaign.spec`.
+    grid : Grid
+        The sampling times.
+    settings : str
+        See `MethodEntry`.
+    note : str
+        See `MethodEntry`.
+    checks : Checks
+        What is looked at beside the trajectory.
+    ensemble : Ensemble or None
+        Many trajectories instead of one.
+    """
+
+    problem: str
+    method: str
+    grid: Grid = Grid()
+    settings: Settings = "chosen"
+    note: str = ""
+    checks: Checks = Checks()
+    ensemble: Ensemble | None = None
+
+
+def shipped() -> dict[str, Path]:
+    """Return the campaign files that come with the package, by name."""
+    folder = Path(str(files("hbvm_bench.campaign") / "shipped"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load(name_or_path: str) -> Campaign:
+    """Read a campaign.
+
+    Parameters
+    ----------
+    name_or_path : str
+        The name of a shipped campaign, or the path of a TOML file.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is no such campaign, or its file is not a campaign.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise InputError(f"there is no campaign file {name_or_path!r}.")
+    elif name_or_path in shipped():
+        path = shipped()[name_or_path]
+    else:
+        raise unknown("campaign", name_or_path, shipped())
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the campaign file {name_or_path!r}: {error}.") from None
+    return parse(text, name_or_path)
+
+
+def parse(text: str, source: str = "campaign") -> Campaign:
+    """Read a campaign from TOML text; ``source`` names it in error messages."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: not valid TOML: {error}.") from None
+    except RecursionError:
+        raise InputError(f"{source}: lists or tables are nested too deep, for a campaign.") from None
+    _check_keys(data, Campaign, source)
+    try:
+        return msgspec.convert(data, Campaign)
+    except msgspec.ValidationError as error:
+        what = str(error).replace(" - at `$.", ", at `").replace(".,", ",").rstrip(".")
+        raise InputError(f"{source}: {what}.") from None
+
+
+def _check_keys(data: dict[str, Any], struct: type[msgspec.Struct], source: str) -> None:
+    for key, value in data.items():
+        if key not in struct.__struct_fields__:
+            raise InputError(f"{source}: {unknown('key', key, struct.__struct_fields__)}")
+        if key == "settings" and value not in get_args(Settings):
+            raise InputError(f"{source}: {unknown('settings', str(value), get_args(Settings))}")
+        if key in NESTED:
+            for item in value if isinstance(value, list) else [value]:
+                if isinstance(item, dict):
+                    _check_keys(item, NESTED[key], source)
+
+
+NESTED: dict[str, type[msgspec.Struct]] = {
+    "grid": Grid,
+    "limits": Limits,
+    "timing": TimingPlan,
+    "checks": Checks,
+    "problems": ProblemEntry,
+    "methods": MethodEntry,
+    "ensembles": EnsembleEntry,
+}
+
+__all__ = [
+    "Campaign",
+    "Case",
+    "Checks",
+    "Ensemble",
+    "EnsembleEntry",
+    "Grid",
+    "Limits",
+    "MethodEntry",
+    "ProblemEntry",
+    "Role",
+    "Settings",
+    "TimingPlan",
+    "load",
+    "parse",
+    "shipped",
+]

@@ -1,0 +1,275 @@
+"""What makes two runs of a case the same: names, options, versions, sources.
+
+The id of a case is the sha256 of canonical JSON of all this. A rerun therefore
+does only what is missing or stale, and two stores can be merged by id.
+"""
+
+import ast
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+import integrators.registry
+import problems.registry
+from hbvm_bench.campaign.file import Case, Checks
+from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.reference import solutions
+from integrators.kernel.native import store as kept
+from integrators.protocol import MethodBase
+from problems import emit
+from problems.errors import InputError
+from problems.problem import Problem
+
+OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
+# What makes numbers of a solution; a worker process does nothing else with it.
+MEASURES = tuple(
+    f"hbvm_bench.measure.{name}" for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing")
+)
+# They say, name and keep what is run; all that a number can depend on of it is in the key.
+BOOKKEEPING = frozenset(
+    f"hbvm_bench.{name}"
+    for name in (
+        *("campaign.entries", "campaign.file", "campaign.grid", "campaign.identity", "campaign.spec"),
+        *("campaign.sweep", "store.files", "store.records", "store.store"),
+    )
+) | {"problems.picture"}
+# A library's numbers also depend on what it computes with.
+COMPUTES_WITH = {
+    "hbvm-bench": ("numpy", "numba", "llvmlite"),
+    "diffrax": ("diffrax", "jax", "jaxlib", "equinox", "lineax", "optimistix"),
+    "scipy": ("scipy", "numpy", "numba"),
+}
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A case whose names and options have been checked.
+
+    Attributes
+    ----------
+    case : Case
+        With canonical texts.
+    problem : Problem
+        Made from the case's text.
+    method : MethodBase
+        Made from the case's text; its library may still be missing.
+    id : str
+        sha256 in hexadecimal.
+    key : dict
+        What was hashed.
+    """
+
+    case: Case
+    problem: Problem
+    method: MethodBase
+    id: str
+    key: dict[str, Any]
+
+
+def resolve(case: Case) -> Resolved:
+    """Check the names and options of a case and give it its id.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an unknown name or option, with the nearest names, or a value that
+        the problem or the method refuses.
+    """
+    problem = _problem(case.problem)
+    method = make_method(case.method)
+    case.grid.times(problem)
+    # not repr(method), which is a third party's own
+    text = str(Spec(parse_spec(case.method).name, method.options()))
+    canonical = msgspec.structs.replace(case, problem=repr(problem), method=text)
+    key = case_key(canonical, problem, method)
+    text = json.dumps(key, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return Resolved(canonical, problem, method, hashlib.sha256(text.encode()).hexdigest(), key)
+
+
+@lru_cache(maxsize=64)
+def _problem(text: str) -> Problem:
+    # a campaign has the same few problems again and again, and tracing one takes a while
+    return make_problem(text)
+
+
+def make_problem(text: str) -> Problem:
+    """Make the problem that ``text`` specifies."""
+    spec = parse_spec(text)
+    return problems.load(spec.name, **spec.arguments)
+
+
+def make_method(text: str) -> MethodBase:
+    """Make the method that ``text`` specifies."""
+    spec = parse_spec(text)
+    try:
+        return integrators.registry.create(spec.name, **spec.arguments)
+    except (InputError, ImportError) as error:
+        raise InputError(f"{spec}: {error}") from None
+
+
+def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]:
+    """Return everything the numbers of a case depend on, as JSON values.
+
+    Notes and settings labels are left out: they are words about the case.
+    """
+    grid = case.grid.times(problem)
+    return {
+        "problem": case.problem,
+        "field": emit.fingerprint(problem.system),
+        "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
+        "parameters": [value.hex() for value in problem.par.tolist()],
+        "method": type(method).__name__,
+        "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
+        "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
+        "versions": versions_of(method),
+        "reference": _reference_digest(problem),
+        "source": source_digest(method, case),
+    } | {
+        # a case without them keeps the id it had
+        name: msgspec.to_builtins(asked)
+        for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
+        if asked not in (None, Checks())
+    }
+
+
+def versions_of(method: MethodBase) -> dict[str, str]:
+    """Return the versions of Python and of the libraries that a method's numbers depend on."""
+    names = COMPUTES_WITH.get(method.library.lower(), (method.library,))
+    return {"python": platform.python_version()} | {name: _version(name) for name in names}
+
+
+def version_of_library(library: str) -> str:
+    """Return the installed version of a method's library, or ``"not installed"``."""
+    return _version(library.lower())
+
+
+def is_ours(method: MethodBase) -> bool:
+    """Whether this project, and not a peer, does the work of the method."""
+    return method.library.lower() == "hbvm-bench"
+
+
+def source_digest(method: MethodBase, case: Case) -> str:
+    """Return the sha256 of the sources that decide about the measured numbers of a case.
+
+    They are those of `MEASURES`, of the method and of the problem, and what these import, at
+    their heads or anywhere below, of our packages and of the method's and the problem's own. So
+    a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
+    nor any because of a report. Comments, docstrings, the layout and
+    what a problem's decorator says do not count.
+    """
+    problem = problems.registry.factory(parse_spec(case.problem).name)
+    return digest_of((*MEASURES, type(method).__module__, problem.__module__))
+
+
+@cache
+def digest_of(modules: tuple[str, ...]) -> str:
+    """Return the sha256 of the `sources` of modules."""
+    return hashlib.sha256(json.dumps(sources(modules), sort_keys=True).encode()).hexdigest()
+
+
+def sources(modules: Iterable[str]) -> dict[str, str]:
+    """Return the digests of modules, and of what they import of our packages and theirs, by name."""
+    left = list(modules)
+    packages = {*OWN_PACKAGES, *(name.partition(".")[0] for name in left)}
+    found: dict[str, str] = {}
+    while left:
+        name = left.pop()
+        if name in found or name in BOOKKEEPING or (path := _file_of(name)) is None:
+            continue
+        found[name], imported = _read(name, path)
+        left += [other for other in imported if other.partition(".")[0] in packages]
+    return found
+
+
+@cache
+def _file_of(module: str) -> Path | None:
+    """Return a module's file; its outermost package has been imported."""
+    package, *rest = module.split(".")
+    top = sys.modules.get(package)
+    if not hasattr(top, "__path__"):
+        file = None if rest else getattr(top, "__file__", None)
+        return Path(file) if file else None
+    bases = [Path(place, *rest) for place in getattr(top, "__path__", ())]
+    paths = [path for base in bases for path in (base / "__init__.py", base.with_name(f"{base.name}.py"))]
+    return next((path for path in paths if path.is_file()), None)
+
+
+def _read(module: str, path: Path) -> tuple[str, list[str]]:
+    """Return the digest of a file's code and the modules that it names; kept by its content."""
+    content = path.read_bytes()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    key = kept.key("source", _rule(), platform.python_version(), package, content)
+    if (known := kept.get(key)) is not None:
+        return json.loads(known)
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):  # a third party's, compiled
+        return hashlib.sha256(content).hexdigest(), []
+    imported = _imported(tree, package)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            body[:] = [part for part in body if not _is_text(part)]
+        if isinstance(node, ast.FunctionDef):  # what a problem says of itself is words too
+            node.decorator_list = [part for part in node.decorator_list if not _is_entry(part)]
+    made = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
+    kept.put(key, json.dumps(made).encode())
+    return made
+
+
+@cache
+def _rule() -> bytes:
+    # digests that another version of this module made are of no use
+    return Path(__file__).read_bytes()
+
+
+def _is_text(node: ast.AST) -> bool:
+    """Whether a statement is a string alone: the docstring of what it stands in, or of what is before it."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+
+
+def _is_entry(node: ast.expr) -> bool:
+    """Whether a decorator is that of `problems.entry`."""
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "entry"
+
+
+def _imported(tree: ast.Module, package: str) -> set[str]:
+    """Return the modules, and what may be modules, that the imports of a file in a package name."""
+    found: set[str] = set()
+    left: list[Any] = [tree]
+    while left:
+        node = left.pop()
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            origin = ".".join([*above, *([node.module] if node.module else [])])
+            found |= {origin} | {f"{origin}.{alias.name}" for alias in node.names}
+        elif not (isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"):
+            for blocks in ("body", "orelse", "finalbody", "handlers", "cases"):  # statements only: quick
+                block = getattr(node, blocks, ())
+                left += block if isinstance(block, list) else ()
+    return found
+
+
+def _reference_digest(problem: Problem) -> str:
+    stored = solutions.find_file(problem)
+    if stored is None:
+        return ""
+    return hashlib.sha256(msgspec.json.encode([stored.t, stored.y])).hexdigest()
+
+
+@cache
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "not installed"

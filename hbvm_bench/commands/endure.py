@@ -1,0 +1,117 @@
+"""``hbvm-bench endure``."""
+
+import dataclasses
+import math
+import shlex
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from hbvm_bench.campaign.identity import make_method
+from hbvm_bench.measure import machine
+from hbvm_bench.report import terminal
+from hbvm_bench.run import processes
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.studies.endure import law, runs
+from hbvm_bench.studies.endure.runs import Endurance, Request
+from problems.errors import InputError
+
+LEAST_YEARS = 100.0
+MOST_YEARS = 1e9
+
+
+def endure(
+    years: Annotated[float | None, typer.Option(help="The span; default a million.")] = None,
+    starts: Annotated[
+        int | None, typer.Option(min=1, help="Trajectories of each method, from perturbed starts; default 8.")
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option("-m", "--method", help="Other methods than the declared ones.")
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="10 000 years from 3 starts; under a minute.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Where the result and the report go; default runs/endure.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result and its laws as JSON.")] = False,
+    redraw: Annotated[
+        bool, typer.Option("--redraw", help="Draw the report of --out again; run nothing.")
+    ] = False,
+) -> None:
+    """Follow the energy error of the outer Solar System over a million years, ours beside the peers'."""
+    directory = out or Path("runs") / ("endure-quick" if quick else "endure")
+    if not redraw:
+        span = years if years is not None else runs.QUICK_YEARS if quick else runs.YEARS
+        if not (math.isfinite(span) and LEAST_YEARS <= span <= MOST_YEARS and span == round(span)):
+            raise InputError(
+                f"--years must be a whole number from {LEAST_YEARS:g} to {MOST_YEARS:g}, not {span!r}."
+            )
+        request = Request(
+            years=span,
+            starts=starts or (runs.QUICK_STARTS if quick else runs.STARTS),
+            methods=[repr(make_method(text)) for text in method or runs.METHODS],
+            out=str(directory),
+            command=_command(years, starts, method, quick, directory),
+        )
+        ensure_writable(directory)
+        _run(request)
+    result = runs.load(directory)
+    from hbvm_bench.studies.endure import report
+
+    if as_json:
+        terminal.print_json(as_data(result))
+    else:
+        for table in report.tables(result):
+            terminal.print_table(table)
+        terminal.console().print(machine.sentence(result.machine), highlight=False)
+    terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
+
+
+def as_data(result: Endurance) -> dict[str, Any]:
+    """Return the result with what is read off it, as plain data for JSON (no not-a-number, no infinity)."""
+    return {
+        "lines": [_finite(dataclasses.asdict(line)) for line in law.lines(result)],
+        "goals": [dataclasses.asdict(goal) for goal in law.goals(result)],
+        "result": msgspec.to_builtins(result),
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {f"{key:g}" if isinstance(key, float) else key: _finite(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _run(request: Request) -> None:
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        path = Path(scratch) / "request.json"
+        path.write_bytes(msgspec.json.encode(request))
+        try:
+            code = processes.wait([sys.executable, "-m", "hbvm_bench.studies.endure.runs", str(path)])
+        except KeyboardInterrupt:
+            print(
+                f"hbvm-bench: interrupted; the starts that had ended are kept in {request.out}; "
+                "--redraw shows them.",
+                file=sys.stderr,
+            )
+            raise typer.Exit(130) from None
+    if code != 0:
+        print(f"hbvm-bench: the process that integrates ended with exit code {code}.", file=sys.stderr)
+        raise typer.Exit(1)
+
+
+def _command(
+    years: float | None, starts: int | None, method: list[str] | None, quick: bool, out: Path
+) -> str:
+    words = ["hbvm-bench", "endure"]
+    words += ["--years", f"{years:g}"] if years is not None else []
+    words += ["--starts", str(starts)] if starts is not None else []
+    words += [word for text in method or [] for word in ("--method", text)]
+    words += ["--quick"] if quick else []
+    words += [] if out.is_absolute() else ["--out", str(out)]  # a path of this machine is nobody else's
+    return shlex.join(words)

@@ -1,0 +1,175 @@
+"""What ``hbvm-bench inspect`` says about a formula or a problem."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import problems
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.summaries import engines
+from problems.analysis import structure
+from problems.analysis.latex import latex
+from problems.catalogue import expression
+from problems.errors import InputError
+from problems.problem import Problem
+from problems.systems.base import System
+
+DEGREES = (1, 2, 3, 4, 5)  # of the methods for which k is given
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What was found.
+
+    Attributes
+    ----------
+    name : str
+        The formula, or the problem as it prints.
+    formula : str
+        The energy as LaTeX; empty where there is none, or none that can be read.
+    kind : str
+        ``"hamiltonian"``, ``"poisson"`` or ``"vector_field"``.
+    dimension : int
+        Length of the state.
+    separable : bool
+        Whether H = sum c_i p_i^2/2 + V(q, t).
+    degree : int or None
+        Of the energy as a polynomial in the state; ``None`` if it is none.
+    exact : tuple of (int, int)
+        Pairs s, k: HBVM(k, s) keeps the energy exactly; empty if it is not a polynomial.
+    cyclic : tuple of str
+        Positions that do not occur: their momenta are constant.
+    depends_on_time : bool
+        Whether the time occurs, so that the energy is not kept.
+    invariants, guards : tuple of str
+        What is known to be kept, and what stays exactly 0.
+    parameters : dict
+        Names and values.
+    engines : dict of str
+        ``None`` for each engine that accepts it, otherwise the reason.
+    """
+
+    name: str
+    formula: str
+    kind: str
+    dimension: int
+    separable: bool
+    degree: int | None
+    exact: tuple[tuple[int, int], ...]
+    cyclic: tuple[str, ...]
+    depends_on_time: bool
+    invariants: tuple[str, ...]
+    guards: tuple[str, ...]
+    parameters: dict[str, Any]
+    engines: dict[str, str | None]
+
+
+def inspect(text: str, parameters: str = "") -> Findings:
+    """Return what is found about a formula or a problem.
+
+    Parameters
+    ----------
+    text : str
+        A formula, ``"p^2/2 - cos(q)"``, or a problem, ``"sitnikov"`` or ``"kepler(e=0.9)"``.
+    parameters : str
+        Values of the other names in a formula: ``"k=2, m=0.5"``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is neither.
+    """
+    problem = _problem(text)
+    if problem is not None:
+        if parameters:
+            raise InputError(f"parameters belong to formulas; write them into the call: {text!r}.")
+        return _describe(repr(problem), problem.system, problem)
+    system = expression.hamiltonian(text, parameters=expression.assignments(parameters))
+    zeros = [0.5] * (system.dim // 2)  # no start is needed: engines are asked about the system
+    made = Problem(system, q0=zeros, p0=zeros, t_end=1.0)
+    return _describe(text.strip(), system, made)
+
+
+def _problem(text: str) -> Problem | None:
+    """Return the problem that a text names, or ``None`` if it is not such a call."""
+    try:
+        named = parse_spec(text).name in problems.names()
+    except InputError:
+        named = text.partition("(")[0].strip() in problems.names()
+    return make_problem(text) if named else None
+
+
+def _describe(name: str, system: System, problem: Problem) -> Findings:
+    energy = "hamiltonian" in system.offered()
+    degree = structure.degree(system, problem.par) if energy else None
+    try:
+        formula = latex(system) if energy else ""
+    except InputError:
+        formula = ""
+    dof = system.dof
+    cyclic = structure.cyclic(system) if dof is not None else []
+    values: dict[str, Any] = {}
+    offset = 0
+    for key, default in system.parameters.items():
+        size = len(default) if isinstance(default, tuple) else 1
+        part = problem.par[offset : offset + size].tolist()
+        values[key] = part if isinstance(default, tuple) else part[0]
+        offset += size
+    return Findings(
+        name=name,
+        formula=formula,
+        kind=system.kind,
+        dimension=system.dim,
+        separable=system.separable,
+        degree=degree,
+        exact=() if degree is None else tuple((s, structure.exact_k(degree, s)) for s in DEGREES),
+        cyclic=tuple("q" if dof == 1 else f"q{place + 1}" for place in cyclic),
+        depends_on_time=structure.depends_on_time(system),
+        invariants=system.invariant_names,
+        guards=system.guard_names,
+        parameters=values,
+        engines=engines.reasons(problem),
+    )
+
+
+def lines(found: Findings) -> list[tuple[str, str]]:
+    """Return the findings as pairs of a heading and a sentence."""
+    freedom = f"{found.dimension // 2} degrees of freedom, " if found.kind == "hamiltonian" else ""
+    kinds = {
+        "hamiltonian": "canonical, q' = dH/dp, p' = -dH/dq",
+        "poisson": "Poisson, y' = B(y) grad H(y)",
+        "vector_field": "first-order system, y' = f(t, y)",
+    }
+    rows = [("system", f"{kinds[found.kind]}; {freedom}{found.dimension} unknowns")]
+    if found.formula:
+        rows.append(("H", found.formula))
+    if found.parameters:
+        rows.append(("parameters", _values(found.parameters)))
+    if found.kind == "hamiltonian":
+        yes = "yes: H = sum of c p^2/2 + V(q), the second-order form applies"
+        rows.append(("separable", yes if found.separable else "no: the first-order form applies"))
+    if found.kind != "vector_field":
+        rows.append(("polynomial", _polynomial(found)))
+    if found.kind == "hamiltonian":
+        momenta = ", ".join(f"{name.replace('q', 'p')} is constant" for name in found.cyclic)
+        rows.append(("cyclic coordinates", f"{', '.join(found.cyclic)}: {momenta}" if momenta else "none"))
+    rows.append(("time", "occurs: the energy is not kept" if found.depends_on_time else "does not occur"))
+    rows.append(("invariants", ", ".join(found.invariants) or "none known"))
+    if found.guards:
+        rows.append(("stays 0 by symmetry", ", ".join(found.guards)))
+    accepted = [name for name, reason in found.engines.items() if reason is None]
+    rows.append(("engines", ", ".join(accepted)))
+    refused = [f"{name}: {reason}" for name, reason in found.engines.items() if reason is not None]
+    rows += [("not for", sentence) for sentence in refused]
+    return rows
+
+
+def _polynomial(found: Findings) -> str:
+    if found.degree is None:
+        return "not polynomial: the energy is kept to rounding once k is large enough, never exactly"
+    pairs = ", ".join(f"k = {k} for s = {s}" for s, k in found.exact)
+    return f"degree {found.degree}: HBVM(k, s) keeps the energy exactly from {pairs}"
+
+
+def _values(parameters: dict[str, Any]) -> str:
+    return ", ".join(f"{name} = {value!r}" for name, value in parameters.items())

@@ -1,0 +1,107 @@
+"""What is looked at beside the trajectory: the law of each invariant's drift, and time reversal."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Checks
+from hbvm_bench.measure import laws
+from hbvm_bench.measure.measured import Measured, largest_distance, positions
+from hbvm_bench.measure.starts import scaled
+from hbvm_bench.store.records import Law
+from integrators.protocol import MethodBase, Program, Status
+from problems.analysis import invariants
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What came out.
+
+    Attributes
+    ----------
+    laws : dict of Law
+        By invariant.
+    t : ndarray, shape (n,)
+        Times since the start of the errors behind the laws.
+    errors : dict of ndarray, shape (starts, n)
+        Errors by invariant; the energy's with their sign.
+    reversal : float or str
+        Distance from the start after integrating there and back, or why there is none.
+    """
+
+    laws: dict[str, Law] = field(default_factory=dict)
+    t: Array = field(default_factory=lambda: np.empty(0))
+    errors: dict[str, Array] = field(default_factory=dict)
+    reversal: float | str = "not asked for"
+
+
+def check(measured: Measured, method: MethodBase, program: Program, asked: Checks) -> Checked:
+    """Run the further integrations that are asked for.
+
+    Parameters
+    ----------
+    measured : Measured
+        The trajectory from the problem's own start, over all samples.
+    method, program
+        What made it.
+    asked : Checks
+        See there.
+    """
+    problem = measured.problem
+    back = _reversal(problem, method, program, asked.reversal) if asked.reversal else "not asked for"
+    if not asked.starts:
+        return Checked(reversal=back)
+    if not measured.complete:
+        why = f"the trajectory ends at t = {measured.t_stop:.4g}"
+        return Checked(
+            laws={name: Law(why=why, starts=1) for name in problem.system.invariant_names}, reversal=back
+        )
+    t = np.abs(measured.t - problem.t0)
+    later = t > 0.0
+    series = [_errors(problem, problem.y0, measured.t, measured.y)]
+    for start in scaled(problem, asked.starts)[1:]:
+        samples = program.start(start, problem.par, problem.t0).advance(measured.t)
+        if samples.status is Status.FINISHED:
+            series.append(_errors(problem, start, measured.t, samples.y))
+    errors = {name: np.stack([one[name] for one in series])[:, later] for name in series[0]}
+    found = {
+        name: laws.find(t[later], rows, signed=name == "energy") if rows.shape[1] else Law(why="no samples")
+        for name, rows in errors.items()
+    }
+    return Checked(laws=found, t=t[later], errors=errors, reversal=back)
+
+
+def _errors(problem: Problem, start: Array, t: Array, y: Array) -> dict[str, Array]:
+    """Return the errors against the values at ``start``, the energy's with their sign, shape (n,) each."""
+    found: dict[str, Array] = {}
+    states = np.ascontiguousarray(np.vstack([start[None], y]).T)
+    times = np.concatenate([[problem.t0], t])
+    with np.errstate(all="ignore"):
+        for name in problem.system.invariant_names:
+            values = invariants.evaluate(
+                problem.system.function(f"invariant:{name}"), times, states, problem.par
+            )
+            gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])
+            size = float(np.linalg.norm([v.hi[0] for v in values])) or 1.0
+            found[name] = (gaps[0] if name == "energy" else np.linalg.norm(gaps, axis=0)) / size
+    return found
+
+
+def _reversal(problem: Problem, method: MethodBase, program: Program, share: float) -> float | str:
+    way = share * (problem.t_end - problem.t0)
+    step = getattr(method, "h", None)
+    if step:  # a whole number of steps, so that the way back meets the same ones
+        way = float(np.copysign(max(1, round(abs(way) / step)) * step, way))
+    turn = problem.t0 + way
+    there = program.start(problem.y0, problem.par, problem.t0).advance(np.array([turn]))
+    if there.status is not Status.FINISHED:
+        return f"the way there ended as {there.status.value.replace('_', ' ')}"
+    back = program.start(there.y[-1], problem.par, turn).advance(np.array([problem.t0]))
+    if back.status is not Status.FINISHED:
+        return f"the way back ended as {back.status.value.replace('_', ' ')}"
+    with np.errstate(all="ignore"):
+        return float(largest_distance(problem, positions(problem, (back.y[-1] - problem.y0)[None]))[0])

@@ -1,0 +1,271 @@
+"""What is missing on this machine, and whether timings here can be trusted."""
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Literal
+
+import integrators.registry
+from hbvm_bench.campaign.identity import version_of_library
+from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import calibrate
+from problems.errors import InputError
+
+State = Literal["ok", "note", "bad"]
+
+SYSTEM = Path("/sys/devices/system/cpu")
+CALIBRATIONS = 60  # of about 10 ms
+LARGEST_SCATTER = 0.05  # ninth decile over the first one, less 1
+LEAST_SHARE = 0.97  # of a core while calibrating
+LARGEST_STEAL = 0.01  # of the wall time of all cores
+LOOKS, PAUSE = 9, 0.03  # at the processes that run: something short always does
+
+EXTRAS = {
+    "peers": ("heyoka", "rebound", "diffrax"),
+    "dask": ("distributed",),
+    "export": ("pyarrow",),
+}
+WITHOUT = {
+    "peers": "their methods are refused and the comparison is ours alone",
+    "dask": "--executor dask:// does not work",
+    "export": "export writes CSV only",
+}
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    what : str
+        In a word or two.
+    state : {"ok", "note", "bad"}
+        ``note`` is good to know; ``bad`` makes the results incomplete or their times doubtful.
+    found : str
+        What it is.
+    advice : str
+        What to do about it; empty where there is nothing to do.
+    """
+
+    what: str
+    state: State
+    found: str
+    advice: str = ""
+
+
+def examine(*, calibration: bool = True) -> dict[str, list[Finding]]:
+    """Look at this machine.
+
+    Parameters
+    ----------
+    calibration : bool
+        Whether to take the time of a fixed computation, again and again for a second.
+
+    Returns
+    -------
+    dict of list of Finding
+        Under ``"installed"`` and ``"timings"``.
+    """
+    timings = [cores(), load(), governor(), boost(), vectors(), virtual()]
+    return {
+        "installed": [python(), *libraries(), *methods(), browser()],
+        "timings": [*timings, *(steadiness() if calibration else [])],
+    }
+
+
+def healthy(findings: dict[str, list[Finding]]) -> bool:
+    """Whether nothing is bad."""
+    return not any(one.state == "bad" for group in findings.values() for one in group)
+
+
+def python() -> Finding:
+    """Return the versions of Python and of this package."""
+    here = machine.describe()
+    return Finding("hbvm-bench", "ok", f"{version('hbvm-bench')}, {here['python']}, {here['system']}")
+
+
+def libraries() -> list[Finding]:
+    """Return for every optional library its version, or what does not work without it."""
+    found: list[Finding] = []
+    for extra, names in EXTRAS.items():
+        advice = f"pip install 'hbvm-bench[{extra}]'"
+        for name in names:
+            try:
+                found.append(Finding(name, "ok", version(name)))
+            except PackageNotFoundError:
+                state: State = "bad" if extra == "peers" else "note"
+                found.append(Finding(name, state, f"not installed: {WITHOUT[extra]}", advice))
+    return found
+
+
+def methods() -> list[Finding]:
+    """Return the registered methods of libraries that are no extra of ours, and those that fail to load."""
+    found: list[Finding] = []
+    for name in integrators.registry.names():
+        try:
+            library = integrators.registry.get(name).library
+        except InputError as error:
+            found.append(Finding(name, "bad", str(error)))
+        except Exception as error:  # a third party's module may raise anything when it is imported
+            words = f"cannot be imported: {type(error).__name__}: {error}"
+            found.append(Finding(name, "bad", words, "ask its authors, or uninstall it"))
+        else:
+            known = {known for names in EXTRAS.values() for known in names} | {"hbvm-bench", "scipy"}
+            if library.lower() not in known:
+                found.append(Finding(name, "ok", f"{library} {version_of_library(library)}"))
+    return found
+
+
+def browser() -> Finding:
+    """Return whether the browser is there that the tests look at reports with."""
+    if path := next((found for name in BROWSERS if (found := shutil.which(name))), None):
+        return Finding("browser", "ok", Path(path).name)
+    if find_spec("playwright") is None:
+        return Finding("browser", "note", "none; only the tests of this project use one")
+    words = "no chromium: the tests that look at reports in a browser are skipped"
+    return Finding("browser", "note", words, "install chromium if you work on this project")
+
+
+def cores() -> Finding:
+    """Return how many cores this process may use: one for the case that is timed, one for the rest."""
+    mine, quota = len(machine.cores()), _quota()
+    words = f"{mine} of {os.cpu_count() or mine}, {machine.describe()['processor']}"
+    if quota is not None and quota < mine:
+        words += f", limited to the time of {quota:g}"
+    if min(mine, quota or mine) < 2:
+        return Finding("cores", "bad", words, "give it two: one is for the case that is timed, alone")
+    return Finding("cores", "ok", words)
+
+
+def load() -> Finding:
+    """Return how many processes want to run now, besides this one, and on average over a minute."""
+    looks: list[int] = []
+    for _ in range(LOOKS):
+        time.sleep(PAUSE)
+        looks.append(max(_running() - 1, 0))
+    others = int(median(looks))
+    words = f"{others} other processes want to run, {os.getloadavg()[0]:.2f} in all over the last minute"
+    if others > 0:
+        return Finding("load", "bad", words, "wait for the end of what else runs")
+    return Finding("load", "ok", words)
+
+
+def governor() -> Finding:
+    """Return how the system chooses the frequency of the cores."""
+    paths = sorted(SYSTEM.glob("cpu[0-9]*/cpufreq/scaling_governor"))
+    names = sorted({_read(path) for path in paths} - {""})
+    if not names:
+        return Finding("governor", "note", "not visible, as in most virtual machines")
+    if names == ["performance"]:
+        return Finding("governor", "ok", "performance")
+    # drivers that choose by themselves are fast under load; the calibration tells
+    advice = "for timings: cpupower frequency-set --governor performance"
+    return Finding("governor", "note", ", ".join(names), advice)
+
+
+def boost() -> Finding:
+    """Return whether cores run faster while others rest, so that times depend on the neighbors."""
+    no_turbo, plain = _read(SYSTEM / "intel_pstate/no_turbo"), _read(SYSTEM / "cpufreq/boost")
+    if not (no_turbo or plain):
+        return Finding("boost", "note", "not visible")
+    if no_turbo == "1" or plain == "0":
+        return Finding("boost", "ok", "off")
+    return Finding("boost", "note", "on: the frequency depends on heat and on what else runs")
+
+
+def vectors() -> Finding:
+    """Return the widest vector instructions: compiled methods use them, wheels mostly do not."""
+    name = str(machine.describe()["vector_instructions"])
+    if name == "AVX-512":
+        return Finding("vectors", "ok", name)
+    return Finding(
+        "vectors", "note", f"{name}, no AVX-512: HBVM's lanes of stages take more instructions here"
+    )
+
+
+def virtual() -> Finding:
+    """Return whether this is a virtual machine, whose host may take its cores away."""
+    if "hypervisor" in machine.flags():
+        return Finding("machine", "note", "virtual: what the host does besides is seen as stolen time only")
+    return Finding("machine", "ok", "not virtual, as far as it tells")
+
+
+def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
+    """Time a fixed computation again and again on one core, and tell how steady that is.
+
+    Parameters
+    ----------
+    measure : callable
+        Returns the seconds of the fixed computation.
+    """
+    with machine.staying_on_a_core():
+        measure()  # compiled now
+        stolen, wall, busy = _stolen(), time.perf_counter(), time.process_time()
+        taken = [measure() for _ in range(CALIBRATIONS)]
+        wall, busy = time.perf_counter() - wall, time.process_time() - busy
+        stolen = None if stolen is None else (_stolen() or 0.0) - stolen
+    return [scatter(taken), share(busy / wall), *([] if stolen is None else [steal(stolen / wall)])]
+
+
+def scatter(taken: Sequence[float]) -> Finding:
+    """Judge how much the same computation varies."""
+    deciles = quantiles(taken, n=10, method="inclusive")
+    spread = deciles[-1] / deciles[0] - 1
+    words = (
+        f"{median(taken) * 1e3:.2f} ms, varying by {spread:.1%} between deciles, "
+        f"the slowest by {max(taken) / median(taken) - 1:.0%}"
+    )
+    if spread > LARGEST_SCATTER:
+        return Finding("calibration", "bad", words, "fix the frequency and stop what else runs")
+    return Finding("calibration", "ok", words)
+
+
+def share(part: float) -> Finding:
+    """Judge how much of a core a busy process gets."""
+    words = f"{min(part, 1.0):.1%} of a core for a busy process"
+    if part < LEAST_SHARE:
+        return Finding("share", "bad", words, "stop what else runs on this machine")
+    return Finding("share", "ok", words)
+
+
+def steal(part: float) -> Finding:
+    """Judge how much time the host took away from a virtual machine."""
+    words = f"{part:.1%} of a core taken away by the host"
+    if part > LARGEST_STEAL:
+        return Finding("stolen time", "bad", words, "use a machine of its own")
+    return Finding("stolen time", "ok", words)
+
+
+def _quota() -> float | None:
+    """Return how many cores' time the control group grants, if it limits it."""
+    granted, _, period = _read(Path("/sys/fs/cgroup/cpu.max")).partition(" ")
+    return int(granted) / int(period) if granted.isdigit() and period.isdigit() else None
+
+
+def _running() -> int:
+    """Return the number of runnable processes, this one among them."""
+    for line in _read(Path("/proc/stat")).splitlines():
+        if line.startswith("procs_running"):
+            return int(line.split()[1])
+    return 1
+
+
+def _stolen() -> float | None:
+    """Return the seconds that the host took from all cores since the start."""
+    fields = (_read(Path("/proc/stat")).splitlines() or [""])[0].split()
+    return int(fields[8]) / os.sysconf("SC_CLK_TCK") if len(fields) > 8 else None
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return ""

@@ -1,0 +1,259 @@
+"""Many trajectories of one problem at once, through the method's batch path where it has one.
+
+Measured as one case: every trajectory's invariants against its own start, the position
+of a few of them against 128-bit Taylor solutions, and the time of all.
+"""
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Ensemble, TimingPlan
+from hbvm_bench.measure.measured import Measured, ahead, largest_distance, position_error, positions
+from hbvm_bench.measure.starts import cloud
+from hbvm_bench.measure.timing import sampled
+from hbvm_bench.reference import solutions as reference
+from hbvm_bench.reference.solutions import Reference
+from hbvm_bench.store.records import Compile, Counters, TimingRound
+from integrators.protocol import MethodBase, Program, Samples, Status
+from problems.analysis.invariants import evaluate
+from problems.errors import InputError
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+WITNESSES = 4  # trajectories whose end is known
+WARM_UP = 16  # trajectories
+
+
+@dataclass(frozen=True, eq=False)
+class Members:
+    """What a batch returned of its members.
+
+    Attributes
+    ----------
+    y : ndarray, shape (n, dim)
+        States at the end; NaN where a trajectory did not arrive.
+    status : list of Status
+        How each ended.
+    reason : str
+        That of the first that failed.
+    steps, evaluations : int or None
+        Over all.
+    seconds : float
+        Of integrating; preparing the batch, or making a stepper for each start, is left out.
+    """
+
+    y: Array
+    status: list[Status]
+    reason: str
+    steps: int
+    evaluations: int | None
+    seconds: float
+
+
+def prepared(program: Program, starts: Array, problem: Problem) -> Callable[[], Any] | None:
+    """Return the call of a program's batch, compiled, checked and allocated where it can prepare one.
+
+    ``None`` where it has no batch. Preparing one compiles what the program leaves to its first batch.
+    """
+    arguments = {"times": np.array([problem.t_end]), "t0": problem.t0}
+    if prepare := getattr(program, "prepare_batch", None):
+        return prepare(starts, problem.par, **arguments)
+    batch = getattr(program, "batch", None)
+    return None if batch is None else partial(batch, starts, problem.par, **arguments)
+
+
+def integrate(
+    program: Program,
+    starts: Array,
+    problem: Problem,
+    sample: str | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Members:
+    """Integrate every start to the end of the problem's span.
+
+    Parameters
+    ----------
+    program : Program
+        Its ``batch`` is used where it has one, prepared before the clock runs where it can be
+        (``prepare_batch``); otherwise one trajectory follows the other.
+    starts : ndarray, shape (n, dim)
+        Where they start.
+    problem : Problem
+        Parameters and span.
+    sample : str, optional
+        How one trajectory meets the end; see `integrators.protocol.MethodBase.to_end`.
+    clock : callable
+        Returns seconds.
+    """
+    end = np.array([problem.t_end])
+    go = prepared(program, starts, problem)
+    if go is not None:
+        begin = clock()
+        made = go()
+        spent = clock() - begin
+        counts = getattr(made, "evaluations", None)
+        return Members(
+            y=made.y[:, -1],
+            status=made.status,
+            reason=next((reason for reason in made.reason if reason), ""),
+            steps=int(made.steps.sum()),
+            evaluations=None if counts is None else int(counts.sum()),
+            seconds=spent,
+        )
+    y = np.full(starts.shape, np.nan)
+    status: list[Status] = []
+    reason, steps, evaluations, spent = "", 0, 0, 0.0
+    counted = True
+    for i, start in enumerate(starts):
+        stepper = program.start(start, problem.par, problem.t0)
+        begin = clock()
+        samples = stepper.advance(end, sample=sample)
+        spent += clock() - begin
+        status.append(samples.status)
+        reason = reason or samples.reason
+        if samples.status is Status.FINISHED:
+            y[i] = samples.y[-1]
+        steps += stepper.stats.steps
+        counted = counted and stepper.stats.evaluations is not None
+        evaluations += stepper.stats.evaluations or 0
+    return Members(y, status, reason, steps, evaluations if counted else None, spent)
+
+
+def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Measured, Status, str]:
+    """Run an ensemble once and evaluate what it kept.
+
+    Returns
+    -------
+    measured : Measured
+        See `Measured.trajectories`; the series are over the trajectories, not over time.
+    status : Status
+        The first failure, if any.
+    reason : str
+        One sentence on it.
+    """
+    starts = cloud(problem, ensemble.count, ensemble.spread)
+    members = integrate(program, starts, problem)
+    failed = [one for one in members.status if one is not Status.FINISHED]
+    witnesses = np.unique(np.linspace(0, ensemble.count - 1, WITNESSES).astype(int))
+    known = _truth(problem, starts[witnesses])
+    with np.errstate(all="ignore"):
+        distance = largest_distance(problem, positions(problem, members.y))
+        errors = _errors(problem, starts, members.y)
+        position = phase = np.empty(0)
+        if known is not None:
+            gap = (members.y[witnesses] - known.high) - known.low
+            position = position_error(problem, gap, known.high)
+            phase = np.abs(ahead(problem, known.t, known.high, gap))
+    t = np.full(ensemble.count, problem.t_end)
+    measured = Measured(
+        problem=problem,
+        t=t,
+        y=members.y,
+        errors=errors,
+        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y, t).items()},
+        distance=distance,
+        position_t=np.full(len(position), problem.t_end),
+        position=np.sort(position),  # the last is the largest
+        phase=np.sort(phase),
+        reference=known,
+        complete=not failed,
+        t_stop=problem.t_end,
+        counters=Counters(steps=members.steps, evaluations=members.evaluations),
+        compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
+        trajectories=ensemble.count,
+    )
+    reason = f"{len(failed)} of {ensemble.count} trajectories failed; {members.reason}" if failed else ""
+    return measured, failed[0] if failed else Status.FINISHED, reason
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleRun:
+    """An ensemble, ready to be timed.
+
+    Attributes
+    ----------
+    program : Program
+        Compiled.
+    starts : ndarray, shape (n, dim)
+        Where the trajectories start.
+    problem : Problem
+        Parameters and span.
+    sample : str or None
+        How one trajectory meets the end.
+    """
+
+    program: Program
+    starts: Array
+    problem: Problem
+    sample: str | None
+
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
+        """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            spent = 0.0
+            for _ in range(repeats - 1):
+                spent += integrate(self.program, self.starts, self.problem, self.sample, clock).seconds
+            members = integrate(self.program, self.starts, self.problem, self.sample, clock)
+            spent += members.seconds
+        finally:
+            if collecting:
+                gc.enable()
+        failed = [one for one in members.status if one is not Status.FINISHED]
+        status = failed[0] if failed else Status.FINISHED
+        return spent / repeats, Samples(np.array([self.problem.t_end]), members.y[:1], status)
+
+
+def time_round(
+    problem: Problem, method: MethodBase, ensemble: Ensemble, plan: TimingPlan
+) -> TimingRound | str:
+    """Take the samples of one round; see `hbvm_bench.measure.timing.time_round`."""
+    program = method.compile(problem.system)
+    starts = cloud(problem, ensemble.count, ensemble.spread)
+    EnsembleRun(program, starts[:WARM_UP], problem, method.to_end).seconds()
+    return sampled(EnsembleRun(program, starts, problem, method.to_end), program, plan)
+
+
+def _errors(problem: Problem, starts: Array, y: Array) -> dict[str, Array]:
+    """Return the errors of the invariants, each trajectory's against its own start, shape (n,)."""
+    found: dict[str, Array] = {}
+    for name in problem.system.invariant_names:
+        function = problem.system.function(f"invariant:{name}")
+        before = evaluate(function, problem.t0, np.ascontiguousarray(starts.T), problem.par)
+        after = evaluate(function, problem.t_end, np.ascontiguousarray(y.T), problem.par)
+        gaps = np.stack([(a - b).rounded() for a, b in zip(after, before, strict=True)])
+        size = np.linalg.norm(np.stack([b.hi for b in before]), axis=0)
+        found[name] = np.linalg.norm(gaps, axis=0) / np.where(size == 0.0, 1.0, size)
+    return found
+
+
+def _truth(problem: Problem, starts: Array) -> Reference | None:
+    """Return the 128-bit ends of a few trajectories, one row each; ``None`` without heyoka."""
+    span = np.array([problem.t0, problem.t_end])
+    rows: list[list[Decimal]] = []
+    parameters = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in problem.system.unpack(problem.par).items()
+    }
+    try:
+        for start in starts:
+            one = Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=problem.t_end)
+            rows.append(reference.taylor(one, span, reference.TOLERANCE)[-1])
+    except InputError:  # heyoka is missing, or it does not arrive
+        return None
+    high = np.array([[float(value) for value in row] for row in rows])
+    low = np.array([[float(value - Decimal(float(value))) for value in row] for row in rows])
+    made = {"method": f"heyoka taylor_adaptive, fp_type=real128, tol={reference.TOLERANCE}"}
+    return Reference(np.full(len(rows), problem.t_end), high, low, made)

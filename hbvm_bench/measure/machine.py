@@ -1,0 +1,188 @@
+"""The machine in words that say what matters for a timing and nothing about whose it is."""
+
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from problems.errors import InputError
+
+VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
+
+
+MEASURED = ("vector_bits", "clock_ghz")
+"""What `describe` measures: it may differ from one look at a processor to the next."""
+
+COLUMNS = (
+    "Columns: LLVM's name of the processor and how wide its arithmetic is, where that was measured; -avx2: "
+    "all that numba compiles, which is our code and the forces and fields handed to REBOUND and SciPy, "
+    "without AVX-512."
+)
+"""What `kind` says, for under a table."""
+
+AVX2 = (
+    "Without AVX-512 in all that numba compiles: our code, and the forces and fields handed to REBOUND "
+    "and SciPy."
+)
+"""What the option --avx2 does."""
+
+FEATURES = "NUMBA_CPU_FEATURES"
+NAME = "NUMBA_CPU_NAME"
+
+
+def describe(*, measure: bool = False) -> dict[str, str | int]:
+    """Return processor, cores, memory, instruction sets, operating system and Python.
+
+    Parameters
+    ----------
+    measure : bool
+        Whether to measure the width of the arithmetic and the clock too (some 50 ms): for
+        whatever will be printed beside times.
+    """
+    from llvmlite import binding
+
+    described: dict[str, str | int] = {
+        "processor": _processor(),
+        "family": f"{VENDORS.get(_cpuinfo('vendor_id'), _cpuinfo('vendor_id'))} family "
+        f"{_cpuinfo('cpu family') or '?'}, model {_cpuinfo('model') or '?'}",
+        "llvm_processor": binding.get_host_cpu_name(),
+        "cores": len(cores()),
+        "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
+        "vector_instructions": _vector_instructions(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": f"{platform.python_implementation()} {platform.python_version()}",
+    }
+    if os.environ.get(NAME) or FEATURES in os.environ:
+        without = "-avx512f" in os.environ.get(FEATURES, "").split(",")
+        described["ours_built_for"] = "AVX2" if without else os.environ.get(NAME) or "other instructions"
+    if measure:
+        from hbvm_bench.measure import processor
+
+        described |= processor.measured()
+    return described
+
+
+def same(a: Mapping[str, str | int], b: Mapping[str, str | int]) -> bool:
+    """Whether two descriptions are of one machine: equal in what both say and neither measured."""
+    restricted = a.get("ours_built_for") == b.get("ours_built_for")
+    return restricted and all(a[name] == b[name] for name in a.keys() & b.keys() if name not in MEASURED)
+
+
+def kind(described: Mapping[str, str | int]) -> str:
+    """Return the kind of processor in one word, for file names and columns.
+
+    ``znver4-256bit``: LLVM's name and how wide the arithmetic is, where that was measured, for
+    it differs among processors of one name; ``znver4-256bit-avx2`` with code restricted to AVX2.
+    """
+    bits, built = described.get("vector_bits"), described.get("ours_built_for")
+    words = [str(described.get("llvm_processor", "unknown"))]
+    words += [f"{bits}bit"] if bits else []
+    words += [str(built).lower()] if built else []
+    return "-".join(words).replace(" ", "-").replace("/", "-")
+
+
+def sentence(described: Mapping[str, str | int]) -> str:
+    """Say what kind of processor times and their ratios belong to."""
+    names = [str(described[key]) for key in ("family",) if key in described]
+    names += [f"LLVM: {described['llvm_processor']}"] if "llvm_processor" in described else []
+    bits, clock = described.get("vector_bits"), described.get("clock_ghz")
+    width = f"arithmetic {bits} bits wide" if bits else "width of the arithmetic not recorded"
+    built = described.get("ours_built_for")
+    return (
+        f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"
+        + (f" ({'; '.join(names)})" if names else "")
+        + f", {described.get('vector_instructions', 'vector instructions not recorded')}, {width}"
+        + (f", {clock} GHz" if clock else "")
+        + (
+            f"; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
+            f"was restricted to {built}, the peers' own code was not"
+            if built
+            else ""
+        )
+        + "."
+    )
+
+
+def restricted_to_avx2() -> dict[str, str]:
+    """Return the environment in which our code, and all else that numba compiles, does without AVX-512.
+
+    Libraries with compilers of their own (heyoka, JAX) or compiled code (REBOUND, SciPy) do not
+    look at it. Only a process that starts with it is restricted.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the processor has no AVX2.
+    """
+    from llvmlite import binding
+
+    features = binding.get_host_cpu_features()
+    if not features.get("avx2"):
+        raise InputError(f"this processor ({_processor()}) has no AVX2; leave --avx2 out.")
+    kept = {name: on and not name.startswith(("avx512", "avx10")) for name, on in features.items()}
+    # LLVM's name of the processor alone would bring AVX-512 back
+    kept["avx512f"] = False
+    return {FEATURES: ",".join(f"{'+' if on else '-'}{name}" for name, on in sorted(kept.items()))}
+
+
+def cores() -> list[int]:
+    """Return the numbers of the cores this process may use."""
+    return sorted(os.sched_getaffinity(0))
+
+
+@contextmanager
+def leaving_a_core() -> Iterator[int | None]:
+    """Keep this process off the core that is yielded, for another one to be timed there.
+
+    Where there is only one core this process cannot leave it.
+    """
+    mine = cores()
+    core = max(mine, default=None)
+    others = set(mine) - {core}
+    if others:
+        os.sched_setaffinity(0, others)
+    try:
+        yield core
+    finally:
+        os.sched_setaffinity(0, mine)
+
+
+@contextmanager
+def staying_on_a_core() -> Iterator[None]:
+    """Keep this process on one core, the last one it may use."""
+    mine = cores()
+    os.sched_setaffinity(0, {mine[-1]})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, mine)
+
+
+def flags() -> set[str]:
+    """Return what the processor says that it can do, in the words of ``/proc/cpuinfo``."""
+    return set(_cpuinfo("flags").split())
+
+
+def _cpuinfo(field: str) -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    for line in text.splitlines():
+        name, _, value = line.partition(":")
+        if name.strip() == field:
+            return value.strip()
+    return ""
+
+
+def _processor() -> str:
+    return _cpuinfo("model name") or platform.processor() or "unknown processor"
+
+
+def _vector_instructions() -> str:
+    has = flags()
+    for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX")):
+        if flag in has:
+            return name
+    return "SSE2" if "sse2" in has else "none known"

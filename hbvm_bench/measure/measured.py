@@ -1,0 +1,264 @@
+"""From a solution to what is measured on it: error series, guards, distances."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.reference.solutions import Reference
+from hbvm_bench.store.records import Compile, Counters, Law, Result, Timing
+from integrators.protocol import Status
+from integrators.solution import Solution
+from problems import emit
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Everything that a metric may look at.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was integrated.
+    t, y : ndarray, shapes (n,) and (n, dim)
+        The samples.
+    errors : dict of ndarray, shape (n,)
+        Errors of the invariants by name, relative where that has a meaning.
+    guards : dict of ndarray, shape (n,)
+        Quantities that a symmetry keeps at exactly zero.
+    distance : ndarray, shape (n,)
+        Largest distance of a body (or of q) from the origin.
+    position_t, position, phase : ndarray, shape (m,)
+        Times of the reference that were reached, the error of the position there, and how
+        far in time the run is ahead of the reference along its trajectory.
+    reference : Reference or None
+        The trusted solution, where there is one.
+    complete : bool
+        Whether the end time was reached.
+    t_stop : float
+        Where the method stopped.
+    counters, compile, timing
+        Work and time.
+    trajectories : int
+        More than one for an ensemble: ``y`` then has the end state of each, and the errors
+        are those of each against its own start.
+    peak_gib : float or None
+        Largest resident memory of the process.
+    laws : dict of Law
+        How the error of each invariant grows.
+    drift : dict of ndarray
+        What the laws were found from: ``t`` of shape (n,), and the errors by invariant, of
+        shape (starts, n).
+    reversal : float or str
+        Distance from the start after integrating there and back, or why there is none.
+    """
+
+    problem: Problem
+    t: Array
+    y: Array
+    errors: dict[str, Array]
+    guards: dict[str, Array]
+    distance: Array
+    position_t: Array
+    position: Array
+    phase: Array
+    reference: Reference | None
+    complete: bool
+    t_stop: float
+    counters: Counters = field(default_factory=Counters)
+    compile: Compile | None = None
+    timing: Timing | None = None
+    trajectories: int = 1
+    peak_gib: float | None = None
+    laws: dict[str, Law] = field(default_factory=dict)
+    drift: dict[str, Array] = field(default_factory=dict)
+    reversal: float | str = "not asked for"
+    extra: dict[str, Array] = field(default_factory=dict)
+
+    def series(self) -> dict[str, Array]:
+        """Return the arrays that the store keeps beside the record."""
+        return {
+            "t": self.t,
+            "y": self.y,
+            "distance": self.distance,
+            "position_t": self.position_t,
+            "position": self.position,
+            "phase": self.phase,
+            **{f"error.{name}": values for name, values in self.errors.items()},
+            **{f"guard.{name}": values for name, values in self.guards.items()},
+            **{f"drift.{name}": values for name, values in self.drift.items()},
+            **{f"extra.{name}": values for name, values in self.extra.items()},
+        }
+
+
+def measure(solution: Solution, reference: Reference | None) -> Measured:
+    """Evaluate everything on the samples of a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+        As `integrators.integrate` returns it.
+    reference : Reference, optional
+        The trusted solution of the same problem.
+
+    Returns
+    -------
+    Measured
+    """
+    problem, t, y = solution.problem, solution.t, solution.y
+    # an overflow is a result here: it becomes a sentence in the metrics
+    with np.errstate(all="ignore"):
+        errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
+        guards = {name: np.asarray(values, float) for name, values in problem.guards(y, t).items()}
+        distance = largest_distance(problem, positions(problem, y))
+        position_t, position, phase = _position_error(problem, t, y, reference)
+    stats = solution.stats
+    return Measured(
+        problem=problem,
+        t=t,
+        y=y,
+        errors=errors,
+        guards=guards,
+        distance=distance,
+        position_t=position_t,
+        position=position,
+        phase=phase,
+        reference=reference,
+        complete=solution.status is Status.FINISHED,
+        t_stop=float(solution.t_stop),
+        counters=Counters(
+            steps=_count(stats.steps),
+            rejections=_count(stats.rejections),
+            evaluations=_count(stats.evaluations),
+            iterations=_count(stats.iterations),
+            solver=stats.solver,
+        ),
+        compile=Compile(seconds=float(solution.compile_seconds), cached=solution.from_cache),
+        extra={name: np.asarray(v) for name, v in stats.extra.items() if _is_history(v)},
+    )
+
+
+def restore(
+    problem: Problem,
+    series: dict[str, Array],
+    result: Result,
+    reference: Reference | None,
+    timing: Timing | None,
+) -> Measured:
+    """Put together again what was measured, from the store, with a timing."""
+
+    def named(prefix: str) -> dict[str, Array]:
+        return {name.removeprefix(prefix): v for name, v in series.items() if name.startswith(prefix)}
+
+    return Measured(
+        problem=problem,
+        t=series["t"],
+        y=series["y"],
+        errors=named("error."),
+        guards=named("guard."),
+        distance=series["distance"],
+        position_t=series["position_t"],
+        position=series["position"],
+        phase=series["phase"],
+        reference=reference,
+        complete=result.status == Status.FINISHED,
+        t_stop=float("nan") if result.t_stop is None else result.t_stop,
+        counters=result.counters,
+        compile=result.compile,
+        timing=timing,
+        trajectories=result.trajectories,
+        laws=result.laws,
+        drift=named("drift."),
+        extra=named("extra."),
+    )
+
+
+def positions(problem: Problem, y: Array) -> Array:
+    """Return the part of the states that says where things are, shape (n, dof) or (n, dim)."""
+    dof = problem.system.dof
+    return y if dof is None else y[:, :dof]
+
+
+def largest_distance(problem: Problem, q: Array) -> Array:
+    """Return the largest distance of a body from the origin, shape (n,).
+
+    Parameters
+    ----------
+    problem : Problem
+        Its bodies say how ``q`` is grouped; without bodies all of ``q`` is one vector.
+    q : ndarray, shape (n, dof)
+        Positions, or differences of positions.
+    """
+    bodies = getattr(problem.system, "bodies", None)
+    width = q.shape[1] if bodies is None else bodies.dimension
+    # scaled by hand: squares of 1e200 overflow, and such positions do occur
+    groups = np.abs(q.reshape(len(q), q.shape[1] // width, width))
+    scale = groups.max(axis=2, initial=0.0)
+    safe = np.where((scale > 0) & np.isfinite(scale), scale, 1.0)
+    return (safe * np.sqrt(((groups / safe[:, :, None]) ** 2).sum(axis=2))).max(axis=1)
+
+
+POSITION = (
+    "A position error is the largest distance of a body from where the 128-bit solution has it, relative to "
+    "the largest distance of a body from the origin at the stored times of that solution. Without bodies all "
+    "positions together are one vector."
+)
+"""The one definition, for every page that prints such an error."""
+
+
+def position_error(problem: Problem, difference: Array, true: Array) -> Array:
+    """Return position errors, shape (n,), as `POSITION` says.
+
+    Parameters
+    ----------
+    problem : Problem
+        Says which part of a state is a position, and of which body.
+    difference : ndarray, shape (n, dim)
+        States less the true ones.
+    true : ndarray, shape (m, dim)
+        The true states at all their stored times; they give the size.
+    """
+    size = float(largest_distance(problem, positions(problem, true)).max(initial=0.0))
+    return largest_distance(problem, positions(problem, difference)) / (size or 1.0)
+
+
+def _position_error(
+    problem: Problem, t: Array, y: Array, reference: Reference | None
+) -> tuple[Array, Array, Array]:
+    if reference is None:
+        return np.empty(0), np.empty(0), np.empty(0)
+    _, ours, theirs = np.intersect1d(t, reference.t, return_indices=True)
+    # the reference is a pair of doubles, so that its own rounding does not enter the difference
+    difference = (y[ours] - reference.high[theirs]) - reference.low[theirs]
+    error = position_error(problem, difference, reference.high)
+    return t[ours], error, ahead(problem, t[ours], reference.high[theirs], difference)
+
+
+def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
+    """Return how far in time a run is ahead: its difference from the reference along the field there.
+
+    Positions and momenta are each measured in units of their largest value, so that turning
+    points, where nothing moves, and the units of either do not matter.
+    """
+    field_ = emit.numpy(problem.system, "field")
+    flow = np.array([field_(time, state, problem.par) for time, state in zip(t, y, strict=True)])
+    flow = flow.reshape(y.shape)
+    along, speed = np.zeros(len(t)), np.zeros(len(t))
+    dof = problem.system.dof or problem.system.dim
+    for block in (slice(0, dof), slice(dof, None)):
+        size = float(np.abs(y[:, block]).max(initial=0.0)) or 1.0
+        along += (difference[:, block] / size * (flow[:, block] / size)).sum(axis=1)
+        speed += ((flow[:, block] / size) ** 2).sum(axis=1)
+    return along / speed
+
+
+def _count(value: Any) -> int | None:
+    return None if value is None else int(value)
+
+
+def _is_history(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu"

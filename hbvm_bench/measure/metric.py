@@ -1,0 +1,80 @@
+"""What a metric is, and when its number must not be compared."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hbvm_bench.measure.measured import Measured
+from hbvm_bench.measure.quantities import Quantity
+from hbvm_bench.store.records import Value
+
+# A symmetry guard that left zero by less than this, relative to the size of the
+# trajectory, has not yet changed the trajectory; the row says so all the same.
+GUARD_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One thing that is measured on every case.
+
+    Attributes
+    ----------
+    key : str
+        The name on the command line and in JSON.
+    label, short, unit : str
+        For sentences and axes, for column heads.
+    better : {"lower", None}
+        Which way is better; ``None`` where neither is.
+    scale : {"log", "linear"}
+        For axes and number formats.
+    function : callable
+        From `Measured` to the number, or to the sentence that says why there is none.
+    description : str
+        One sentence for readers.
+    same_trajectory : bool
+        Whether the number means something only on the trajectory that was asked
+        for, so that it is void where a symmetry guard is violated.
+    whole_span : bool
+        Whether the number needs the whole span, so that it is void for a case
+        that ended early.
+    problem : str or None
+        The only problem that has it, if it is not for all.
+    """
+
+    key: str
+    label: str
+    short: str
+    unit: str
+    better: Literal["lower"] | None
+    scale: Literal["log", "linear"]
+    function: Quantity
+    description: str
+    same_trajectory: bool = False
+    whole_span: bool = True
+    problem: str | None = None
+
+
+def guard_violation(measured: Measured) -> str:
+    """Return a sentence where the trajectory left the one that was asked for, else ``""``."""
+    size = float(np.max(measured.distance, initial=0.0))
+    for name, values in measured.guards.items():
+        worst = float(np.max(np.abs(values), initial=0.0))
+        if not worst <= GUARD_TOLERANCE * size:
+            return f"another trajectory: {name.replace('_', ' ')} reached {worst:.2g} instead of 0"
+    return ""
+
+
+def value(metric: Metric, measured: Measured) -> Value:
+    """Return a metric of a case, void or without a number where it has to be."""
+    with np.errstate(all="ignore"):
+        number = metric.function(measured)
+    if isinstance(number, str):
+        return Value(why=number)
+    if not np.isfinite(number):
+        return Value(why="not finite")
+    if metric.whole_span and not measured.complete:
+        return Value(value=float(number), void=True, why=f"only to t = {measured.t_stop:.4g}")
+    if metric.same_trajectory and (why := guard_violation(measured)):
+        return Value(value=float(number), void=True, why=why)
+    return Value(value=float(number))

@@ -1,0 +1,39 @@
+"""Integrate with a program that is compiled already: the bench integrates one case several times."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.protocol import MethodBase, Program, Status
+from integrators.solution import Solution
+from problems.problem import Problem
+
+
+def solve(problem: Problem, method: MethodBase, program: Program, times: NDArray[np.float64]) -> Solution:
+    """Return what `integrators.integrate` returns, without compiling again.
+
+    Parameters
+    ----------
+    problem, method
+        The method accepts the problem.
+    program : Program
+        What ``method.compile(problem.system)`` returned.
+    times : ndarray, shape (n,)
+        Sampling times.
+    """
+    stepper = program.start(problem.y0, problem.par, problem.t0)
+    samples = stepper.advance(times)
+    finished = samples.status is Status.FINISHED
+    return Solution(
+        t=samples.t,
+        y=samples.y,
+        status=samples.status,
+        reason=samples.reason,
+        t_stop=float(samples.t[-1]) if finished and samples.t.size else stepper.t,
+        stats=replace(stepper.stats),
+        compile_seconds=program.compile_seconds,
+        from_cache=program.from_cache,
+        problem=problem,
+        method=method,
+    )

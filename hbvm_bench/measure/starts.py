@@ -1,0 +1,57 @@
+"""Starts near a problem's own: for the law of a drift, and for ensembles."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.grid import GOLDEN
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+PERTURBATION = 1e-6
+"""Relative size of the changes of the starts from which a law is found."""
+
+
+def scaled(problem: Problem, count: int) -> Array:
+    """Return starts for the law of a drift, shape (count, dim); the first is the problem's own.
+
+    All positions are multiplied by one number and all momenta by another, both within
+    `PERTURBATION` of 1: round-off decorrelates, and a start that is symmetric, at rest or
+    in a plane stays so bit for bit. The numbers follow the golden ratio.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of any kind; a state without positions and momenta has one number.
+    count : int
+        How many, the problem's own among them.
+    """
+    dim, dof = problem.system.dim, problem.system.dof or problem.system.dim
+    number = np.arange(2 * count).reshape(count, 2)
+    factors = 1.0 + PERTURBATION * (2.0 * ((number * GOLDEN) % 1.0) - 1.0)
+    factors[0] = 1.0
+    return problem.y0 * np.repeat(factors, [dof, dim - dof], axis=1)
+
+
+def cloud(problem: Problem, count: int, spread: float) -> Array:
+    """Return the starts of an ensemble, shape (count, dim); the first is the problem's own.
+
+    Every number is multiplied by 1 + ``spread`` x, where x runs evenly through [-1, 1] in
+    all of them together: the Weyl sequence of the roots of x^(dim+1) = x + 1.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its start is the centre.
+    count : int
+        How many.
+    spread : float
+        Relative size.
+    """
+    dim = problem.system.dim
+    root = 1.5
+    for _ in range(64):
+        root = (1.0 + root) ** (1.0 / (dim + 1))
+    steps = root ** -np.arange(1.0, dim + 1.0)
+    x = 2.0 * ((0.5 + np.arange(count)[:, None] * steps) % 1.0) - 1.0
+    return problem.y0 * (1.0 + spread * x)

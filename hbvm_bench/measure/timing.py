@@ -1,0 +1,188 @@
+"""Warm seconds of whole integrations, honestly: compiled before, without output, samples kept."""
+
+import gc
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import TimingPlan
+from hbvm_bench.store.records import Compile, TimingRound
+from integrators.protocol import MethodBase, Program, Samples, Status
+from problems.problem import Problem
+
+WARM_UP = 0.01  # of the span: everything has run once
+SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
+CALIBRATION_LOOPS = 800_000
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A whole integration that returns its end state only, ready to be timed.
+
+    Attributes
+    ----------
+    program : Program
+        Compiled.
+    y0, par : ndarray
+        Where it starts, and the parameters.
+    t0, t_end : float
+        The span.
+    sample : str or None
+        How the end time is met; see `integrators.protocol.MethodBase.to_end`.
+    """
+
+    program: Program
+    y0: NDArray[np.float64]
+    par: NDArray[np.float64]
+    t0: float
+    t_end: float
+    sample: str | None
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        method: MethodBase,
+        program: Program | None = None,
+        *,
+        t_end: float | None = None,
+    ) -> "Run":
+        """Return the run of a method on a problem, which meets its end as the method's library does.
+
+        Parameters
+        ----------
+        problem, method
+            What to integrate, and how.
+        program : Program, optional
+            What ``method.compile(problem.system)`` returned; made anew by default.
+        t_end : float, optional
+            The problem's own by default.
+        """
+        program = method.compile(problem.system) if program is None else program
+        end = problem.t_end if t_end is None else t_end
+        return cls(program, problem.y0, problem.par, problem.t0, end, method.to_end)
+
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
+        """Return the mean seconds of ``repeats`` runs one after the other, and what the last returned.
+
+        Only ``advance`` is timed: making a stepper belongs to setting up. Garbage
+        collection is off meanwhile.
+        """
+        end = np.array([self.t_end])
+        spent, samples = 0.0, None
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            for _ in range(repeats):
+                stepper = self.program.start(self.y0, self.par, self.t0)
+                start = clock()
+                samples = stepper.advance(end, sample=self.sample)
+                spent += clock() - start
+        finally:
+            if collecting:
+                gc.enable()
+        if samples is None:
+            raise ValueError(f"repeats must be at least 1, not {repeats!r}")
+        return spent / repeats, samples
+
+    def until(self, share: float) -> "Run":
+        """Return the run over the first ``share`` of the span."""
+        return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
+
+
+def repeats_for(seconds: float, shortest: float) -> int:
+    """Return how many runs of ``seconds`` make a sample that lasts ``shortest``, with a reserve."""
+    return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1
+
+
+def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> TimingRound | str:
+    """Take the samples of one round.
+
+    Parameters
+    ----------
+    problem, method
+        What to time: integrations from ``t0`` to ``t_end`` that return the end state only.
+    plan : TimingPlan
+        How many samples, and how long they may take.
+
+    Returns
+    -------
+    TimingRound or str
+        A sentence where the integration does not reach the end.
+    """
+    run = Run.of(problem, method)
+    run.until(WARM_UP).seconds()
+    return sampled(run, run.program, plan)
+
+
+class Timeable(Protocol):
+    """What can be timed: a `Run`, or an ensemble."""
+
+    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+        """Return the mean seconds of some runs, and what the last returned."""
+        ...
+
+
+def sampled(run: Timeable, program: Program, plan: TimingPlan) -> TimingRound | str:
+    """Take the samples of one round of a run that is warm; see `time_round`."""
+    wall, busy = time.perf_counter(), time.process_time()
+    calibration = [calibrate()]
+    first, reached = run.seconds()
+    if reached.status is not Status.FINISHED:
+        return f"not timed: the integration ended as {reached.status.value}"
+    repeats = repeats_for(first, plan.shortest)
+    samples = [first] if first > SLOW else []
+    calibration += [calibrate()] if samples else []
+    spent = sum(samples)
+    while len(samples) < plan.samples and (not samples or spent + first * repeats <= plan.budget):
+        mean, _ = run.seconds(repeats)
+        samples.append(mean)
+        calibration.append(calibrate())
+        spent += mean * repeats
+    wall, busy = time.perf_counter() - wall, time.process_time() - busy
+    return TimingRound(
+        share=round(busy / wall, 3),
+        samples=samples,
+        repeats=repeats,
+        calibration=calibration,
+        compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
+    )
+
+
+def calibrate() -> float:
+    """Return the seconds of a fixed computation that has nothing to do with any integrator.
+
+    It divides out how fast the machine is at the moment: square roots, divisions and
+    multiply-adds in four independent chains, compiled, about 10 ms.
+    """
+    loop = _calibration_loop()
+    loop(1000)
+    start = time.perf_counter()
+    loop(CALIBRATION_LOOPS)
+    return time.perf_counter() - start
+
+
+@cache
+def _calibration_loop() -> Any:
+    import numba
+
+    # it calls nothing else that is compiled, so numba's own cache cannot be stale; a second saved per visit
+    @numba.njit(cache=True)
+    def loop(n: int) -> float:
+        a, b, c, d = 1.1, 1.2, 1.3, 1.4
+        for _ in range(n):
+            a = 1.0 / math.sqrt(1.0 + a * a) + 0.5
+            b = 1.0 / math.sqrt(1.0 + b * b) + 0.5
+            c = 1.0 / math.sqrt(1.0 + c * c) + 0.5
+            d = 1.0 / math.sqrt(1.0 + d * d) + 0.5
+        return a + b + c + d
+
+    return loop

@@ -1,0 +1,1 @@
+"""Trusted solutions: stored ones, and how they are made."""

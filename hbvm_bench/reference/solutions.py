@@ -1,0 +1,286 @@
+"""Trusted solutions: computed once in 128-bit arithmetic, stored as text with their provenance.
+
+A reference belongs to the exact doubles a problem starts from. It is made by
+heyoka's Taylor method in 128-bit floating point from the same traced vector
+field, and its accuracy is what a second run with another tolerance leaves of it.
+"""
+
+import ast
+import platform
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from functools import lru_cache
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from problems import emit
+from problems.errors import InputError, MissingLibraryError
+from problems.problem import Problem
+from problems.systems.base import System
+
+Array = NDArray[np.float64]
+
+TOLERANCE = "1e-28"
+CHECK_TOLERANCE = "1e-25"
+INTERVALS = 60
+
+
+class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A stored reference as it stands in its file.
+
+    Attributes
+    ----------
+    problem : str
+        The problem as it prints.
+    start, parameters : list of str
+        ``t0`` and the initial state, and the parameters: the doubles in hexadecimal.
+    provenance : dict of str
+        What computed it, and what a second computation says.
+    t : list of str
+        The times, doubles in hexadecimal.
+    y : list of list of str
+        The states in decimal.
+    """
+
+    problem: str
+    start: list[str]
+    parameters: list[str]
+    provenance: dict[str, str]
+    t: list[str]
+    y: list[list[str]]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A trusted solution, each number as an unevaluated sum of two doubles.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        The times.
+    high, low : ndarray, shape (n, dim)
+        The states are ``high + low``.
+    provenance : dict of str
+        What computed it, and what a second computation says.
+    """
+
+    t: Array
+    high: Array
+    low: Array
+    provenance: dict[str, str]
+
+
+def folder() -> Path:
+    """Return where the references that come with the package lie."""
+    return Path(str(files("hbvm_bench.reference") / "data"))
+
+
+def find(problem: Problem, where: Path | None = None) -> Reference | None:
+    """Return the stored reference of a problem, or ``None``.
+
+    Parameters
+    ----------
+    problem : Problem
+        Matched by its name, its initial state and its parameters, bit for bit.
+    where : Path, optional
+        The folder to look in; the package's own by default.
+    """
+    path = _path(problem, where)
+    return None if path is None else _parsed(path)
+
+
+def find_file(problem: Problem, where: Path | None = None) -> ReferenceFile | None:
+    """Return the stored reference of a problem with all its digits, or ``None``; see `find`."""
+    path = _path(problem, where)
+    return None if path is None else read(path)
+
+
+def _path(problem: Problem, where: Path | None) -> Path | None:
+    wanted = start(problem), hexadecimal(problem.par)
+    for path in sorted((where or folder()).glob(f"{problem.name}*.json")):
+        stored = read(path)
+        if (stored.start, stored.parameters) == wanted:
+            return path
+    return None
+
+
+def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
+    """Compute the reference of a problem; it takes seconds to minutes.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate; every number enters as the exact double.
+    intervals : int
+        The states are kept at this many equal intervals of the span.
+
+    Returns
+    -------
+    ReferenceFile
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        Without heyoka.
+    problems.errors.InputError
+        If the computation does not reach the end time.
+    """
+    # multiplied first: round numbers stay round, and are met by a sampling grid
+    times = problem.t0 + (problem.t_end - problem.t0) * np.arange(intervals + 1) / intervals
+    states = taylor(problem, times, TOLERANCE)
+    check = taylor(problem, times, CHECK_TOLERANCE)
+    difference = max(
+        abs(a - b) for row, other in zip(states, check, strict=True) for a, b in zip(row, other, strict=True)
+    )
+    return ReferenceFile(
+        problem=repr(problem),
+        start=start(problem),
+        parameters=hexadecimal(problem.par),
+        provenance={
+            "method": f"heyoka taylor_adaptive, fp_type=real128, tol={TOLERANCE}, high_accuracy=True",
+            "heyoka": version("heyoka"),
+            "python": platform.python_version(),
+            "field": emit.fingerprint(problem.system),
+            "check": f"largest difference of any component from tol={CHECK_TOLERANCE}: {difference:.1e}",
+        },
+        t=hexadecimal(times),
+        y=[[str(value) for value in row] for row in states],
+    )
+
+
+def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
+    """Return the largest difference of any component of two references of one problem."""
+    if (stored.start, stored.parameters, stored.t) != (fresh.start, fresh.parameters, fresh.t):
+        raise InputError(f"{stored.problem} and {fresh.problem} are references of different problems.")
+    pairs = zip(stored.y, fresh.y, strict=True)
+    return max(
+        abs(_CONTEXT.subtract(Decimal(a), Decimal(b)))
+        for row, other in pairs
+        for a, b in zip(row, other, strict=True)
+    )
+
+
+def encode(stored: ReferenceFile) -> str:
+    """Return the text of a reference file, one state a line."""
+    head = {
+        "problem": stored.problem,
+        "provenance": stored.provenance,
+        "start": stored.start,
+        "parameters": stored.parameters,
+        "t": stored.t,
+    }
+    lines = [f"{_text(key)}: {_text(value)}" for key, value in head.items()]
+    rows = ",\n".join(f"  {_text(row)}" for row in stored.y)
+    return "{" + ",\n".join([*lines, f'"y": [\n{rows}\n]']) + "}\n"
+
+
+_CONTEXT = Context(prec=60)
+
+
+def _text(value: object) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def hexadecimal(values: Array) -> list[str]:
+    """Return doubles as text that loses nothing."""
+    return [value.hex() for value in np.asarray(values, float).tolist()]
+
+
+def start(problem: Problem) -> list[str]:
+    """Return the initial time and state of a problem, as in a file."""
+    return [float(problem.t0).hex(), *hexadecimal(problem.y0)]
+
+
+@lru_cache(maxsize=64)
+def read(path: Path) -> ReferenceFile:
+    """Return a stored reference with all its digits."""
+    return msgspec.json.decode(path.read_bytes(), type=ReferenceFile)
+
+
+@lru_cache(maxsize=8)
+def _parsed(path: Path) -> Reference:
+    return parse(read(path))
+
+
+def parse(stored: ReferenceFile) -> Reference:
+    """Return a stored reference as pairs of doubles."""
+    exact = [[Decimal(value) for value in row] for row in stored.y]
+    high = np.array([[float(value) for value in row] for row in exact])
+    low = np.array([[float(_CONTEXT.subtract(v, Decimal(float(v)))) for v in row] for row in exact])
+    return Reference(np.array([float.fromhex(t) for t in stored.t]), high, low, stored.provenance)
+
+
+def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "real128") -> list[list[Decimal]]:
+    """Return the states at given times by heyoka's Taylor method.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate; every number enters as the exact double.
+    times : ndarray, shape (n,)
+        Times from ``t0`` on.
+    tolerance : str
+        Decimal text.
+    precision : {"real128", "longdouble"}
+        Arithmetic: 113 or 64 bits.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        Without heyoka.
+    problems.errors.InputError
+        If the computation does not reach the last time.
+    """
+    try:
+        import heyoka as hy
+    except ImportError:
+        raise MissingLibraryError(
+            "a reference needs heyoka; install it with: pip install 'hbvm-bench[peers]'."
+        ) from None
+    real = hy.real128 if precision == "real128" else np.longdouble
+    integrator = hy.taylor_adaptive(
+        _expressions(problem.system, hy, real),
+        np.array([real(value) for value in problem.y0.tolist()]),
+        time=real(float(problem.t0)),
+        pars=np.array([real(value) for value in problem.par.tolist()]),
+        fp_type=real,
+        tol=real(tolerance),
+        high_accuracy=True,
+        compact_mode=problem.system.dim > 40,
+    )
+    outcome = integrator.propagate_grid(np.array([real(float(time)) for time in times]))
+    states = outcome[-1]
+    if len(states) != len(times):
+        raise InputError(f"the reference of {problem!r} stopped before its end time: {outcome[0]}.")
+    return [[Decimal(str(value)) for value in row] for row in states]
+
+
+class _Numbers(ast.NodeTransformer):
+    """Turns literals into numbers of the arithmetic in use."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        if not isinstance(node.value, float):
+            return node
+        return ast.Call(ast.Name("number", ast.Load()), [node], [])
+
+
+def _expressions(system: System, hy: Any, real: Any) -> list[Any]:
+    """Return heyoka's expressions with literals in full precision.
+
+    With double literals heyoka would turn a division by 3 into a multiplication
+    by the double next to 1/3, whatever the precision of the integration.
+    """
+    made = emit.source(system, "field", "heyoka")
+    tree = ast.fix_missing_locations(_Numbers().visit(ast.parse(made.text)))
+    namespace: dict[str, Any] = {"number": lambda value: hy.expression(real(value))}
+    exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
+    variables = [variable for variable, _ in emit.heyoka(system)]
+    found = namespace[made.name](hy.time, variables, hy.par, hy)
+    found = [e if isinstance(e, hy.expression) else hy.expression(real(e)) for e in found]
+    return list(zip(variables, found, strict=True))

@@ -1,0 +1,180 @@
+"""References by two independent computations, and how far they agree.
+
+Up to `SMALL` unknowns: heyoka's Taylor method in 128-bit arithmetic, checked by
+Gauss collocation in double-double arithmetic (`hbvm_bench.reference.collocation`); they
+must agree to 1e-20. Above: the collocation, checked by the Taylor method in
+long double, to 1e-15. A chaotic problem has a reference as far as they agree.
+"""
+
+import platform
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from importlib.metadata import version
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.reference import collocation, solutions
+from hbvm_bench.reference.solutions import ReferenceFile
+from problems import emit
+from problems.errors import InputError
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+SMALL = 60  # unknowns
+GRID = 1000  # the bench's own grid: a reference's times are among its samples
+# How many states are kept at most, so that the files stay small: (unknowns up to, states).
+ROWS = ((20, 50), (SMALL, 20), (100, 10))
+FEW_ROWS = 4  # of larger systems
+FEW_DIGITS = 21  # above SMALL unknowns
+LONG_DOUBLE_TOLERANCE = "1e-20"
+
+
+@dataclass(frozen=True)
+class Opinions:
+    """Two computations of one problem.
+
+    Attributes
+    ----------
+    times : ndarray, shape (n,)
+        Where both were looked at.
+    states : list of list of Decimal
+        The first, more accurate one.
+    first, second : str
+        What computed them.
+    apart : ndarray, shape (n,)
+        Largest difference of a position (or a momentum) up to each time, relative
+        to the largest position (momentum) of all.
+    wanted : float
+        How far they may differ.
+    """
+
+    times: Array
+    states: list[list[Decimal]]
+    first: str
+    second: str
+    apart: Array
+    wanted: float
+
+    @property
+    def agreed(self) -> int:
+        """How many of the times come before they differ by more than what is wanted."""
+        return (
+            int(np.argmax(self.apart > self.wanted)) if (self.apart > self.wanted).any() else len(self.times)
+        )
+
+
+def times(problem: Problem, until: float | None = None) -> Array:
+    """Return some times of the bench's grid, the start and the last one up to ``until`` among them.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If ``until`` is not within the problem's span, or nearer than its first sample.
+    """
+    span = problem.t_end - problem.t0
+    count = GRID
+    if until is not None:
+        part = (until - problem.t0) / span
+        if not 0 < part <= 1:
+            raise InputError(f"until={until!r} must lie between {problem.t0!r} and {problem.t_end!r}.")
+        count = int(part * GRID * (1 + 1e-12))
+        if count == 0:
+            raise InputError(f"until={until!r} comes before the first sample, {problem.t0 + span / GRID!r}.")
+    rows = next((rows for most, rows in ROWS if problem.system.dim <= most), FEW_ROWS)
+    places = np.append(np.arange(0, count, -(-count // rows)), count)
+    # As the bench computes its own grid, so that the times are the same doubles.
+    return problem.t0 + span * places / GRID
+
+
+def ask(problem: Problem, at: Array) -> Opinions:
+    """Compute a problem twice, at the given times."""
+    pairs = collocation.integrate(problem, at)
+    gauss = (
+        f"Gauss collocation with {collocation.STAGES} stages, double-double arithmetic, "
+        f"last Legendre coefficient {collocation.DECAY:g}"
+    )
+    with mpmath.workdps(40):
+        collocated = [[Decimal(str(mpmath.nstr(x, 36))) for x in row] for row in collocation.decimals(pairs)]
+    if problem.system.dim <= SMALL:
+        states = solutions.taylor(problem, at, solutions.TOLERANCE)
+        made = f"heyoka taylor_adaptive, fp_type=real128, tol={solutions.TOLERANCE}, high_accuracy=True"
+        return Opinions(at, states, made, gauss, _apart(problem, states, collocated), 1e-20)
+    other = solutions.taylor(problem, at, LONG_DOUBLE_TOLERANCE, "longdouble")
+    made = f"heyoka taylor_adaptive, fp_type=longdouble, tol={LONG_DOUBLE_TOLERANCE}, high_accuracy=True"
+    return Opinions(at, collocated, gauss, made, _apart(problem, collocated, other), 1e-15)
+
+
+def make(problem: Problem, until: float | None = None, at: Array | None = None) -> ReferenceFile:
+    """Return a reference that two computations agree on; seconds to minutes.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate.
+    until : float, optional
+        How far; by default the end of the problem's span.
+    at : ndarray, optional
+        The times instead of the bench's own, as those of a stored reference.
+
+    Returns
+    -------
+    ReferenceFile
+        It ends where the two begin to differ.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If they do not agree anywhere.
+    """
+    opinions = ask(problem, times(problem, until) if at is None else at)
+    kept = opinions.agreed
+    if kept < 2:
+        raise InputError(
+            f"two computations of {problem!r} differ by {opinions.apart[1]:.1e} already at "
+            f"t = {float(opinions.times[1])!r}; ask for less with until=."
+        )
+    horizon = "the whole span" if opinions.times[kept - 1] == problem.t_end else "this horizon"
+    return ReferenceFile(
+        problem=repr(problem),
+        start=solutions.start(problem),
+        parameters=solutions.hexadecimal(problem.par),
+        provenance={
+            "method": opinions.first,
+            "check": opinions.second,
+            "agreement": (
+                f"{opinions.apart[kept - 1]:.1e} relative to the largest component, over {horizon} "
+                f"(t <= {opinions.times[kept - 1]:g}, {opinions.wanted:g} wanted)"
+            ),
+            "heyoka": version("heyoka"),
+            "python": platform.python_version(),
+            "field": emit.fingerprint(problem.system),
+        },
+        t=solutions.hexadecimal(opinions.times[:kept]),
+        y=[[_text(problem, value) for value in row] for row in opinions.states[:kept]],
+    )
+
+
+def _text(problem: Problem, value: Decimal) -> str:
+    if problem.system.dim <= SMALL:
+        return str(value)
+    return str(Context(prec=FEW_DIGITS).plus(value))
+
+
+def _apart(problem: Problem, one: list[list[Decimal]], other: list[list[Decimal]]) -> Array:
+    a, b = (np.array([[float(value) for value in row] for row in rows]) for rows in (one, other))
+    gap = np.array(
+        [
+            [float(abs(x - y)) for x, y in zip(row, rest, strict=True)]
+            for row, rest in zip(one, other, strict=True)
+        ]
+    )
+    found = np.zeros(len(gap))
+    dof = problem.system.dof or problem.system.dim
+    for block in (slice(0, dof), slice(dof, None)):
+        if gap[:, block].size:
+            size = max(np.abs(a[:, block]).max(), np.abs(b[:, block]).max())
+            found = np.maximum(found, gap[:, block].max(axis=1) / (size or 1.0))
+    return np.maximum.accumulate(found)

@@ -1,0 +1,224 @@
+"""Figures as files: deterministic SVG and PNG, and SVG that takes the colours of the page."""
+
+import io
+import math
+import re
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
+
+from hbvm_bench.report.figures.plots import Plot
+from hbvm_bench.report.figures.png import small, with_small_images
+from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
+
+FONT = "DejaVu Sans"
+SETTINGS: Any = {
+    "svg.fonttype": "none",  # text stays text: it can be read aloud, searched and selected
+    "svg.hashsalt": "hbvm-bench",
+    "font.family": FONT,
+    "font.size": 9,
+    "text.color": INK,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 9,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.6,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "lines.linewidth": 1.3,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 2.6,
+    "figure.facecolor": PAPER,
+    "axes.facecolor": PAPER,
+    "savefig.facecolor": PAPER,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.4,
+}
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a report.
+
+    Attributes
+    ----------
+    key : str
+        Its file name without the ending, and its anchor.
+    title, caption : str
+        For readers.
+    summary : str
+        What it shows, for those who do not see it.
+    svg : str
+        Self-contained.
+    png : bytes
+        The same picture.
+    plot : Plot or None
+        What it shows, as numbers.
+    """
+
+    key: str
+    title: str
+    caption: str
+    summary: str
+    svg: str
+    png: bytes
+    plot: Plot | None = None
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[\w-]+", self.key):
+            raise ValueError(f"{self.key!r} can be no anchor and no file name")
+
+
+def drawing() -> AbstractContextManager[None]:
+    """Return the context in which figures are made, so that they all look alike."""
+    return mpl.rc_context(SETTINGS)
+
+
+def picture(
+    figure: Figure, key: str, title: str, caption: str, summary: str, plot: Plot | None = None
+) -> Picture:
+    """Render a figure; the same figure gives the same bytes."""
+    svg, png = io.StringIO(), io.BytesIO()
+    with mpl.rc_context(SETTINGS | {"svg.hashsalt": f"hbvm-bench-{key}"}):
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(png, format="png", dpi=160, metadata={"Software": None})
+    text = svg.getvalue()
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
+    text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
+    return Picture(
+        key, title, caption, summary, compact(with_small_images(text)), small(png.getvalue()), plot
+    )
+
+
+def compact(svg: str) -> str:
+    """Return an SVG without what nobody sees: digits below a hundredth of a point, ids, blanks."""
+    svg = re.sub(r'\b(d|x|y|transform)="([^"]*)"', _rounded, svg)
+    svg = re.sub(r' transform="rotate\(-0 [^"]*\)"', "", svg)
+    svg = re.sub(r' id="[A-Za-z0-9.]+_\d+"', "", svg)
+    svg = re.sub(r">\s*\n\s*<", "><", svg)
+    svg = re.sub(r'(?<=style=")[^"]*', lambda style: style[0].replace("; ", ";").replace(": ", ":"), svg)
+    svg = re.sub(r"<g((?: clip-path=\"[^\"]*\")?)>((?:<use [^>]*/>)+)</g>", _with_one_style, svg)
+    families = re.findall(r"font-family:[^;\"]*", svg)
+    if len(set(families)) == 1:
+        svg = svg.replace(f"{families[0]};", "").replace("</style>", f"text{{{families[0]}}}</style>", 1)
+    return svg
+
+
+def _with_one_style(match: re.Match[str]) -> str:
+    """Put the style that all markers of a line share on their group."""
+    styles = set(re.findall(r' style="[^"]*"', match[2]))
+    if len(styles) != 1 or match[2].count(" style=") != match[2].count("<use "):
+        return match[0]
+    style = styles.pop()
+    return f"<g{match[1]}{style}>{match[2].replace(style, '')}</g>"
+
+
+def _rounded(match: re.Match[str]) -> str:
+    value = re.sub(r"-?\d+\.\d+", lambda number: f"{round(float(number[0]), 2):.4g}", match[2])
+    value = " ".join(value.split())
+    if match[1] == "d" and not re.search("[CQ]", value):
+        value = value.replace(" L ", " ")  # what follows the first point of a path is a line anyway
+    return f'{match[1]}="{value}"'
+
+
+def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
+    """Return the SVG for a page: its colours are the page's variables, its size is the page's.
+
+    Parameters
+    ----------
+    picture : Picture
+        A rendered figure.
+    colours : mapping of str to str
+        From colour to name of the variable, for the cases.
+    """
+    variables = {**NEUTRALS, **colours}
+    text = re.sub(
+        r"#[0-9a-f]{6}\b",
+        lambda match: f"var({variables[match[0]]})" if match[0] in variables else match[0],
+        picture.svg,
+    )
+    width, height = re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', text)[0]
+    head = (
+        f'<svg role="img" aria-labelledby="{picture.key}-title {picture.key}-desc" '
+        f'viewBox="0 0 {width} {height}" xmlns="http://www.w3.org/2000/svg" '
+        'xmlns:xlink="http://www.w3.org/1999/xlink">'
+    )
+    # ids are unique in a file; in a page they must be unique among all its figures
+    text = re.sub(r'\bid="', f'id="{picture.key}-', text)
+    text = re.sub(r'(xlink:href="|url\()#', rf"\1#{picture.key}-", text)
+    return re.sub(r"<svg[^>]*>", lambda _: head, text, count=1)
+
+
+def new(width: float, height: float) -> Figure:
+    """Return an empty figure of ``width`` × ``height`` inches."""
+    return Figure(figsize=(width, height))
+
+
+def log_axis(
+    axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
+) -> None:
+    """Make an axis logarithmic from 10^low to 10^high with its labels written as powers.
+
+    Parameters
+    ----------
+    axes : Axes
+        Whose axis.
+    which : {"x", "y"}
+        Which axis.
+    low, high : int
+        Powers of ten.
+    most : int
+        At most this many labels.
+    zero : float, optional
+        Where values that are exactly 0 are drawn; labelled so.
+    """
+    stride = max(1, -(-(high - low) // most))
+    ticks = [10.0**power for power in range(low, high + 1) if (power - high) % stride == 0]
+    labels = {tick: power_label(tick) for tick in ticks}
+    if zero is not None:
+        labels = {tick: text for tick, text in labels.items() if tick > zero * 10.0 ** (stride / 2)}
+        labels[zero] = "exactly 0"
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+    (axes.set_xlim if which == "x" else axes.set_ylim)(10.0**low, 10.0**high)
+    axis.set_major_locator(FixedLocator(sorted(labels)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, power_label(value))))
+
+
+def power_range(values: Iterable[NDArray[np.float64]], low: int, high: int) -> tuple[int, int]:
+    """Return the powers of ten between which positive values lie, within ``low`` and ``high``."""
+    logs = [np.log10(v[(v > 0) & np.isfinite(v)]) for v in values]
+    logs = [one for one in logs if one.size]
+    if not logs:
+        return low, high
+    bottom = max(low, math.floor(min(float(one.min()) for one in logs)))
+    top = min(high, math.ceil(max(float(one.max()) for one in logs)))
+    return min(bottom, high - 1), max(top, min(bottom, high - 1) + 1)
+
+
+def power_label(value: float) -> str:
+    """Write a power of ten: ``10⁻¹⁵``."""
+    exponent = round(math.log10(value))
+    return "1" if exponent == 0 else "10" if exponent == 1 else "10" + str(exponent).translate(_SUPERSCRIPT)

@@ -1,0 +1,127 @@
+"""The drift of an invariant: its error over the starts, and the law that was fitted to it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.measure import drift
+from hbvm_bench.measure.laws import curve, find
+from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_range
+from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.store.records import Law
+from hbvm_bench.summaries.laws import text
+from hbvm_bench.summaries.rows import group_of
+
+Array = NDArray[np.float64]
+
+PER_DECADE = 6  # windows of time in which the error is drawn
+LAW_POINTS = 40
+EARLIEST = 30  # without laws in the store, one is fitted from this part of the span on
+MOST_CASES = 60
+POWERS = (-18, 3)  # an error beyond is no drift but a failure, and is in the table
+
+Found = tuple[Array, Array, Law]
+
+
+def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture | None:
+    """Draw the error of an invariant, rms over starts and windows of time, with its law; else ``None``."""
+    found = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c, invariant)) is not None}
+    shown = [case for case in cases if case.record.id in found and _visible(found[case.record.id][1])]
+    if not shown:
+        return None
+    laws = {number: law for number, (_, _, law) in found.items()}
+    curves = {number: _windows(t, rows) for number, (t, rows, _) in found.items()}
+    label = f"error of {invariant.replace('_', ' ')}, rms"
+    figure, grid = family_panels(shown, label)
+    low, high = power_range([y for _, y in curves.values()], *POWERS)
+    times = np.concatenate([t for t, _ in curves.values()])
+    traces: list[Trace] = []
+    for axes, members in grid:
+        log_axis(axes, "y", low, high)
+        left, right = power_range([times], -6, 12)
+        log_axis(axes, "x", left, right, most=4)
+        axes.set_xlim(times.min() / 1.3, times.max() * 1.3)
+        for case in members:
+            t, error = curves[case.record.id]
+            law = laws[case.record.id]
+            at, fitted = _law(law, t)
+            axes.plot(t, error, case.look.marker, color=case.look.light, markersize=2.4, linestyle="")
+            (line,) = axes.plot(at, fitted, color=case.look.light, linewidth=1.1)
+            if case.look.dash:
+                line.set_dashes(case.look.dash)
+            traces += [
+                trace(case, t, error),
+                Trace(case.look.number, case.record.case.method, at, fitted, "law", text(law)),
+            ]
+        panel_legend(
+            axes,
+            members,
+            markers=True,
+            notes={case.record.id: text(laws[case.record.id]).replace(" to ", "–") for case in members},
+        )
+    starts = max(law.starts for law in laws.values())
+    over = (
+        f"{starts} starts (the problem's own, the others changed in their last digits)"
+        if starts > 1
+        else f"windows of time, from one start; the law is fitted from a {EARLIEST}th of the span on, when "
+        "an oscillation has shown its size"
+    )
+    return picture(
+        figure,
+        "drift" if invariant == "energy" else f"drift-{invariant.replace('_', '-')}",
+        f"Drift of the {invariant.replace('_', ' ')} and its law",
+        f"Markers: root mean square of the error over {over}. Lines: the law that was fitted, "
+        "a floor with a growth; its power of t stands with its 95 % interval. Bounded or t^1/2 is the best "
+        "there is; a law is what these samples show, not a proof."
+        + (f" {drift.told(starts)}." if starts > 1 and invariant == "energy" else ""),
+        "Law of each case. "
+        + "; ".join(f"{c.record.case.method}: {text(laws[c.record.id])}" for c in shown)
+        + ".",
+        Plot([Panel("", Axis("time", log=True, both=True), Axis(label, log=True), traces)]),
+    )
+
+
+def _visible(rows: Array) -> bool:
+    positive = np.abs(rows[np.isfinite(rows) & (rows != 0.0)])
+    return positive.size > 0 and float(np.median(positive)) < 10.0 ** POWERS[1]
+
+
+def _drift(case: Drawn, invariant: str) -> Found | None:
+    """Return times, errors of shape (starts, n) and their law: as stored, or else from this trajectory."""
+    stored = case.record.result.laws.get(invariant)
+    if stored is not None and f"drift.{invariant}" in case.series:
+        t, rows = case.series["drift.t"], np.atleast_2d(case.series[f"drift.{invariant}"])
+        return (t, rows, stored) if t.size > 1 else None
+    name = f"error.{invariant}"
+    if group_of(case.record) != "on" or name not in case.series:
+        return None
+    t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series[name]
+    later = t >= t[-1] / EARLIEST
+    if later.sum() < 2 or not np.isfinite(error).all():
+        return None
+    law = find(t[later], error[None, later], signed=False)
+    return t[1:], error[None, 1:], law
+
+
+def _windows(t: Array, rows: Array) -> tuple[Array, Array]:
+    """Return the rms over starts in windows that are equally long in log t; what is 0 is left out."""
+    good = np.isfinite(rows).all(axis=0) & (t > 0)
+    t, each = t[good], drift.rms(rows[:, good])
+    if not t.size:
+        return np.empty(0), np.empty(0)
+    number = np.floor(np.log10(t / t[0]) * PER_DECADE + 1e-9)
+    windows = np.unique(number)
+    middle = np.array([np.exp(np.mean(np.log(t[number == n]))) for n in windows])
+    error = np.array([drift.rms(each[number == n][:, None])[0] for n in windows])
+    return middle[error > 0], error[error > 0]
+
+
+def _law(law: Law, t: Array) -> tuple[Array, Array]:
+    if law.law is None or t.size < 2:
+        return np.empty(0), np.empty(0)
+    at = np.geomspace(max(t[0], t[-1] / EARLIEST) if law.starts == 1 else t[0], t[-1], LAW_POINTS)
+    fitted = curve(law, at)
+    good = fitted > 0
+    return at[good], fitted[good]

@@ -1,0 +1,240 @@
+"""Errors over time, and what the figures of cases share: their panels and legends."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, MUTED, Look, method_name, options, panels
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of
+
+Array = NDArray[np.float64]
+
+BINS = 60  # an error series is drawn as its largest value in each of so many spans
+FINE_BINS = 120  # and in so many in the page's interactive figures
+COLUMNS = 4
+# Inches: the panels of all figures over time have one size and stand under each other.
+WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
+TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case with what is needed to draw it."""
+
+    record: Record
+    look: Look
+    series: dict[str, Array]
+
+    def legend(self, *, named: bool) -> str:
+        """Return its number, its name if ``named``, its options, and a mark where it failed."""
+        mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
+        name = f"{method_name(self.record)}  " if named else ""
+        return f"{self.look.number}  {name}{options(self.record)}{mark}"
+
+
+@dataclass(frozen=True)
+class OverTime:
+    """What a figure of an error over time shows.
+
+    Attributes
+    ----------
+    key, title, caption, label : str
+        The label is the axis's.
+    get : callable
+        From the series of a case to times and values; ``None`` where it has none.
+    low, high : int
+        Powers of ten of the axis.
+    zero : bool
+        Whether "exactly 0" is a place on the axis.
+    joined : bool
+        Whether the samples are joined and binned (else: drawn as markers).
+    """
+
+    key: str
+    title: str
+    caption: str
+    label: str
+    get: Callable[[dict[str, Array]], tuple[Array, Array] | None]
+    low: int
+    high: int
+    zero: bool = False
+    joined: bool = True
+
+
+def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
+    """Draw an error over time, a panel per family; ``None`` if no case has it."""
+    shown = [case for case in cases if what.get(case.series) is not None]
+    if not shown:
+        return None
+    figure, grid = family_panels(shown, what.label)
+    for axes, members in grid:
+        log_axis(axes, "y", what.low, what.high, zero=10.0**what.low if what.zero else None)
+        axes.grid(visible=False, axis="x")
+        ends = [case.series["t"][[0, -1]] for case in shown]
+        axes.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+        for case in members:
+            _draw_error(axes, case, what)
+        panel_legend(axes, members, markers=not what.joined)
+    plot = Plot(
+        [
+            Panel(
+                "",
+                Axis("time", both=True),
+                Axis(what.label, log=True, low=what.low, high=what.high),
+                _curves(shown, what),
+            )
+        ]
+    )
+    return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what), plot)
+
+
+def trace(case: Drawn, x: Array, y: Array) -> Trace:
+    """Return a curve of a case for the page."""
+    return Trace(case.look.number, case.record.case.method, x, y)
+
+
+def _curves(cases: Sequence[Drawn], what: OverTime) -> list[Trace]:
+    made = []
+    for case in cases:
+        t, values = _finite(case, what)
+        if what.joined:
+            t, values = envelope(t, values, FINE_BINS)
+        made.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
+    return made
+
+
+def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
+    got = what.get(case.series)
+    assert got is not None
+    t, values = got
+    finite = np.isfinite(values)
+    return t[finite], np.abs(values[finite])
+
+
+def family_panels(
+    cases: Sequence[Drawn], label: str, *, height: float = 1.75
+) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
+    """Return a figure with a panel per family, all of one size, with room for a legend under each.
+
+    Parameters
+    ----------
+    cases : sequence of Drawn
+        Divided as `style.panels` does.
+    label : str
+        Of the vertical axes.
+    height : float
+        Of a panel, in inches.
+    """
+    by_id = {case.record.id: case for case in cases}
+    groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
+    rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
+    heights = [TOP + height + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
+    figure = new(WIDTH, sum(heights))
+    panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
+    made: list[tuple[Axes, list[Drawn]]] = []
+    ceiling = sum(heights)
+    for row, used in zip(rows, heights, strict=True):
+        for column, (name, members) in enumerate(row):
+            x, y = LEFT + column * (panel + GAP), ceiling - TOP - height
+            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, height / sum(heights)))
+            axes.set_title(name, color=INK)
+            axes.text(1.0, -0.2, "time", transform=axes.transAxes, ha="right", fontsize=8, color=MUTED)
+            axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
+            if column == 0:
+                axes.set_ylabel(label)
+                axes.yaxis.set_label_coords(-0.72 / panel, 0.5)
+            else:
+                axes.tick_params(labelleft=False)
+            made.append((axes, members))
+        ceiling -= used
+    return figure, made
+
+
+def panel_legend(
+    axes: Axes,
+    cases: Sequence[Drawn],
+    *,
+    markers: bool = False,
+    notes: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
+    named = len({method_name(case.record) for case in cases}) > 1
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=case.look.light,
+            dashes=case.look.dash or (None, None),
+            marker=case.look.marker if markers else "",
+            markersize=4,
+            label=shortened(case.legend(named=named), notes.get(case.record.id, "")),
+        )
+        for case in cases
+    ]
+    axes.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(-0.03, -0.23),
+        borderaxespad=0.0,
+        fontsize=6.8 if notes else 7.5,
+    )
+
+
+def shortened(name: str, note: str) -> str:
+    """Return a name and its note in one line of a legend under its panel; the name gives way."""
+    room = max(48 - len(note) - 3, 8) if note else 42  # with notes the letters are smaller
+    cut = name if len(name) <= room else name[: room - 1] + "…"
+    return f"{cut}   {note}" if note else cut
+
+
+def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
+    """Return the largest value in each of ``bins`` equal spans of time, at the place where it is."""
+    if t.size <= bins:
+        return t, values
+    edges = np.linspace(t[0], t[-1], bins + 1)
+    which = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, bins - 1)
+    order = np.lexsort((values, which))
+    last = np.flatnonzero(np.diff(which[order], append=bins))
+    chosen = np.sort(order[last])
+    return t[chosen], values[chosen]
+
+
+def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
+    t, values = _finite(case, what)
+    if t.size == 0:
+        return
+    if what.joined:
+        t, values = envelope(t, values)
+    elif not what.zero:  # the start is right by definition
+        seen = values >= 10.0**what.low
+        t, values = t[seen], values[seen]
+    bottom = 10.0**what.low
+    clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
+    drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
+    (line,) = axes.plot(t, drawn, color=case.look.light, clip_on=False)
+    if case.look.dash:
+        line.set_dashes(case.look.dash)
+    if not what.joined:
+        line.set_linewidth(0.7)
+        line.set_marker(case.look.marker)
+        line.set_markersize(2.6)
+        line.set_markevery(max(1, t.size // 10))
+
+
+def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
+    parts = []
+    for case in cases:
+        _, values = _finite(case, what)
+        worst = f"{values.max():.1e}" if values.size else "none finite"
+        parts.append(f"{case.record.case.method}: {worst}")
+    return f"{what.title}, largest values. " + "; ".join(parts) + "."

@@ -1,0 +1,143 @@
+"""Phase portraits, and Poincaré sections of problems with two degrees of freedom."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.report.figures.canvas import Picture, new, picture
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, MUTED, options
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+
+COLUMNS = 6
+MOST = 3000  # points of one case that are drawn
+PAGE_POINTS = 700  # and that the page carries
+FEWEST_CROSSINGS = 20
+FARTHEST = 3.0  # times the usual width: a wider cloud is cut at the edge of its panel
+COARSEST = 0.5  # of the largest |q1| between two samples: beyond, a crossing is a guess
+
+
+def portrait(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
+    """Draw momentum against position of a problem with one degree of freedom; else ``None``."""
+    if problem.system.dof != 1:
+        return None
+    clouds = [(case, case.series["y"][:, 0], case.series["y"][:, 1]) for case in cases]
+    return _grid(
+        [(case, q, p) for case, q, p in clouds if q.size > 2],
+        "phase-portrait",
+        "Phase portrait",
+        "All samples of each case. The true motion stays on one closed curve; a spread across it is an error "
+        "of the energy.",
+        ("q", "p"),
+    )
+
+
+def section(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
+    """Draw the Poincaré section q1 = 0, p1 > 0 of a problem with two degrees of freedom; else ``None``.
+
+    A problem with bodies has no such section, nor has a case whose samples are too far apart.
+    """
+    bodies = getattr(problem.system, "bodies", None)
+    if problem.system.dof != 2 or bodies is not None or problem.system.kind != "hamiltonian":
+        return None
+    clouds = [(case, *crossings(case.series["y"])) for case in cases]
+    return _grid(
+        [(case, q, p) for case, q, p in clouds if q.size >= FEWEST_CROSSINGS],
+        "poincare-section",
+        "Poincaré section",
+        "Where the samples pass q₁ = 0 with p₁ > 0, between two samples on a straight line. A regular orbit "
+        "makes curves, a chaotic one fills an area; on a chaotic orbit no method is right point by point.",
+        ("q₂", "p₂"),
+    )
+
+
+def crossings(y: Array) -> tuple[Array, Array]:
+    """Return q2 and p2 where q1 passes 0 upwards, shape (n,) each.
+
+    Parameters
+    ----------
+    y : ndarray, shape (n, 4)
+        States q1, q2, p1, p2 in the order of time.
+    """
+    good = np.isfinite(y).all(axis=1)
+    y = y[good]
+    if len(y) < 2:
+        return np.empty(0), np.empty(0)
+    before, after = y[:-1], y[1:]
+    size = float(np.max(np.abs(y[:, 0])))
+    up = (before[:, 0] < 0.0) & (after[:, 0] >= 0.0) & (after[:, 0] - before[:, 0] < COARSEST * size)
+    share = -before[up, 0] / (after[up, 0] - before[up, 0])
+    at = before[up] + share[:, None] * (after[up] - before[up])
+    return at[:, 1], at[:, 3]
+
+
+def _grid(
+    clouds: Sequence[tuple[Drawn, Array, Array]],
+    key: str,
+    title: str,
+    caption: str,
+    labels: tuple[str, str],
+) -> Picture | None:
+    if not clouds:
+        return None
+    rows = math.ceil(len(clouds) / COLUMNS)
+    height = 2.3 * rows
+    figure = new(WIDTH, height)
+    figure.subplots_adjust(
+        left=0.055, right=0.99, top=1 - 0.26 / height, bottom=0.42 / height, hspace=0.5, wspace=0.12
+    )
+    grid = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey=True).ravel().tolist()
+    reach = [_reach([x for _, x, _ in clouds]), _reach([y for _, _, y in clouds])]
+    traces: list[Trace] = []
+    for axes in grid[len(clouds) :]:
+        axes.set_axis_off()
+    for axes, (case, x, y) in zip(grid, clouds, strict=False):
+        every = max(1, -(-x.size // MOST))
+        axes.plot(x[::every], y[::every], ".", color=case.look.light, markersize=1.1, rasterized=True)
+        axes.set_xlim(*reach[0])
+        axes.set_ylim(*reach[1])
+        axes.set_title(
+            f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=8, color=INK
+        )
+        words = options(case.record)
+        lowest = axes in grid[max(len(clouds) - COLUMNS, 0) : len(clouds)]
+        if lowest:  # of its column
+            axes.tick_params(labelbottom=True)
+            axes.text(1.0, -0.2, labels[0], transform=axes.transAxes, fontsize=8, ha="right", va="top")
+        axes.text(
+            0.0,
+            -0.2 if lowest else -0.08,
+            words if len(words) < 34 else words[:33] + "…",
+            transform=axes.transAxes,
+            fontsize=6,
+            color=MUTED,
+            va="top",
+        )
+        fewer = max(1, -(-x.size // PAGE_POINTS))
+        traces.append(Trace(case.look.number, case.record.case.method, x[::fewer], y[::fewer]))
+    for row in range(rows):
+        grid[row * COLUMNS].set_ylabel(labels[1])
+    said = "; ".join(f"{case.record.case.method}: {x.size} points" for case, x, _ in clouds)
+    return picture(
+        figure,
+        key,
+        f"{title} ({labels[0]}, {labels[1]})",
+        caption,
+        f"{title} of each case. {said}.",
+        Plot([Panel("", Axis(labels[0]), Axis(labels[1]), traces)], "dots"),
+    )
+
+
+def _reach(values: Sequence[Array]) -> tuple[float, float]:
+    """Return the limits that nearly all values lie in: one case that escaped must not shrink the others."""
+    ends = [(float(np.nanmin(v)), float(np.nanmax(v))) for v in values]
+    usual = FARTHEST * sorted(high - low for low, high in ends)[len(ends) // 2]
+    kept = [(low, high) for low, high in ends if high - low <= usual] or ends
+    low, high = min(low for low, _ in kept), max(high for _, high in kept)
+    margin = 0.08 * (high - low or 1.0)
+    return low - margin, high + margin

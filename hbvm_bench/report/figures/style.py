@@ -1,0 +1,185 @@
+"""One visual language: a method keeps its colour, dash and marker in every figure and table.
+
+Colour and marker tell the family and survive the common kinds of colour blindness;
+shade and dash tell the setting within it, and every case has a number, so that
+nothing rests on colour alone.
+"""
+
+import colorsys
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import numbers
+
+# Base colour of each method: light theme, dark theme.
+FAMILIES = {
+    "HBVM": ("#0a58b5", "#62b0ff"),
+    "Gauss": ("#0a8f9c", "#4fd3de"),
+    "LineIntegral": ("#7a4a1e", "#e0a46a"),
+    "Taylor": ("#c8500a", "#ff9a57"),
+    "IAS15": ("#17753a", "#5fcf86"),
+    "Leapfrog": ("#86720c", "#dcc44a"),
+    "WHFast": ("#8a2160", "#ec86bf"),
+    "WHFast512": ("#8a2160", "#ec86bf"),
+    "SemiImplicitEuler": ("#6b4bb8", "#b79cff"),
+    "LeapfrogMidpoint": ("#6b4bb8", "#b79cff"),
+    "ReversibleHeun": ("#6b4bb8", "#b79cff"),
+    "Dopri8": ("#6b4bb8", "#b79cff"),
+    "DOP853": ("#55606b", "#b4bfca"),
+    "Radau": ("#55606b", "#b4bfca"),
+}
+OTHERS = (("#a8324a", "#ff8a9e"), ("#3d6b1f", "#a5d677"), ("#7a4a1e", "#e0a46a"))
+
+DASHES: tuple[tuple[float, ...], ...] = (
+    (),
+    (6, 2),
+    (2, 1.6),
+    (8, 2, 2, 2),
+    (5, 1.5, 1.5, 1.5, 1.5, 1.5),
+    (12, 3),
+)
+MARKERS = {
+    "HBVM": "o",
+    "Gauss": "D",
+    "LineIntegral": "d",
+    "Taylor": "s",
+    "IAS15": "^",
+    "Leapfrog": "v",
+    "WHFast": "P",
+    "WHFast512": "*",
+    "SemiImplicitEuler": "X",
+    "LeapfrogMidpoint": "<",
+    "ReversibleHeun": ">",
+    "Dopri8": "p",
+    "DOP853": "h",
+    "Radau": "H",
+}
+UNKNOWN_MARKER = "8"  # of a method that is not in the table
+
+# Neutral colours of the figures; each is unique so that it can be themed in the page.
+INK = "#1d2430"
+MUTED = "#5c6674"
+GRID = "#d9dee5"
+TRUTH = "#9aa3ae"
+PAPER = "#ffffff"
+NEUTRALS = {INK: "--ink", MUTED: "--muted", GRID: "--line", TRUTH: "--truth", PAPER: "--paper"}
+DARK_NEUTRALS = {
+    "--ink": "#e8ecf2",
+    "--muted": "#a2acba",
+    "--line": "#2f3743",
+    "--truth": "#6d7886",
+    "--paper": "#14181f",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one case looks.
+
+    Attributes
+    ----------
+    number : int
+        Its number in the tables and figures, from 1 in the order of the campaign.
+    light, dark : str
+        Its colour in the two themes.
+    dash : tuple of float
+        On-off lengths in points; empty for a solid line.
+    marker : str
+        Of matplotlib.
+    """
+
+    number: int
+    light: str
+    dark: str
+    dash: tuple[float, ...]
+    marker: str
+
+
+def looks(records: Sequence[Record]) -> dict[str, Look]:
+    """Return the look of every case by its id; a method looks the same on every problem."""
+    seen: dict[str, int] = {}
+    taken: set[str] = set()
+    number = numbers(records)
+    by_method: dict[str, Look] = {}
+    for record in records:
+        if record.case.method in by_method:
+            continue
+        name = method_name(record)
+        light, dark = base_colours(name)
+        # settings of one colour are told apart by shade and dash, whatever their method's name
+        index = seen[light] = seen.get(light, -1) + 1
+        by_method[record.case.method] = Look(
+            number=number[record.id],
+            light=_unique(_shade(light, index, towards=0.0), taken),
+            dark=_shade(dark, index, towards=1.0),
+            dash=DASHES[index % len(DASHES)],
+            marker=MARKERS.get(name, UNKNOWN_MARKER),
+        )
+    return {record.id: by_method[record.case.method] for record in records}
+
+
+def base_colours(name: str) -> tuple[str, str]:
+    """Return the light and dark colour of a method by its name; unknown names get a steady one."""
+    if name in FAMILIES:
+        return FAMILIES[name]
+    return OTHERS[hashlib.sha256(name.encode()).digest()[0] % len(OTHERS)]
+
+
+def method_name(record: Record) -> str:
+    """Return the name of a case's method, without its options."""
+    return parse_spec(record.case.method).name
+
+
+def options(record: Record) -> str:
+    """Return the options of a case's method as short as a legend needs them."""
+    words = []
+    for name, value in parse_spec(record.case.method).arguments.items():
+        if isinstance(value, bool):
+            words.append(name if value else f"no {name}")
+        else:
+            words.append(value if isinstance(value, str) else f"{name}={value}")
+    return ", ".join(words) or "default"
+
+
+def panels(records: Sequence[Record], most: int = 6) -> list[tuple[str, list[Record]]]:
+    """Divide cases into panels: by library, and by method where a library has more than ``most``."""
+    libraries: dict[str, list[Record]] = {}
+    for record in records:
+        libraries.setdefault("ours" if record.role == "ours" else record.library, []).append(record)
+    made: list[tuple[str, list[Record]]] = []
+    for library, members in libraries.items():
+        names: dict[str, list[Record]] = {}
+        for record in members:
+            names.setdefault(method_name(record), []).append(record)
+        if len(members) <= most:
+            made.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
+        else:
+            made += [(f"{name} · {library}", group) for name, group in names.items()]
+    return made
+
+
+def _shade(colour: str, index: int, *, towards: float) -> str:
+    # alternately deeper and paler, so that neighbours in a legend differ most
+    if index == 0:
+        return colour
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
+    step = 0.11 * ((index + 1) // 2)
+    lightness += step if (index % 2 == 1) == (towards == 0.0) else -step * 0.8
+    low, high = (0.16, 0.46) if towards == 0.0 else (0.6, 0.9)  # what stands out from the paper
+    lightness = min(max(lightness, low), high)
+    channels = colorsys.hls_to_rgb(hue, lightness, saturation)
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in channels)
+
+
+def _unique(colour: str, taken: set[str]) -> str:
+    # a colour is replaced by a variable of the page, so two cases must not share one
+    value = int(colour[1:], 16)
+    while f"#{value:06x}" in taken or f"#{value:06x}" in NEUTRALS:
+        value = (value + 1) % 2**24
+    made = f"#{value:06x}"
+    taken.add(made)
+    return made

@@ -1,0 +1,216 @@
+"""Figures that belong to one problem, and step sizes where a library tells them."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.reference.solutions import Reference
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, family_panels, panel_legend, trace
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, MUTED, TRUTH, options
+from hbvm_bench.summaries.rows import status_of
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+View = Callable[[Problem, Sequence[Drawn], Reference | None], Picture | None]
+
+LAST = 100.0  # time units at the end that the picture of z shows
+REACH = 3.2  # of its vertical axis; the planetoid stays within 1.69
+REVOLUTION = 21.46  # of the primaries
+
+
+def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
+    """Draw the planetoid's z over the last part of the span, a panel per family."""
+    start = problem.t_end - LAST
+    shown = [case for case in cases if case.series["t"].size and case.series["t"][-1] > start]
+    if not shown:
+        return None
+    figure, grid = family_panels(shown, "z of the planetoid")
+    curves: list[Trace] = []
+    late_truth: tuple[Array, Array] | None = None
+    for axes, members in grid:
+        for case in members:
+            t, z = case.series["t"], case.series["y"][:, PLANETOID_Z]
+            kept = (t >= start) & (np.abs(z) <= REACH)
+            (line,) = axes.plot(t[kept], z[kept], color=case.look.light)
+            curves.append(trace(case, t[kept], z[kept]))
+            if case.look.dash:
+                line.set_dashes(case.look.dash)
+        if reference is not None:
+            late = reference.t >= start
+            truth = reference.high[late, PLANETOID_Z]
+            late_truth = (reference.t[late], truth)
+            axes.plot(reference.t[late], truth, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
+        axes.set_xlim(start, problem.t_end)
+        axes.set_ylim(-REACH, REACH)
+        panel_legend(axes, members)
+    ends = "; ".join(
+        f"{case.record.case.method}: {case.series['y'][-1, PLANETOID_Z]:.4g}"
+        for case in shown
+        if case.series["t"][-1] == problem.t_end
+    )
+    return picture(
+        figure,
+        "axis-motion",
+        f"The planetoid on the axis, the last {LAST:.0f} time units",
+        "Rings: the stored 128-bit reference. A line that is missing has left the picture: its planetoid "
+        "is far away. A curve that misses the rings conserves, at best, the energy of another motion.",
+        f"z at t = {problem.t_end:g}. {ends}.",
+        Plot([Panel("", Axis("time"), Axis("z of the planetoid"), [*curves, *_truth(late_truth)])]),
+    )
+
+
+def _truth(points: tuple[Array, Array] | None) -> list[Trace]:
+    return [] if points is None else [Trace(0, "128-bit reference", *points, role="truth")]
+
+
+def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
+    """Draw the paths of the two primaries at the end over the true ones, a square per case."""
+    del reference
+    shown = [case for case in cases if case.series["t"].size > 2]
+    if not shown:
+        return None
+    best = min(shown, key=_position_error)
+    columns = 9
+    rows = -(-len(shown) // columns)
+    figure = new(WIDTH, 1.66 * rows)
+    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / (1.66 * rows), bottom=0.2 / (1.66 * rows))
+    grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.32}).ravel().tolist()
+    for axes in grid[len(shown) :]:
+        axes.set_axis_off()
+    curves: tuple[list[Trace], list[Trace]] = ([], [])
+    for axes, case in zip(grid, shown, strict=False):
+        t = case.series["t"]
+        first = best.series["t"] <= REVOLUTION
+        last = t >= t[-1] - 3 * REVOLUTION
+        for body in (0, 1):
+            _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
+            _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
+            curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::4]))
+        axes.set_xlim(-3.4, 3.4)
+        axes.set_ylim(-3.4, 3.4)
+        axes.set_aspect("equal")
+        axes.set_xticks([-2.5, 0, 2.5], labels=[])
+        axes.set_yticks([-2.5, 0, 2.5], labels=[])
+        axes.tick_params(length=0)
+        axes.set_title(
+            f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK
+        )
+        words = options(case.record)
+        axes.set_xlabel(words if len(words) < 32 else words[:30] + "…", fontsize=5.5, color=MUTED, labelpad=1)
+    return picture(
+        figure,
+        "primaries",
+        "The paths of the primaries in their plane",
+        f"Grey: the first revolution of case {best.look.number}; the true orbits keep their place. "
+        "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
+        "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
+        "for the direction of the apsides, whatever its energy says.",
+        Plot(
+            [
+                Panel(f"primary {body + 1}", Axis("x"), Axis("y"), curves[body], square=True)
+                for body in (0, 1)
+            ],
+            "paths",
+        ),
+    )
+
+
+def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
+    """Draw the step sizes of the cases that stalled, against time and against the step's number."""
+    shown = [
+        case
+        for case in cases
+        if case.record.result.outcome == "stalled" and np.any(case.series.get("extra.dt_history", 0.0))
+    ]
+    if not shown:
+        return None
+    figure = new(WIDTH, 3.4)
+    figure.subplots_adjust(left=0.07, right=0.98, top=0.97, bottom=0.15)
+    left, right = figure.subplots(1, 2)
+    low = 0
+    curves: tuple[list[Trace], list[Trace]] = ([], [])
+    for case in shown:
+        history = case.series["extra.dt_history"]
+        history = history[np.abs(history[:, 1]) > 0]
+        dt = np.abs(history[:, 1])
+        low = min(low, int(np.floor(np.log10(dt.min()))) - 1)
+        for axes, x in ((left, history[:, 0]), (right, np.arange(1, len(dt) + 1))):
+            every = max(1, len(dt) // 60)
+            axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2, markevery=every)
+        curves[0].append(trace(case, history[:, 0], dt))
+        curves[1].append(trace(case, np.arange(1.0, len(dt) + 1), dt))
+        left.annotate(
+            f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}",
+            (history[-1, 0], dt.min()),
+            xytext=(-8, 4),
+            textcoords="offset points",
+            ha="right",
+            fontsize=8,
+            color=INK,
+        )
+    for axes in (left, right):
+        log_axis(axes, "y", low, 1)
+        axes.set_ylabel("step size dt")
+    left.set_xlabel("time")
+    right.set_xlabel("recorded step")
+    return picture(
+        figure,
+        "step-sizes",
+        "Step sizes of what stalled",
+        "The run was ended by a watchdog that saw the time stand still, not by a time limit.",
+        "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
+        Plot(
+            [
+                Panel(title, Axis(title), Axis("step size dt", log=True), traces)
+                for title, traces in zip(("time", "recorded step"), curves, strict=True)
+            ]
+        ),
+    )
+
+
+VIEWS: dict[str, tuple[View, ...]] = {"sitnikov": (axis_motion, primaries)}
+
+
+def _position_error(case: Drawn) -> float:
+    value = case.record.result.metrics.get("position_end")
+    return value.value if value is not None and value.counts and value.value is not None else np.inf
+
+
+def _path(
+    axes: Axes,
+    problem: Problem,
+    case: Drawn,
+    chosen: NDArray[np.bool_],
+    body: int,
+    *,
+    color: str,
+    linewidth: float,
+) -> None:
+    curve = path(problem, case, chosen, body)
+    axes.plot(curve[:, 0], curve[:, 1], color=color, linewidth=linewidth)
+
+
+def path(problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int) -> Array:
+    """Return the path of a body in the plane between chosen samples, shape (n, 2), for drawing."""
+    t, y = case.series["t"][chosen], case.series["y"][chosen]
+    velocity = problem.velocity(y)
+    if velocity is None or len(t) < 2 or not np.isfinite(y).all():
+        return np.empty((0, 2))
+    # cubic Hermite pieces: the samples know their velocities, straight lines would cut the pericentres
+    here = slice(3 * body, 3 * body + 2)
+    q, v = y[:, here], velocity[:, here]
+    h = np.diff(t)[:, None, None]
+    u = np.linspace(0, 1, 5)[None, :-1, None]
+    q0, q1, v0, v1 = q[:-1, None], q[1:, None], v[:-1, None], v[1:, None]
+    curve = (
+        (1 + 2 * u) * (1 - u) ** 2 * q0
+        + u * (1 - u) ** 2 * h * v0
+        + u**2 * (3 - 2 * u) * q1
+        + u**2 * (u - 1) * h * v1
+    ).reshape(-1, 2)
+    return curve[np.abs(curve).max(axis=1) < 30]

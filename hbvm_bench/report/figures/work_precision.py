@@ -1,0 +1,124 @@
+"""Work and precision: position error and energy error against time, side by side."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.labels import number_points
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, method_name
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of
+
+MOST_NAMED = 30  # cases in the legend
+
+
+def work_precision(cases: Sequence[Drawn]) -> Picture | None:
+    """Draw position error and energy error against time, side by side; energy is not shown alone."""
+    keys = ("position_end", "energy_max")
+    shown = [
+        case
+        for case in cases
+        if all(_counts(case.record, key) for key in (*keys, "warm_seconds")) and group_of(case.record) == "on"
+    ]
+    if len(shown) < 2:
+        return None
+    figure = new(WIDTH, 4.7)
+    figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
+    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
+    times = [_number(case.record, "warm_seconds") for case in shown]
+    plotted = []
+    for axes, key in ((left, keys[0]), (right, keys[1])):
+        values = [_number(case.record, key) for case in shown]
+        floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
+        top = min(max(values), 1e3)
+        log_axis(axes, "x", math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
+        log_axis(axes, "y", round(math.log10(floor)), math.ceil(math.log10(top * 3)), most=9)
+        axes.set_ylim(bottom=floor / 5)  # room for the numbers of the best
+        spots = [
+            (seconds, min(max(value, floor), top * 2)) for seconds, value in zip(times, values, strict=True)
+        ]
+        for case, spot, value in zip(shown, spots, values, strict=True):
+            marker = case.look.marker if value <= top else "^"
+            axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
+        number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
+        axes.set_xlabel("seconds for the whole span (median)")
+        axes.set_title(METRICS[key].label, color=INK)
+        clouds = [
+            trace(case, np.array([seconds]), np.array([value]))
+            for case, seconds, value in zip(shown, times, values, strict=True)
+        ]
+        plotted.append(
+            Panel(
+                METRICS[key].label,
+                Axis("seconds for the whole span (median)", log=True),
+                Axis(METRICS[key].label, log=True, low=-18, high=3),
+                [*clouds, *_envelopes(axes, shown, spots)],
+            )
+        )
+    side.set_axis_off()
+    handles = [
+        Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
+        for c in sorted(shown, key=lambda case: case.look.number)[:MOST_NAMED]
+    ]
+    if len(shown) > MOST_NAMED:
+        handles.append(
+            Line2D([], [], linestyle="", label=f"and {len(shown) - MOST_NAMED} more, see the table")
+        )
+    side.legend(
+        handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1
+    )
+    best = min(shown, key=lambda case: _number(case.record, "position_end"))
+    left_out = len(cases) - len(shown)
+    return picture(
+        figure,
+        "work-precision",
+        "Work and precision",
+        "Lower left is better. The same cases in both panels: energy is never shown without position. "
+        f"{left_out} {'case' if left_out == 1 else 'cases'} of another trajectory or that did not reach the "
+        "end are not in this picture; "
+        "points beyond the upper edge are drawn on it. Lines join the settings of a method that none of its "
+        "others beats.",
+        f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
+        f"is that of {best.record.case.method}.",
+        Plot(plotted, "points"),
+    )
+
+
+def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> list[Trace]:
+    """Join the settings of each method that none of its others beats in both work and error."""
+    made = []
+    for name in dict.fromkeys(method_name(case.record) for case in cases):
+        members = [(s, c) for s, c in zip(spots, cases, strict=True) if method_name(c.record) == name]
+        best: list[tuple[float, float]] = []
+        for spot, _ in sorted(members, key=lambda member: member[0]):
+            if not best or spot[1] < best[-1][1]:
+                best.append(spot)
+        if len(best) < 2:
+            continue
+        x, y = np.array(best).T
+        look = members[0][1].look
+        axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
+        made.append(Trace(look.number, f"best of {name}", x, y, "law", "no setting is better in both"))
+    return made
+
+
+def _full(case: Drawn) -> str:
+    return f"{case.look.number}  {case.record.case.method}"
+
+
+def _counts(record: Record, key: str) -> bool:
+    value = record.result.metrics.get(key)
+    return value is not None and value.counts
+
+
+def _number(record: Record, key: str) -> float:
+    value = record.result.metrics[key].value
+    assert value is not None
+    return value

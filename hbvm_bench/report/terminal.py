@@ -1,0 +1,157 @@
+"""What the command line shows of results: tables that fit."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from hbvm_bench.measure.metrics import Metric
+from hbvm_bench.store.files import json_of
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
+from hbvm_bench.summaries.table import Table
+
+NARROWEST = 24  # characters for the methods
+# Where a terminal is narrow, these columns are left out, in this order.
+GIVEN_UP = (
+    "compile_seconds",
+    "evaluations",
+    "z_end",
+    "steps",
+    "z_error",
+    "guard_max",
+    "angular_momentum_max",
+)
+PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded at 80
+
+
+def console(*, stderr: bool = False) -> Console:
+    """Return a console that does not fold tables when its output is a file or a pipe.
+
+    Nor does it take brackets in a text for a style: what is printed may be somebody else's.
+    """
+    made = Console(stderr=stderr, highlight=False, markup=False)
+    if not made.is_terminal:
+        made.width = PIPE_WIDTH
+    return made
+
+
+def print_json(value: Any) -> None:
+    """Print a value for programs."""
+    print(json_of(value).decode(), end="")
+
+
+def print_table(table: Table) -> None:
+    """Print a table of text."""
+    made = RichTable(
+        title=Text(table.title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, caption=table.note
+    )
+    for index, head in enumerate(table.head):
+        made.add_column(
+            Text(head), justify="left" if table.is_words(index) else "right", overflow="fold", min_width=6
+        )
+    for row in table.rows:
+        made.add_row(*(Text(cell) for cell in row))
+    console().print(made)
+
+
+def print_results(
+    records: Sequence[Record], keys: Sequence[str] | None = None, sort: str | None = None
+) -> None:
+    """Print the tables of `results` as wide as the terminal is."""
+    terminal = console()
+    for table in results(records, keys, sort, terminal.width):
+        terminal.print(table)
+
+
+def results(
+    records: Sequence[Record],
+    keys: Sequence[str] | None = None,
+    sort: str | None = None,
+    width: int = PIPE_WIDTH,
+) -> list[RenderableType]:
+    """Return, for each problem and each ensemble, its table and the remarks on its rows.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The cases.
+    keys : sequence of str, optional
+        Only these metrics, whether they fit or not.
+    sort : str, optional
+        Metric to sort by.
+    width : int
+        Of the terminal, in characters.
+    """
+    return [
+        _results(problem + at_once(ensemble), members, keys, sort, width)
+        for (problem, ensemble), members in tasks(records).items()
+    ]
+
+
+def _results(
+    title: str, records: Sequence[Record], keys: Sequence[str] | None, sort: str | None, width: int
+) -> RenderableType:
+    shown = columns(records, keys)
+    lines = rows(records, sort)
+    hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
+    number_of = numbers(records)
+    made = RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made.add_column("#", justify="right", no_wrap=True)
+    made.add_column("method", overflow="fold", min_width=NARROWEST)
+    for metric in shown:
+        made.add_column(metric.short, justify="right", no_wrap=True)
+    remarks = RichTable.grid(padding=(0, 2))
+    group = ""
+    for row in lines:
+        if row.group != group:
+            if group:
+                made.add_section()
+            group = row.group
+            title = title_of(group, [one for one in lines if one.group == group])
+            made.add_row("", Text(title, style="bold italic"))
+        number = str(number_of[row.record.id])
+        made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
+        if row.remark:
+            remarks.add_row(Text(number, justify="right"), Text(f"{row.record.case.method}: {row.remark}."))
+    note = "In brackets: void, for the row is another trajectory or only a part of it."
+    if hidden:
+        note += f" {hidden} columns do not fit; a wider terminal or --metric shows them."
+    return Group(made, Text(note, style="dim"), remarks, "")
+
+
+def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metric]:
+    """Return the columns that fit beside the methods, the least telling given up first."""
+    kept = list(shown)
+
+    def needed() -> int:
+        lengths = [
+            max(
+                [
+                    len(metric.short),
+                    *(len(row.cells[metric.key].text) + 2 for row in lines if metric.key in row.cells),
+                ]
+            )
+            for metric in kept
+        ]
+        return 5 + NARROWEST + sum(length + 3 for length in lengths)
+
+    for key in GIVEN_UP:
+        if needed() <= width:
+            break
+        kept = [metric for metric in kept if metric.key != key]
+    return kept
+
+
+def _method(row: Row) -> Text:
+    return Text(row.record.case.method, style="bold cyan" if row.record.role == "ours" else "")
+
+
+def _cell(row: Row, key: str) -> Text:
+    if key not in row.cells:
+        return Text("–", style="dim")
+    cell = row.cells[key]
+    return Text(f"({cell.text})", style="dim") if cell.void else Text(cell.text)

@@ -1,0 +1,180 @@
+"""Run cases side by side: each in a process of its own, under hard limits, by any executor."""
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from pathlib import Path
+
+from hbvm_bench.campaign.file import Campaign, Case, Limits
+from hbvm_bench.campaign.identity import Resolved, resolve
+from hbvm_bench.run.executors import Pool
+from hbvm_bench.run.task import InterruptedRunError, Reply, execute, task_of
+from hbvm_bench.run.worker import STALE
+from hbvm_bench.store.records import COMPILING, Record, decoded
+from hbvm_bench.store.store import Store, damage, is_of
+from problems.errors import InputError
+
+ATTEMPTS = 2  # an executor may lose a case once, with the machine that had it
+PATIENCE = 1.0  # seconds between two looks at how many slots there are
+
+
+class UnfinishedRunError(Exception):
+    """Some cases could not be run at all; what finished is in the store."""
+
+
+def plan(campaign: Campaign) -> list[Resolved]:
+    """Return the cases of a campaign, every name and option checked.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For the first one that cannot be used, or for a case given twice.
+    """
+    cases = [resolve(case) for case in campaign.cases()]
+    seen: set[str] = set()
+    for resolved in cases:
+        if resolved.id in seen:
+            raise InputError(f"{resolved.case.method} on {resolved.case.problem} is given twice.")
+        seen.add(resolved.id)
+    return cases
+
+
+def is_done(record: Record | None, limits: Limits) -> bool:
+    """Whether a stored case need not run again under these limits."""
+    if record is None or record.result.status == COMPILING:
+        return False
+    stopped_by = {"timeout": "wall_seconds", "killed": "memory_gib"}.get(record.result.outcome)
+    return stopped_by is None or getattr(limits, stopped_by) <= getattr(record.limits, stopped_by)
+
+
+def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
+    """Whether the store has a case as a run under these limits leaves it, its series with it."""
+    record = store.load(resolved.id)
+    if record is None or not is_of(record.case, resolved.case) or not is_done(record, limits):
+        return False
+    return not damage(record, store.series(resolved.id), resolved.problem.system.dim)
+
+
+def run_case(case: Case, directory: str, limits: Limits) -> Record:
+    """Measure one case in a process of its own and store it.
+
+    Parameters
+    ----------
+    case : Case
+        What to run.
+    directory : str
+        The store.
+    limits : Limits
+        Wall time and memory of the process.
+
+    Returns
+    -------
+    Record
+        Whatever happens to the process: a failure is a record with its reason.
+
+    Raises
+    ------
+    hbvm_bench.run.task.InterruptedRunError
+        If the run was stopped meanwhile; nothing is stored then.
+    problems.errors.InputError
+        If the sources changed meanwhile; nothing is stored then either.
+    """
+    return _stored(Store(Path(directory)), *execute(task_of(resolve(case), limits)))
+
+
+def run_accuracy(
+    cases: Sequence[Resolved],
+    store: Store,
+    limits: Limits,
+    pool: Pool,
+    tell: Callable[[Sequence[Resolved]], None] = lambda running: None,
+) -> Iterator[Record]:
+    """Run cases side by side, store each as it finishes, and yield its record.
+
+    Parameters
+    ----------
+    cases : sequence of Resolved
+        What to run.
+    store : Store
+        This process alone writes there; the executor's may be other machines.
+    limits : Limits
+        Of each case.
+    pool : Pool
+        The executor. It has as many cases as it has slots, and never a long queue, so that
+        what runs is known, and little is left behind where the run is stopped.
+    tell : callable, optional
+        Called with the running cases, whenever they change and about once a second.
+
+    Raises
+    ------
+    InterruptedRunError
+        If the run was stopped.
+    UnfinishedRunError
+        If the executor is gone, or one of its machines has other sources or versions (it would
+        refuse one case after the other); and after all others, if it could not run some cases.
+    """
+    waiting = deque(cases)
+    running: dict[Future[tuple[bytes, bytes]], Resolved] = {}
+    attempts: Counter[str] = Counter()
+    failures: list[str] = []
+    try:
+        while waiting or running:
+            slots = pool.slots()
+            while waiting and len(running) < slots:
+                resolved = waiting.popleft()
+                running[_submitted(pool, task_of(resolved, limits))] = resolved
+            tell(list(running.values()))
+            if why := pool.lost():
+                raise UnfinishedRunError(why)
+            if not running:  # a cluster that has no worker at the moment
+                time.sleep(PATIENCE)
+                continue
+            done, _ = wait(running, timeout=PATIENCE, return_when=FIRST_COMPLETED)
+            for future in done:
+                resolved = running.pop(future)
+                try:
+                    record = _stored(store, *future.result())
+                except (InterruptedRunError, InputError, UnfinishedRunError):
+                    raise
+                except (Exception, CancelledError) as error:  # of the executor, not of the case
+                    attempts[resolved.id] += 1
+                    if attempts[resolved.id] < ATTEMPTS:
+                        waiting.append(resolved)
+                    else:
+                        known = isinstance(error, UnfinishedRunError)
+                        failures.append(
+                            str(error) if known else f"{type(error).__name__}: {error}".rstrip(": ")
+                        )
+                    continue
+                yield record
+    finally:
+        for future in running:
+            future.cancel()
+    if failures:
+        reasons = "; ".join(dict.fromkeys(failures))
+        count = "1 case" if len(failures) == 1 else f"{len(failures)} cases"
+        raise UnfinishedRunError(f"{count} could not be run: {reasons}")
+
+
+def _sentence(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(": ")
+
+
+def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
+    try:
+        return pool.executor.submit(execute, task)
+    except Exception as error:  # broken or shut down, each executor in its own words
+        raise UnfinishedRunError(
+            f"the executor takes no more cases: {type(error).__name__}: {error}"
+        ) from None
+
+
+def _stored(store: Store, reply: bytes, series: bytes) -> Record:
+    answer = decoded(reply, Reply)
+    if answer.why == STALE:
+        raise InputError(STALE)
+    if answer.record is None:
+        raise UnfinishedRunError(answer.why)
+    store.save(answer.record, series or None)
+    return answer.record

@@ -1,0 +1,199 @@
+"""One case, measured in a process of its own under hard limits: the task that executors run."""
+
+import os
+import platform
+import sys
+import tempfile
+import threading
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from hbvm_bench.campaign.file import Case, Limits
+from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
+from hbvm_bench.measure import machine
+from hbvm_bench.run import supervise
+from hbvm_bench.run.supervise import Ended
+from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, STALE, Request
+from hbvm_bench.store import records
+from hbvm_bench.store.records import COMPILING, Outcome, Record, Result
+from hbvm_bench.store.store import decode_series
+from problems.errors import InputError
+
+T = TypeVar("T")
+LOG_LENGTH = 4000  # characters kept of what a crashed process printed
+NO_RESULT = "the process left no readable result"
+
+_thread = threading.local()
+
+
+class InterruptedRunError(Exception):
+    """The run was stopped; what finished is in the store."""
+
+
+class Task(msgspec.Struct, frozen=True, kw_only=True):
+    """What an executor is asked to run.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    id : str
+        The id that the runner gave it; elsewhere it must come out the same.
+    versions : dict
+        Behind the id, to name what differs.
+    limits : Limits
+        Wall time and memory of the process.
+    """
+
+    case: Case
+    id: str
+    versions: dict[str, str]
+    limits: Limits
+
+
+class Reply(msgspec.Struct, frozen=True, kw_only=True):
+    """The record of a case, or why it could not be run here at all."""
+
+    record: Record | None = None
+    why: str = ""
+
+
+def task_of(resolved: Resolved, limits: Limits) -> bytes:
+    """Return the JSON of a `Task`, which `execute` takes."""
+    task = Task(case=resolved.case, id=resolved.id, versions=versions_of(resolved.method), limits=limits)
+    return msgspec.json.encode(task)
+
+
+def execute(task: bytes) -> tuple[bytes, bytes]:
+    """Measure one case in a process of its own.
+
+    Top-level, from bytes to bytes and without a directory, so that any
+    `concurrent.futures.Executor` can run it, on this machine or another.
+
+    Parameters
+    ----------
+    task : bytes
+        JSON of a `Task`.
+
+    Returns
+    -------
+    reply : bytes
+        JSON of a `Reply`. Whatever happens to the process, it is a record with its reason.
+    series : bytes
+        As `hbvm_bench.store.store.encode_series` makes them; empty where there are none.
+
+    Raises
+    ------
+    InterruptedRunError
+        If the run was stopped meanwhile.
+    """
+    asked = msgspec.json.decode(task, type=Task)
+    try:
+        resolved = resolve(asked.case)
+    except InputError as error:
+        return _refuse(f"{platform.node()} cannot run it: {error}")
+    if resolved.id != asked.id:
+        return _refuse(_difference(asked, resolved))
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        core = getattr(_thread, "core", None)
+        request = Request(case=resolved.case, id=resolved.id, core=core, runner=os.getpid())
+        ended = start(Path(scratch), request, asked.limits)
+        result, series = _result(Path(scratch), ended, asked.limits)
+    if result.reason == STALE:
+        return _refuse(STALE)
+    if ended.code == NO_ROOM:
+        return _refuse(
+            f"there is no room for the results of a case on {platform.node()}; make some in "
+            f"{tempfile.gettempdir()} and in the cache, and run the same command again"
+        )
+    record = Record(
+        id=resolved.id,
+        case=resolved.case,
+        role="ours" if is_ours(resolved.method) else "peer",
+        library=resolved.method.library,
+        order=resolved.method.order,
+        result=result,
+        limits=asked.limits,
+        seconds=round(ended.seconds, 3),
+        peak_memory_gib=round(ended.peak_gib, 3),
+        log=ended.output[-LOG_LENGTH:] if result.outcome == "crashed" else "",
+        versions=versions_of(resolved.method),
+        machine=machine.describe(),
+        finished=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    return msgspec.json.encode(Reply(record=record)), series
+
+
+def stay_on(core: int) -> None:
+    """Let the cases that this thread starts stay on one core."""
+    _thread.core = core
+
+
+def start(scratch: Path, request: Request, limits: Limits) -> Ended:
+    """Start the worker process of a request and wait for its end.
+
+    Raises
+    ------
+    InterruptedRunError
+        If the run was stopped.
+    """
+    path = scratch / "request.json"
+    path.write_bytes(msgspec.json.encode(request))
+    command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path)]
+    ended = supervise.run(command, ENVIRONMENT, limits, scratch / COMPILED)
+    if ended.cause == "stopped":
+        raise InterruptedRunError
+    return ended
+
+
+def decoded(path: Path, type_: type[T]) -> T | None:
+    """Return what a worker wrote, or ``None`` if it is missing or something else."""
+    try:
+        return records.decoded(path.read_bytes(), type_)
+    except (FileNotFoundError, ValueError):  # msgspec's errors and bad UTF-8 are among the latter
+        return None
+
+
+def _refuse(why: str) -> tuple[bytes, bytes]:
+    return msgspec.json.encode(Reply(why=why)), b""
+
+
+def _difference(asked: Task, resolved: Resolved) -> str:
+    here = versions_of(resolved.method)
+    differing = [
+        f"{name} {here.get(name, 'not known')} instead of {version}"
+        for name, version in asked.versions.items()
+        if here.get(name) != version
+    ]
+    what = ", ".join(differing) or "other sources of hbvm-bench"
+    return f"{platform.node()} would run another case than was asked for: it has {what}"
+
+
+def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]:
+    def failed(outcome: Outcome, reason: str) -> tuple[Result, bytes]:
+        return Result(outcome=outcome, reason=reason), b""
+
+    if ended.cause == "timeout":
+        return failed("timeout", f"did not end within {limits.wall_seconds:g} s")
+    if ended.cause == "compiling":
+        reason = f"was still compiling after {limits.compile_seconds:g} s; it is tried again in the next run"
+        return Result(outcome="timeout", status=COMPILING, reason=reason), b""
+    if ended.cause == "memory":
+        return failed("killed", f"used more than {limits.memory_gib:g} GiB of memory")
+    if ended.code == -9:
+        return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory")
+    if ended.code != 0:
+        return failed("crashed", f"the process {ended.words}")
+    result = decoded(scratch / "result.json", Result)
+    if result is None:
+        return failed("crashed", NO_RESULT)
+    if result.outcome not in ("ok", "stalled"):
+        return result, b""
+    try:
+        series = (scratch / "series.npz").read_bytes()
+    except FileNotFoundError:
+        return failed("crashed", NO_RESULT)
+    return (result, series) if decode_series(series) else failed("crashed", NO_RESULT)

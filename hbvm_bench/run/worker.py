@@ -1,0 +1,246 @@
+"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json``.
+
+It writes ``result.json`` (and ``series.npz`` or ``timing.json``) beside the
+request and leaves the store alone; whatever happens to it, the runner that
+started it says what.
+"""
+
+import contextlib
+import ctypes
+import errno
+import os
+import resource
+import signal
+import sys
+import traceback
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from hbvm_bench.campaign.file import Case, TimingPlan
+from hbvm_bench.campaign.identity import Resolved, resolve
+from hbvm_bench.measure import ensemble, timing
+from hbvm_bench.measure.checks import check
+from hbvm_bench.measure.measured import Measured, measure
+from hbvm_bench.measure.metrics import evaluate, guard_violation
+from hbvm_bench.measure.solve import solve
+from hbvm_bench.reference import solutions
+from hbvm_bench.store.files import atomic
+from hbvm_bench.store.records import Result, TimingRound
+from hbvm_bench.store.store import NAME, encode_series
+from integrators.protocol import Program, Status
+from integrators.solution import Solution
+from problems.errors import InputError
+from problems.systems.base import System
+
+COMPILED = "compiled"  # the file that says that compiling has ended
+NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
+DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
+STALE = "the sources or versions changed while the run was under way; start it again."
+ENVIRONMENT = {
+    # one thread each, whatever does the linear algebra
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "NUMBA_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+    "JAX_PLATFORMS": "cpu",
+}
+
+
+class Request(msgspec.Struct, frozen=True, kw_only=True):
+    """What a worker is asked to do.
+
+    Attributes
+    ----------
+    case : Case
+        The case.
+    id : str
+        The id that the runner gave it.
+    mode : {"measure", "time"}
+        The accuracy run, or one round of the timing pass.
+    plan : TimingPlan
+        For the timing pass.
+    core : int or None
+        The core to stay on.
+    runner : int
+        The process that asks: without it there is nobody to answer.
+    """
+
+    case: Case
+    id: str
+    mode: Literal["measure", "time"] = "measure"
+    plan: TimingPlan = TimingPlan()
+    core: int | None = None
+    runner: int
+
+
+class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
+    """One round of samples, or why there are none."""
+
+    round: TimingRound | None = None
+    why: str = ""
+
+
+def main(path: Path) -> None:
+    """Do what the request at ``path`` asks."""
+    request = msgspec.json.decode(path.read_bytes(), type=Request)
+    _limit_and_die_with(request.runner)
+    if request.core is not None:
+        os.sched_setaffinity(0, {request.core})
+    # complex states are no states, and their real parts are not either
+    warnings.simplefilter("error", np.exceptions.ComplexWarning)
+    work = _time if request.mode == "time" else _measure
+    name = "timing.json" if request.mode == "time" else "result.json"
+    try:
+        reply = work(request, path.parent)
+        with atomic(path.parent / name) as temporary:
+            temporary.write_bytes(msgspec.json.encode(reply))
+    except (OSError, InputError) as error:
+        if getattr(error.__cause__ or error, "errno", None) in DISK:
+            sys.exit(NO_ROOM)
+        raise
+
+
+def _limit_and_die_with(runner: int) -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError):  # short of memory the system ends this process, not the runner
+            Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
+        pr_set_pdeathsig = 1
+        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
+        if os.getppid() != runner:  # it died while this process was starting
+            sys.exit(1)
+
+
+def _measure(request: Request, directory: Path) -> Result:
+    try:
+        resolved = _resolved(request)
+        if reason := resolved.method.accepts(resolved.problem):
+            return Result(outcome="refused", reason=reason)
+        names = resolved.problem.system.invariant_names
+        if bad := [name for name in names if not NAME.fullmatch(name)]:
+            return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
+        grid = resolved.case.grid.times(resolved.problem)
+        program = _compiled(resolved, directory)
+        if resolved.case.ensemble is not None:
+            return _measure_ensemble(resolved, program, directory)
+        solution = solve(resolved.problem, resolved.method, program, grid)
+    except OSError as error:
+        if error.errno in DISK:
+            raise
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
+    except InputError as error:  # a missing library among them
+        return Result(outcome="refused", reason=str(error))
+    except Exception as error:
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
+    if wrong := _garbage(solution, grid):
+        return Result(outcome="crashed", reason=wrong, status=solution.status.value)
+    measured = measure(solution, solutions.find(resolved.problem))
+    try:
+        checked = check(measured, resolved.method, program, resolved.case.checks)
+    except Exception as error:
+        traceback.print_exc()
+        return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
+    measured = replace(
+        measured,
+        laws=checked.laws,
+        drift={"t": checked.t, **checked.errors} if checked.errors else {},
+        reversal=checked.reversal,
+    )
+    return _stored(measured, solution.status, solution.reason, directory)
+
+
+def _measure_ensemble(resolved: Resolved, program: Program, directory: Path) -> Result:
+    asked = resolved.case.ensemble
+    assert asked is not None
+    return _stored(*ensemble.measure(resolved.problem, program, asked), directory)
+
+
+def _stored(measured: Measured, status: Status, reason: str, directory: Path) -> Result:
+    measured = replace(measured, peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+    with atomic(directory / "series.npz") as temporary:
+        temporary.write_bytes(encode_series(measured.series()))
+    return Result(
+        outcome="stalled" if status is Status.STALLED else "ok",
+        status=status.value,
+        reason=reason,
+        t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
+        violation=guard_violation(measured),
+        counters=measured.counters,
+        metrics=evaluate(measured),
+        compile=measured.compile,
+        laws=measured.laws,
+        trajectories=measured.trajectories,
+    )
+
+
+def _time(request: Request, directory: Path) -> TimingReply:
+    resolved = _resolved(request)
+    asked = resolved.case.ensemble
+    method: Any = _Telling(resolved, directory)
+    if asked is None:
+        answer = timing.time_round(resolved.problem, method, request.plan)
+    else:
+        answer = ensemble.time_round(resolved.problem, method, asked, request.plan)
+    return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
+
+
+class _Telling:
+    """A method that tells the runner when it has compiled."""
+
+    def __init__(self, resolved: Resolved, directory: Path) -> None:
+        self._resolved, self._directory = resolved, directory
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._resolved.method, name)
+
+    def compile(self, system: System) -> Program:
+        del system  # the resolved problem's
+        return _compiled(self._resolved, self._directory)
+
+
+def _compiled(resolved: Resolved, directory: Path) -> Program:
+    """Compile, what only a batch needs too where an ensemble is asked for; then tell the runner."""
+    problem = resolved.problem
+    program = resolved.method.compile(problem.system)
+    if resolved.case.ensemble is not None and hasattr(program, "prepare_batch"):
+        ensemble.prepared(program, problem.y0[None], problem)
+    (directory / COMPILED).touch()
+    return program
+
+
+def _resolved(request: Request) -> Resolved:
+    resolved = resolve(request.case)
+    if resolved.id != request.id:
+        raise InputError(STALE)
+    return resolved
+
+
+def _garbage(solution: Solution, grid: np.ndarray) -> str:
+    """Return what is wrong with a solution that breaks the protocol, else ``""``."""
+    t, y = solution.t, solution.y
+    if y.dtype.kind not in "fiu":
+        return f"the method returned states of the type {y.dtype}, not real numbers"
+    if t.ndim != 1 or y.shape != (t.size, solution.problem.system.dim):
+        return f"the method returned times of shape {t.shape} and states of shape {y.shape}"
+    if t.size > grid.size or not np.array_equal(t, grid[: t.size]):
+        return "the method returned times that were not asked for"
+    if solution.status is Status.FINISHED and t.size != grid.size:
+        return f"the method says it finished but returned {t.size} of {grid.size} samples"
+    if solution.status is Status.FINISHED and not np.isfinite(y).all():
+        first = t[np.flatnonzero(~np.isfinite(y).all(axis=1))[0]]
+        return f"the method says it finished but its state is not finite from t = {first:.4g}"
+    return ""
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,94 @@
+"""Files that are complete or not there, and directories that can be written."""
+
+import os
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from problems.errors import InputError
+
+
+@contextmanager
+def atomic(path: Path) -> Iterator[Path]:
+    """Yield a temporary path that becomes ``path`` if the block succeeds, and vanishes if not.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it cannot be written, as on a full disk.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}-{threading.get_ident()}.part")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise InputError(f"cannot write {str(path)!r}: {error.strerror or error}.") from error
+        raise
+
+
+def json_of(value: Any) -> bytes:
+    """Return a value as JSON for people: indented, and ended by a line end."""
+    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as JSON, all of it or nothing."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(json_of(value))
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all of them or, as far as it can be helped, none.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If one cannot be written; what there was is left as it was.
+    """
+    folders = {path.parent for path in files}
+    new = {path for folder in folders for path in (folder, *folder.parents) if not path.exists()}
+    try:
+        for folder in folders:
+            ensure_writable(folder)
+        with ExitStack() as stack:
+            for path, content in files.items():
+                stack.enter_context(atomic(path)).write_bytes(content)
+    except BaseException:
+        for path in sorted(new, reverse=True):
+            with suppress(OSError):
+                path.rmdir()
+        raise
+
+
+def ensure_writable(directory: Path, *, keep: bool = True) -> None:
+    """Make a directory and try to write in it; on failure, or unless ``keep``, leave nothing behind.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With the reason.
+    """
+    made: list[Path] = []
+    kept = False
+    try:
+        missing = [path for path in (directory, *directory.parents) if not path.exists()]
+        for path in reversed(missing):
+            path.mkdir(exist_ok=True)
+            made.append(path)
+        with tempfile.TemporaryFile(dir=directory):
+            pass
+        kept = keep
+    except OSError as error:
+        raise InputError(f"cannot write to the directory {str(directory)!r}: {error.strerror}.") from None
+    finally:
+        if not kept:
+            for path in reversed(made):
+                path.rmdir()

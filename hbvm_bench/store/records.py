@@ -1,0 +1,305 @@
+"""What the store keeps of a case: plain, typed, JSON.
+
+Not-a-number and infinity never enter a record: a value that does not exist is
+``None`` with a sentence saying why.
+"""
+
+import math
+import re
+from datetime import datetime
+from statistics import median, quantiles
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from hbvm_bench.campaign.file import Case, Limits, Role
+
+T = TypeVar("T")
+SCHEMA = 2  # 1 had position errors in units of length
+COMPILING = "compiling"
+# They command a terminal, or turn the direction in which a line is read.
+COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused", "damaged", "outdated"]
+
+
+def decoded(content: bytes, type_: type[T]) -> T:
+    """Read JSON that somebody else may have written: its texts lose the characters that command a terminal.
+
+    Raises
+    ------
+    msgspec.MsgspecError
+        If it is no JSON, or not that of the type.
+    ValueError
+        If it is no UTF-8, or nested too deeply.
+    """
+    try:
+        return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+
+
+def printable(text: str) -> str:
+    """Return text without the characters that command a terminal; line ends and tabs stay."""
+    return COMMANDS.sub("", text)
+
+
+def _printable(value: Any) -> Any:
+    match value:
+        case str():
+            return printable(value)
+        case list():
+            return [_printable(item) for item in value]
+        case dict():
+            return {printable(key): _printable(item) for key, item in value.items()}
+    return value
+
+
+class Value(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One metric of one case.
+
+    Attributes
+    ----------
+    value : float or None
+        The number; ``None`` where there is none.
+    void : bool
+        Whether the number exists but must not be compared.
+    why : str
+        Why there is no number, or why it is void.
+    """
+
+    value: float | None = None
+    void: bool = False
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        if self.value is not None and not math.isfinite(self.value):
+            raise ValueError(f"a metric must be finite, not {self.value!r}")
+
+    @property
+    def counts(self) -> bool:
+        """Whether the number may be compared with other cases'."""
+        return self.value is not None and not self.void
+
+
+class Compile(msgspec.Struct, frozen=True, kw_only=True):
+    """Seconds of one compilation, and whether it came from a cache (``None``: nothing to compile)."""
+
+    seconds: float
+    cached: bool | None
+
+
+class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
+    """What one visit of the timing pass measured, in a process of its own.
+
+    Attributes
+    ----------
+    samples : list of float
+        Seconds per whole integration.
+    repeats : int
+        Integrations in one sample.
+    compile : Compile
+        The compilation in this process.
+    share : float
+        Processor seconds per wall second while sampling: below 1 something else used the core.
+    calibration : list of float
+        Seconds of a fixed computation before each sample and after the last.
+    """
+
+    samples: list[float]
+    repeats: int
+    compile: Compile
+    share: float = 1.0
+    calibration: list[float] = []
+
+    def __post_init__(self) -> None:
+        if not self.samples or not all(0.0 < s < math.inf for s in [*self.samples, *self.calibration]):
+            raise ValueError("a timing has samples, and all of them are positive")
+
+    @property
+    def calibrated(self) -> list[float]:
+        """Return the samples in units of the fixed computation; empty where it was not taken."""
+        return [sample / median(self.calibration) for sample in self.samples] if self.calibration else []
+
+
+class Timing(msgspec.Struct, frozen=True, kw_only=True):
+    """All samples of the timing pass; nothing is thrown away.
+
+    Attributes
+    ----------
+    rounds : list of TimingRound
+        Round by round.
+    why : str
+        Why there are none, or fewer than planned.
+    machine : dict
+        Where all the rounds were taken; the case may have been measured on another one.
+    """
+
+    rounds: list[TimingRound] = []
+    why: str = ""
+    machine: dict[str, str | int] = {}
+
+    @property
+    def samples(self) -> list[float]:
+        return [sample for one in self.rounds for sample in one.samples]
+
+    @property
+    def summary(self) -> dict[str, float]:
+        """Return ``median``, ``min``, ``q1``, ``q3`` in seconds; empty without samples."""
+        samples = sorted(self.samples)
+        if not samples:
+            return {}
+        q1, _, q3 = quantiles(samples, n=4, method="inclusive") if len(samples) > 1 else samples * 3
+        return {"median": median(samples), "min": samples[0], "q1": q1, "q3": q3}
+
+    @property
+    def share(self) -> float:
+        """Return the least share of a core that a round had; 1 without rounds."""
+        return min((one.share for one in self.rounds), default=1.0)
+
+    @property
+    def compile(self) -> Compile | None:
+        """Return the compilation with the median seconds."""
+        compiles = sorted((one.compile for one in self.rounds), key=lambda c: c.seconds)
+        return compiles[(len(compiles) - 1) // 2] if compiles else None
+
+
+class Counters(msgspec.Struct, frozen=True, kw_only=True):
+    """Work done; ``None`` where a library has no such counter."""
+
+    steps: int | None = None
+    rejections: int | None = None
+    evaluations: int | None = None
+    iterations: int | None = None
+    solver: str | None = None
+
+
+class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The law that an invariant's error follows in time; numbers that do not exist are ``None``.
+
+    Attributes
+    ----------
+    law : str or None
+        A key of `hbvm_bench.measure.drift.LAWS`; ``None`` where the samples do not say.
+    why : str
+        Why there is no law.
+    slope, slope_low, slope_high : float or None
+        Power of t, with its 95 % interval.
+    floor : float
+        What is there before the growth.
+    growth : float or None
+        Rate of an exponential, in 1/t.
+    rate, rate_low, rate_high : float or None
+        Mean signed drift per unit of time, with its 95 % interval over the starts;
+        for the energy only, the other invariants' errors have no sign.
+    mean, mean_error : float or None
+        Mean over the starts at the end, without the offset of each, and its standard
+        error (`hbvm_bench.measure.drift.Mean`); for the energy of several starts only.
+    positive : int or None
+        How many of the starts end above 0.
+    reached : float
+        What the growth alone reached at the end.
+    end : float
+        The end of the span, from the start on.
+    starts : int
+        Trajectories it was found from.
+    """
+
+    law: str | None = None
+    why: str = ""
+    slope: float | None = None
+    slope_low: float | None = None
+    slope_high: float | None = None
+    floor: float = 0.0
+    growth: float | None = None
+    rate: float | None = None
+    rate_low: float | None = None
+    rate_high: float | None = None
+    mean: float | None = None
+    mean_error: float | None = None
+    positive: int | None = None
+    reached: float = 0.0
+    end: float = 0.0
+    starts: int = 0
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """What a worker process reports of the case it ran.
+
+    Attributes
+    ----------
+    outcome : str
+        ``ok``, ``stalled``, ``refused`` or ``crashed``; ``timeout`` and ``killed`` are seen from
+        outside, and ``damaged`` or ``outdated`` is said of a record that the store cannot use.
+    status : str
+        The solution's own status; empty without a solution, `COMPILING` for a timeout before it began.
+    reason : str
+        One sentence where something did not go as asked.
+    t_stop : float or None
+        Where the integration stopped.
+    violation : str
+        Where a symmetry guard says that this is another trajectory than the one asked for.
+    counters, metrics, compile
+        What was measured.
+    laws : dict of Law
+        By invariant, where the campaign asks for them.
+    trajectories : int
+        More than one for an ensemble.
+    """
+
+    outcome: Outcome
+    status: str = ""
+    reason: str = ""
+    t_stop: float | None = None
+    violation: str = ""
+    counters: Counters = Counters()
+    metrics: dict[str, Value] = {}
+    compile: Compile | None = None
+    laws: dict[str, Law] = {}
+    trajectories: int = 1
+
+
+class Record(msgspec.Struct, frozen=True, kw_only=True):
+    """One case in the store.
+
+    Attributes
+    ----------
+    id : str
+        See `hbvm_bench.campaign.identity`.
+    case : Case
+        What was run.
+    role, library, order
+        Of the method.
+    result : Result
+        What came out.
+    timing : Timing or None
+        From the serial timing pass.
+    limits : Limits
+        Under which it ran.
+    seconds, peak_memory_gib : float
+        Of the process of the accuracy run, start and imports included.
+    log : str
+        The end of what the process printed, where it crashed.
+    versions, machine, finished
+        Where and when it was measured.
+    """
+
+    id: str
+    case: Case
+    role: Role
+    library: str
+    order: int | None
+    result: Result
+    timing: Timing | None = None
+    limits: Limits = Limits()
+    seconds: float = 0.0
+    peak_memory_gib: float = 0.0
+    log: str = ""
+    versions: dict[str, str] = {}
+    machine: dict[str, str | int] = {}
+    finished: str = ""
+    schema: int = SCHEMA
+
+    def __post_init__(self) -> None:
+        if self.finished:
+            datetime.fromisoformat(self.finished)

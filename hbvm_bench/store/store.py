@@ -1,0 +1,383 @@
+"""The store: one atomic JSON file per case, its series beside it, and an index.
+
+::
+
+    DIR/campaign.json        what was asked for: the campaign and the ids of its cases
+    DIR/cases/<id>.json      one record per case
+    DIR/cases/<id>.npz       its series
+
+A file is complete or not there, so that the store is also the cache: a rerun
+does what is missing. Nothing is pickled.
+"""
+
+import fcntl
+import io
+import math
+import os
+import re
+import shlex
+import time
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Campaign, Case
+from hbvm_bench.campaign.identity import is_ours, make_method, make_problem
+from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.store.files import atomic, ensure_writable, write_json
+from hbvm_bench.store.records import SCHEMA, Outcome, Record, Result, decoded
+from problems import limits
+from problems.errors import InputError
+
+INDEX = "campaign.json"
+CASES = "cases"
+NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
+NAME = re.compile(r"\w[\w .-]{0,99}")
+SERIES = ("t", "y", "distance", "position_t", "position", "phase")  # every trajectory has them
+FORGOTTEN = 3600.0  # seconds after which a half-written file has nobody who writes it
+
+
+class Index(msgspec.Struct, frozen=True, kw_only=True):
+    """What a run was asked to do.
+
+    Attributes
+    ----------
+    campaign : Campaign
+        As read.
+    ids : list of str
+        The ids of its cases, in order.
+    version : str
+        Of this package.
+    command : str
+        How to run it again.
+    cases : list of Case
+        The cases, in the order of their ids; empty where they are the campaign's own.
+    """
+
+    campaign: Campaign
+    ids: list[Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]]  # they are file names, too
+    version: str
+    command: str
+    cases: list[Case] = []
+    schema: int = SCHEMA
+
+    def listed(self) -> list[tuple[str, Case]]:
+        """Return the ids with their cases, in order."""
+        return list(zip(self.ids, self.cases or self.campaign.cases(), strict=True))
+
+
+class _Version(msgspec.Struct):
+    schema: int = SCHEMA
+
+
+class OtherVersionError(ValueError):
+    """A record is sound, but an earlier or later version of this package wrote it."""
+
+
+class Store:
+    """Records and series in a directory; see the module's text."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = Path(directory)
+        self.cases = self.directory / CASES
+
+    def prepare(self) -> None:
+        """Make the directories, or refuse a place that cannot be written.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If nothing can be written there; nothing is left behind.
+        """
+        ensure_writable(self.cases)
+        for path in self.cases.glob(".*.part"):  # of a runner that was killed while it wrote
+            with suppress(FileNotFoundError):
+                if time.time() - path.stat().st_mtime > FORGOTTEN:
+                    path.unlink()
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out of the directory; the lock ends with the process, however it ends.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If another run is writing there.
+        """
+        handle = os.open(self.directory, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(
+                    f"another run is writing to {str(self.directory)!r}; "
+                    "wait for its end, or give another --out."
+                ) from None
+            except OSError:  # a file system without locks; two runs there repeat work but harm nothing
+                pass
+            yield
+        finally:
+            os.close(handle)
+
+    def load(self, case_id: str) -> Record | None:
+        """Return the record of a case, or ``None`` if it is missing or unreadable."""
+        try:
+            return self._read(case_id)
+        except (OSError, ValueError):
+            return None
+
+    def has(self, case_id: str) -> bool:
+        """Whether there is a record of a case, be it readable or not."""
+        return self._record_path(case_id).exists()
+
+    def save(self, record: Record, series: Mapping[str, NDArray[np.float64]] | bytes | None = None) -> None:
+        """Store a record, its series first so that a record never lacks them."""
+        if series is not None:
+            encoded = series if isinstance(series, bytes) else encode_series(series)
+            with atomic(self._series_path(record.id)) as path:
+                path.write_bytes(encoded)
+        write_json(self._record_path(record.id), record)
+
+    def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
+        """Return the series of a case by name; empty where it has none."""
+        return decode_series(self.series_file(case_id))
+
+    def series_file(self, case_id: str) -> bytes:
+        """Return the ``.npz`` file of a case as it is; empty where it has none, or none that can be read."""
+        try:
+            return self._series_path(case_id).read_bytes()
+        except OSError:
+            return b""
+
+    def write_index(self, index: Index) -> None:
+        """Store what the run was asked to do."""
+        write_json(self.directory / INDEX, index)
+
+    def index(self) -> Index:
+        """Return what the run was asked to do.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the directory holds no run.
+        """
+        try:
+            content = (self.directory / INDEX).read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            there = "has no results" if self.directory.is_dir() else "does not exist"
+            raise InputError(
+                f"the directory {str(self.directory)!r} {there}; make some with: hbvm-bench run."
+            ) from None
+        except OSError as error:
+            raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
+        try:
+            index = decoded(content, Index)
+            cases = index.cases or index.campaign.cases()
+        except ValueError as error:  # msgspec's errors and ours are among them
+            words = str(error).rstrip(".")
+            raise InputError(f"{self.directory / INDEX} is not the index of a run: {words}.") from None
+        if len(index.ids) != len(cases) or len(set(index.ids)) != len(cases):
+            raise InputError(
+                f"{self.directory / INDEX} is damaged: {len(set(index.ids))} ids of {len(cases)} cases; "
+                f"what has run is kept, {again(index, self.directory)}."
+            )
+        return index
+
+    def records(self) -> list[Record]:
+        """Return the records of the run that are there, in the order of the campaign.
+
+        Labels and notes are the campaign's present ones: they are words, and no reason to run again.
+        A record that cannot be read is one that says so.
+        """
+        made: list[Record] = []
+        index = self.index()
+        for case_id, case in index.listed():
+            try:
+                record = self._read(case_id)
+                if not is_of(record.case, case):
+                    raise ValueError("it is the record of another case")
+            except FileNotFoundError:
+                continue
+            except (OSError, ValueError) as error:
+                made.append(_unread(case_id, case, error, again(index, self.directory)))
+                continue
+            words = msgspec.structs.replace(record.case, settings=case.settings, note=case.note)
+            made.append(msgspec.structs.replace(record, case=words))
+        return made
+
+    def everything(self) -> Iterator[Record]:
+        """Yield all records in the directory, those of earlier versions and other settings too."""
+        for path in sorted(self.cases.glob("[!.]*.json")):
+            try:
+                record = decoded(path.read_bytes(), Record)
+            except (OSError, ValueError):
+                continue
+            if record.schema == SCHEMA and path == self._record_path(record.id):
+                yield record
+
+    def _read(self, case_id: str) -> Record:
+        content = self._record_path(case_id).read_bytes()
+        schema = decoded(content, _Version).schema
+        if schema != SCHEMA:
+            when = "an earlier" if schema < SCHEMA else "a later"
+            raise OtherVersionError(f"measured by {when} version of hbvm-bench")
+        record = decoded(content, Record)
+        if record.id != case_id:
+            raise ValueError("it is the record of another case")
+        return record
+
+    def _record_path(self, case_id: str) -> Path:
+        return self.cases / f"{case_id[:NAME_LENGTH]}.json"
+
+    def _series_path(self, case_id: str) -> Path:
+        return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
+
+
+def is_of(stored: Case, asked: Case) -> bool:
+    """Whether the case of a record is the one asked for; labels and notes are words and do not count."""
+    words = msgspec.structs.replace(
+        asked, problem=stored.problem, method=stored.method, settings=stored.settings, note=stored.note
+    )
+    return (
+        words == stored
+        and _prints_as(asked.problem, stored.problem, _problem)
+        and _prints_as(asked.method, stored.method, _method)
+    )
+
+
+def _prints_as(asked: str, stored: str, printed: Callable[[str], str]) -> bool:
+    if asked == stored:
+        return True
+    try:
+        return printed(asked) == stored
+    except InputError:  # of a plugin that is not here
+        with suppress(InputError):
+            return parse_spec(asked).name == parse_spec(stored).name
+        return False
+
+
+def _problem(text: str) -> str:
+    return repr(make_problem(text))
+
+
+def _method(text: str) -> str:
+    return str(Spec(parse_spec(text).name, make_method(text).options()))
+
+
+def _unread(case_id: str, case: Case, error: Exception, again: str) -> Record:
+    """Return the row of a case whose record cannot be used."""
+    outcome: Outcome = "damaged"
+    reason = f"its record in the store is damaged ({' '.join(str(error).split())}); {again}"
+    if isinstance(error, OtherVersionError):
+        outcome, reason = "outdated", f"{error}; {again}"
+    result = Result(outcome=outcome, reason=reason)
+    with suppress(InputError):
+        case = msgspec.structs.replace(case, problem=_problem(case.problem))
+    try:
+        case = msgspec.structs.replace(case, method=_method(case.method))
+        method = make_method(case.method)
+    except InputError:  # of a plugin that is not here
+        return Record(id=case_id, case=case, role="peer", library="", order=None, result=result)
+    role = "ours" if is_ours(method) else "peer"
+    return Record(id=case_id, case=case, role=role, library=method.library, order=method.order, result=result)
+
+
+def again(index: Index, directory: Path) -> str:
+    """Say how to repair a run; its own command may be a stranger's, and is not for pasting."""
+    return f"run the campaign {index.campaign.name!r} again with --out {shlex.quote(str(directory))}"
+
+
+def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) -> str:
+    """Return what is wrong with the series of a case, ``""`` where they are as a run writes them.
+
+    Parameters
+    ----------
+    record : Record
+        One without a trajectory has no series.
+    series : mapping of ndarray
+        As `Store.series` returns them.
+    dim : int
+        Length of a state.
+    """
+    if record.result.outcome in ("damaged", "outdated"):
+        return "there is no record of them"
+    if record.result.outcome not in ("ok", "stalled"):
+        return ""
+    if absent := [name for name in SERIES if name not in series]:
+        return f"there is no {absent[0]}"
+    t, y = series["t"], series["y"]
+    lengths = {name: t.size for name in series if name.startswith(("distance", "error.", "guard."))}
+    lengths |= dict.fromkeys(("position", "phase"), series["position_t"].size)
+    if t.ndim != 1 or y.shape != (t.size, dim):
+        return f"t has the shape {t.shape} and y {y.shape}"
+    if wrong := [name for name, length in lengths.items() if series[name].shape != (length,)]:
+        return f"{wrong[0]} has the shape {series[wrong[0]].shape}, beside {lengths[wrong[0]]} times"
+    if drifts := [name for name in series if name.startswith("drift.")]:
+        times = series.get("drift.t", np.empty(0))
+        if times.ndim != 1 or any(series[name].shape[-1:] != times.shape for name in drifts):
+            return "the errors of its drift do not belong to the times of it"
+    if series.get("extra.dt_history", np.empty((0, 2))).shape[1:] != (2,):
+        return "its step sizes have no times"
+    steps = np.diff(t)
+    if record.case.ensemble is None:
+        if not np.isfinite(t).all() or not (np.all(steps > 0) or np.all(steps < 0)):
+            return "its times do not go one way"
+        if not np.isfinite(y[:1]).all() or (record.result.status == "finished" and not np.isfinite(y).all()):
+            return "its states are not finite"
+    return ""
+
+
+def progress(record: Record) -> tuple[bool, int, str]:
+    """Return what orders records of one case, by which the greatest is kept.
+
+    A measured case before a failure, then the one with more rounds of timing, then the later one.
+    """
+    rounds = len(record.timing.rounds) if record.timing else 0
+    return record.result.outcome == "ok", rounds, record.finished
+
+
+def encode_series(series: Mapping[str, NDArray[np.float64]]) -> bytes:
+    """Return arrays by name as a compressed ``.npz`` file without pickles."""
+    stream = io.BytesIO()
+    np.savez_compressed(stream, allow_pickle=False, **series)  # pyright: ignore[reportArgumentType]
+    return stream.getvalue()
+
+
+def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of a ``.npz`` file by name; empty if it is not one of ours.
+
+    It may be cut or something else; be far larger than it looks; have pickles, texts or complex
+    numbers; or have names that are none, for names go into pages and file names.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the environment's limit of memory is no number.
+    """
+    most = limits.limit("GIB") * 2**30
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            if sum(member.file_size for member in archive.infolist()) > most:
+                return {}
+            found = {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
+    except Exception:  # zipfile and numpy raise a dozen kinds, and the content is a stranger's
+        return {}
+    ours = all(NAME.fullmatch(name) and array.dtype.kind in "fiu" for name, array in found.items())
+    return found if ours else {}
+
+
+def _array(content: bytes) -> NDArray[np.float64]:
+    """Read a ``.npy`` file whose header promises no more than follows it, for numpy makes room first."""
+    stream = io.BytesIO(content)
+    np.lib.format.read_magic(stream)
+    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    if math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+        raise ValueError("its header says another size")
+    stream.seek(0)
+    return np.atleast_1d(np.load(stream, allow_pickle=False))

@@ -1,0 +1,1 @@
+"""HBVM that chooses everything itself."""

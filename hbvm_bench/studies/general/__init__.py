@@ -1,0 +1,1 @@
+"""General and stiff systems with known end values."""

@@ -1,0 +1,177 @@
+"""The Henon-Heiles experiment: who leaves the triangle, when, and from where."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.studies.paper.departure import departure
+from integrators import integrate
+from integrators.gauss import Gauss
+from integrators.hbvm import HBVM
+from integrators.protocol import Array, MethodBase
+from problems.catalogue.henon_heiles import henon_heiles, inside_triangle
+
+H, T_END = 1.0, 5e4
+GAUSS = Gauss(s=2, h=H)
+HBVM_4 = HBVM(k=4, s=2, h=H)
+
+GAP = 2e-4  # 1/6 - H0; the paper says "very close to 1/6" and gives no start
+START = (0.0, 0.5, 0.5)  # q1, q2 and the momentum's angle
+GONE = 2.0  # |q| from which no orbit comes back
+NEIGHBOURS = 32
+
+DIRECTIONS = tuple((np.arange(36) * 2 * math.pi / 36).tolist())
+GAPS = tuple((10.0 ** np.linspace(-5.0, -2.0, 19)).tolist())
+MAP_END = 2e4
+
+STEPS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
+STEP_STARTS = 8
+TRUTH = HBVM(k=15, s=10, h=0.25)
+AGREES = 1e-2  # distance at which two orbits have parted
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A run at its own steps.
+
+    Attributes
+    ----------
+    method : str
+        As it prints.
+    t, q, energy : ndarray, shapes (n,), (n, 2), (n,)
+        Times, positions, values of H.
+    error : float
+        Largest relative error of H.
+    left : float or None
+        When |q| exceeded `GONE`.
+    outside : int
+        Number of steps outside the triangle before that.
+    """
+
+    method: str
+    t: Array
+    q: Array
+    energy: Array
+    error: float
+    left: float | None
+    outside: int
+
+
+@dataclass(frozen=True)
+class StepRow:
+    """What a method does with a step.
+
+    Attributes
+    ----------
+    h : float
+        The step.
+    left : list of (float or None)
+        When the orbits from neighbouring starts have left.
+    agrees : float
+        Time up to which the orbit is within `AGREES` of the true one.
+    """
+
+    h: float
+    left: list[float | None]
+    agrees: float
+
+
+def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END, every: int = 1) -> Orbit:
+    """Integrate from the start, ``offset`` last bits away; keep every ``every``-th step."""
+    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    y0 = neighbour(problem.y0, offset)
+    stepper = method.compile(problem.system).start(y0, problem.par, 0.0)
+    samples = stepper.advance(np.array([t_end]), sample="steps")
+    t, y = np.concatenate([[0.0], samples.t])[::every], np.vstack([y0, samples.y])[::every]
+    gone = np.flatnonzero(np.abs(y[:, :2]).max(axis=1) > GONE)
+    if gone.size:
+        t, y = t[: gone[0] + 1], y[: gone[0] + 1]
+    return Orbit(
+        method=repr(method),
+        t=t,
+        q=y[:, :2],
+        energy=problem.invariants(y)["energy"],
+        error=float(problem.errors(y)["energy"].max()),
+        left=float(t[-1]) if gone.size else float(stepper.t) if samples.status.failed else None,
+        outside=int(np.count_nonzero(~inside_triangle(y))) - int(gone.size > 0),
+    )
+
+
+def neighbour(y0: Array, offset: int) -> Array:
+    """Return the start whose second momentum is ``offset`` times 2^-53 larger."""
+    y = y0.copy()
+    y[3] += offset * 2.0**-53
+    return y
+
+
+def escapes(
+    method: MethodBase, offsets: Sequence[int] = range(NEIGHBOURS), t_end: float = T_END
+) -> list[float | None]:
+    """Return when the orbits from neighbouring starts have left."""
+    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2])
+    program = method.compile(problem.system)
+    return [
+        departure(program.start(neighbour(problem.y0, i), problem.par, 0.0), t_end, _gone, stretch=256 * H)
+        for i in offsets
+    ]
+
+
+def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STARTS) -> list[StepRow]:
+    """Return what ``gauss``, s = 2, or ``hbvm``, HBVM(4, 2), does with each step."""
+    rows = []
+    for h in steps:
+        method = Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h)
+        rows.append(StepRow(h, escapes(method, range(starts)), agreement(method)))
+    return rows
+
+
+def agreement(method: MethodBase, t_end: float = 100.0) -> float:
+    """Return the time of the first own step at which the orbit is `AGREES` away from the true one."""
+    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    found = integrate(problem, method, times=[t_end], sample="steps")
+    truth = integrate(problem, TRUTH, times=found.t)
+    parted = np.flatnonzero(~(np.hypot(*(found.y[:, :2] - truth.y[:, :2]).T) < AGREES))
+    return float(found.t[parted[0]] if parted.size else found.t[-1])
+
+
+def escape_map(
+    method: MethodBase,
+    gaps: Sequence[float] = GAPS,
+    directions: Sequence[float] = DIRECTIONS,
+    t_end: float = MAP_END,
+) -> Array:
+    """Return when orbits have left, for energies 1/6 - gap and directions of the momentum at the start.
+
+    Returns
+    -------
+    ndarray, shape (len(gaps), len(directions))
+        Times; NaN where the orbit stays.
+    """
+    program = method.compile(henon_heiles().system)
+    times = np.full((len(gaps), len(directions)), np.nan)
+    for i, gap in enumerate(gaps):
+        for j, angle in enumerate(directions):
+            problem = henon_heiles(energy=1 / 6 - gap, q1=START[0], q2=START[1], direction=angle)
+            stepper = program.start(problem.y0, problem.par, 0.0)
+            left = departure(stepper, t_end, _gone, stretch=128 * H)
+            times[i, j] = np.nan if left is None else left
+    return times
+
+
+def true_orbit(t_end: float = 300.0) -> Array:
+    """Return positions of the true orbit, shape (n, 2), for a trace in the level curves."""
+    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    times = np.arange(0.0, t_end + 0.05, 0.1)
+    return integrate(problem, HBVM(k=12, s=8, h=0.2), times=times).y[:, :2]
+
+
+def potential(q1: Array, q2: Array) -> Array:
+    """Return U(q1, q2)."""
+    return (q1**2 + q2**2) / 2 + q1**2 * q2 - q2**3 / 3
+
+
+def _gone(y: Array) -> NDArray[np.bool_]:
+    return ~(np.abs(y[:, :2]).max(axis=1) <= GONE)

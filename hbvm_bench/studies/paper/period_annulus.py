@@ -1,0 +1,205 @@
+"""The edge of a period annulus: the paper's bisection, Table 1, and why its entries are what they are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.studies.paper.departure import departure
+from integrators.gauss import Gauss
+from integrators.hbvm import HBVM
+from integrators.protocol import Array, MethodBase, Program
+from problems import emit
+from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, period_annulus
+
+TOLERANCE = 2.0**-52
+SPAN, SHORT_SPAN = 2500.0, 100.0
+FAR = 1.0  # |q| or |p| of an orbit that departs; the annulus lies within 0.69
+DEGREES = (2, 3, 4, 5)
+NODES: dict[int, int] = dict(zip(DEGREES, (5, 8, 10, 13), strict=True))  # k >= 5 s / 2
+STEPS = (1.0, 0.5)
+ENDS = tuple(1.0 + i / 64 for i in range(12))  # of the segment; the paper's first
+PROBLEM = period_annulus()
+
+# Table 1 of the paper: (h, s) -> Gauss point, its error in H, HBVM point, its error in H.
+PRINTED = {
+    (1.0, 2): ("3.723580509957994e-1", 2.15e-2, "3.757055929263451e-1", 7.66e-16),
+    (1.0, 3): ("3.748759009745006e-1", 5.38e-3, "3.757055929263451e-1", 4.60e-16),
+    (1.0, 4): ("3.754691919292651e-1", 1.53e-3, "3.757055929263450e-1", 1.22e-15),
+    (1.0, 5): ("3.756914213384024e-1", 9.20e-5, "3.757055929263451e-1", 4.60e-16),
+    (0.5, 2): ("3.756045691696934e-1", 6.56e-4, "3.757055929263451e-1", 4.60e-16),
+    (0.5, 3): ("3.756828289241957e-1", 1.47e-4, "3.757055929263451e-1", 4.60e-16),
+    (0.5, 4): ("3.757049796804918e-1", 3.98e-6, "3.757055929263451e-1", 4.60e-16),
+    (0.5, 5): ("3.757055571549585e-1", 2.32e-7, "3.757055929263451e-1", 4.60e-16),
+}
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where a method puts the edge of the annulus.
+
+    Attributes
+    ----------
+    low, high : float
+        The last interval of the bisection: (0, low) stays, (0, high) departs.
+    orbits : int
+        How many orbits were integrated.
+    """
+
+    low: float
+    high: float
+    orbits: int
+
+    @property
+    def c(self) -> float:
+        """The middle of the last interval."""
+        return (self.low + self.high) / 2
+
+
+def edge(
+    method: MethodBase,
+    span: float,
+    program: Program | None = None,
+    *,
+    every: float | None = None,
+    end: float = 1.0,
+) -> Edge:
+    """Find the edge by the paper's steps 1 to 5, on the segment from the origin to Q = (0, 1).
+
+    The printed step 2 lets the segment end in P1; it has to end in Q.
+
+    Parameters
+    ----------
+    method : MethodBase
+        Whose orbits are judged.
+    span : float
+        Time over which they are followed.
+    program : Program, optional
+        The method compiled.
+    every : float, optional
+        See `departure`.
+    end : float
+        Another Q = (0, end): the bisection then visits other points.
+    """
+    program = program or method.compile(PROBLEM.system)
+    low, high, orbits = 0.0, end, 0
+    while high - low >= TOLERANCE:
+        middle = (low + high) / 2
+        if middle in (low, high):
+            break
+        if fate(program, middle, span, every) is None:
+            low = middle
+        else:
+            high = middle
+        orbits += 1
+    return Edge(low, high, orbits)
+
+
+def fate(program: Program, c: float, span: float, every: float | None = None) -> float | None:
+    """Return when the numerical orbit from (0, c) departs, or ``None``; see `departure` for ``every``."""
+    stepper = program.start(np.array([0.0, c]), PROBLEM.par, 0.0)
+    return departure(stepper, span, _departed, stretch=SHORT_SPAN, every=every)
+
+
+def cell(s: int, h: float) -> dict[str, Edge]:
+    """Return the entries of Table 1 for one s and h: ``gauss`` and ``hbvm``, each over both spans."""
+    made = {}
+    for family, method in (("gauss", Gauss(s=s, h=h)), ("hbvm", HBVM(k=NODES[s], s=s, h=h))):
+        program = method.compile(PROBLEM.system)
+        for name, span in ((family, SPAN), (f"{family}_short", SHORT_SPAN)):
+            made[name] = edge(method, span, program)
+    return made
+
+
+def limit(s: int, h: float, span: float = SPAN) -> tuple[float, float]:
+    """Return when the first start beyond the edge by HBVM departs, and how far H/H* rises until then."""
+    method = HBVM(k=NODES[s], s=s, h=h)
+    t, y = orbit(method, edge(method, span).high, span)
+    values = energy(y)
+    return float(t[-1]), float((values - values[0]).max() / H_STAR)
+
+
+def spread(s: int, h: float, ends: Sequence[float] = ENDS) -> list[float]:
+    """Return the errors in H of Gauss(s) over the paper's span, from bisections with other ends."""
+    method = Gauss(s=s, h=h)
+    program = method.compile(PROBLEM.system)
+    return [error_of(edge(method, SPAN, program, end=end).c) for end in ends]
+
+
+def error_of(c: float) -> float:
+    """Return |H(0, c) - H*|/H*, with H evaluated in double-double."""
+    return float(abs(energy(np.array([[0.0, c]]))[0] - H_STAR) / H_STAR)
+
+
+def energy(y: Array) -> Array:
+    """Return H of states (n, 2), evaluated in double-double."""
+    return PROBLEM.invariants(y)["energy"]
+
+
+def fates(method: MethodBase, gaps: Sequence[float], span: float = SPAN) -> list[tuple[float, float | None]]:
+    """Return, for each gap, the gap and when the orbit from c = (1 - gap) c* departs."""
+    program = method.compile(PROBLEM.system)
+    return [(gap, fate(program, C_STAR * (1 - gap), span)) for gap in gaps]
+
+
+def orbit(method: MethodBase, c: float, span: float = SPAN) -> tuple[Array, Array]:
+    """Return the times and states at the own steps of the orbit from (0, c), up to its departure."""
+    stepper = method.compile(PROBLEM.system).start(np.array([0.0, c]), PROBLEM.par, 0.0)
+    samples = stepper.advance(np.array([span]), sample="steps")
+    t, y = np.concatenate([[0.0], samples.t]), np.vstack([[0.0, c], samples.y])
+    far = np.flatnonzero(_departed(y))
+    return (t[: far[0]], y[: far[0]]) if far.size else (t, y)
+
+
+def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
+    """Return, for c = (1 - gap) c*, the relative distance of H from H* and the orbit's period.
+
+    The period ends at the return to the positive p axis; the root is found by secants, and
+    every state between steps is a partial step.
+    """
+    h = 1 / 16
+    program = HBVM(k=15, s=6, h=h).compile(PROBLEM.system)
+    return [(error_of(C_STAR * (1 - gap)), _period(program, C_STAR * (1 - gap), h)) for gap in gaps]
+
+
+def eigenvalues(point: Sequence[float]) -> NDArray[np.complex128]:
+    """Return the two eigenvalues of the field linearised at a point (q, p), by central differences."""
+    field = emit.numpy(PROBLEM.system, "field")
+    J = np.empty((2, 2))
+    for j in range(2):
+        step = np.zeros(2)
+        step[j] = 1e-5
+        ahead, behind = (field(0.0, np.array(point) + side * step, PROBLEM.par) for side in (1, -1))
+        J[:, j] = (ahead - behind) / 2e-5
+    return np.linalg.eigvals(J).astype(complex)
+
+
+def saddle_rate() -> float:
+    """Return the positive eigenvalue at P1; the period grows as log(1/gap)/rate."""
+    return float(eigenvalues(P1).real.max())
+
+
+def _period(program: Program, c: float, h: float) -> float:
+    stepper = program.start(np.array([0.0, c]), PROBLEM.par, 0.0)
+    while True:
+        kept, t0 = stepper.checkpoint(), stepper.t
+        samples = stepper.advance(np.array([t0 + 64 * h]), sample="steps")
+        q, p = samples.y[:, 0], samples.y[:, 1]
+        back = np.flatnonzero((q[:-1] < 0) & (q[1:] >= 0) & (p[1:] > 0))
+        if back.size:
+            break
+    a, b = float(samples.t[back[0]]), float(samples.t[back[0] + 1])
+    qa, qb = float(q[back[0]]), float(q[back[0] + 1])
+    for _ in range(20):
+        middle = b - qb * (b - a) / (qb - qa)
+        stepper.restore(kept)
+        value = float(stepper.advance(np.array([middle])).y[0, 0])
+        a, qa, b, qb = b, qb, middle, value
+        if abs(b - a) < 1e-13 * b or qa == qb:
+            break
+    return b
+
+
+def _departed(y: Array) -> NDArray[np.bool_]:
+    return ~(np.abs(y).max(axis=1) <= FAR)

@@ -1,0 +1,1 @@
+"""What the bench costs the libraries that it measures."""

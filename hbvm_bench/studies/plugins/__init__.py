@@ -1,0 +1,1 @@
+"""What our methods cost inside other libraries."""

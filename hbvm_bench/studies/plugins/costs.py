@@ -1,0 +1,303 @@
+"""What our methods cost inside other libraries: a plugin, the native kernel and the host's own, in turn.
+
+Every row is compiled and run once before it is timed; then all rows run one after
+the other, several rounds of it, so that what else the machine does meets them all.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import integrators
+import problems
+from hbvm_bench.measure.measured import position_error
+from problems.catalogue.pendulum import exact_state
+from problems.errors import unknown
+from problems.problem import Problem
+
+Array = NDArray[np.float64]
+Run = Callable[[], Array]
+PENDULUM = 100.0  # time units
+PLANETS = 100_000.0  # REBOUND's time units, 1.6e4 years
+
+
+@dataclass(frozen=True)
+class Cost:
+    """A row of the table.
+
+    Attributes
+    ----------
+    name : str
+        What ran.
+    energy, position : float
+        Largest relative error of the energy over the states it returned, and the position error
+        at the end (`hbvm_bench.measure.measured.POSITION`, with the true start and end for stored
+        times).
+    seconds : ndarray
+        One of each round.
+    """
+
+    name: str
+    energy: float
+    position: float
+    seconds: Array
+
+
+def measure(host: str, rounds: int) -> list[Cost]:
+    """Measure the rows of one host: ``"scipy"``, ``"diffrax"`` or ``"rebound"``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is none of these, or is not installed.
+    """
+    if host not in HOSTS:
+        raise unknown("host", host, HOSTS)
+    problem, reference, rows = HOSTS[host]()
+    names = [name for name, _ in rows]
+    first = [run() for _, run in rows]
+    seconds = np.empty((len(rows), rounds))
+    for j in range(rounds):
+        for i, (_, run) in enumerate(rows):
+            start = time.perf_counter()
+            run()
+            seconds[i, j] = time.perf_counter() - start
+    energies = [float(problem.errors(y)["energy"].max()) for y in first]
+    true = np.stack([problem.y0, reference])
+    positions = [float(position_error(problem, (y[-1] - reference)[None], true)[0]) for y in first]
+    return [Cost(*row) for row in zip(names, energies, positions, seconds, strict=True)]
+
+
+def markdown(rows: list[Cost]) -> str:
+    """Return the table: medians, fastest and slowest rounds, and ratios of the fastest to the first row's.
+
+    What else a machine does only ever adds to a time, so ratios are of the fastest rounds.
+    """
+    lines = [
+        "| method | energy | position | median | rounds | to the native kernel |",
+        "|:--|--:|--:|--:|--:|--:|",
+    ]
+    base = float(rows[0].seconds.min())
+    for row in rows:
+        low, middle, high = (1e3 * float(f(row.seconds)) for f in (np.min, np.median, np.max))
+        lines.append(
+            f"| {row.name} | {row.energy:.1e} | {row.position:.1e} | {middle:.3g} ms "
+            f"| {low:.3g} .. {high:.3g} | {low / (1e3 * base):.3g} |"
+        )
+    return "\n".join(lines)
+
+
+def _native(problem: Problem, method: Any) -> tuple[str, Run]:
+    program = method.compile(problem.system)
+    times = np.linspace(problem.t0, problem.t_end, 11)[1:]
+
+    def run() -> Array:
+        return program.start(problem.y0, problem.par, problem.t0).advance(times).y
+
+    return f"native kernel `{method!r}`", run
+
+
+def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
+    import numba
+    from scipy.integrate import solve_ivp
+
+    from integrators.plugins.scipy import HBVM, field
+
+    problem = problems.load("pendulum", t_end=PENDULUM)
+    njit: Any = numba.njit
+
+    @njit
+    def compiled(t, y):
+        return np.array([y[1], -np.sin(y[0])])
+
+    def python(t: float, y: Array) -> list[float]:
+        return [y[1], -np.sin(y[0])]
+
+    def columns(t: Any, y: Array) -> Array:
+        return np.stack([y[1], -np.sin(y[0])])
+
+    def run(fun: Any, **options: Any) -> Run:
+        span = problem.t0, problem.t_end
+        return lambda: solve_ivp(fun, span, problem.y0, atol=options["rtol"], **options).y.T
+
+    ours = {"method": HBVM, "k": 12, "s": 6, "rtol": 1e-10}
+    native = integrators.HBVM(k=12, s=6, tol=1e-10)
+    traced, times = field(problem), np.linspace(problem.t0, problem.t_end, 1001)
+    untraced = Problem(problems.Foreign(compiled, dim=2), y0=problem.y0, t_end=problem.t_end)
+    return (
+        problem,
+        np.array([float(x) for x in exact_state(problem, problem.t_end)]),
+        [
+            _native(problem, native),
+            ("native kernel, numba function", _native(untraced, native)[1]),
+            ("plugin, traced field", run(traced, **ours)),
+            ("plugin, traced field, `every=100`", run(traced, every=100, **ours)),
+            ("plugin, traced field, `t_eval` of 1001 times", run(traced, t_eval=times, **ours)),
+            ("plugin, numba function", run(compiled, **ours)),
+            ("plugin, numba function, `every=100`", run(compiled, every=100, **ours)),
+            ("plugin, Python function", run(python, **ours)),
+            ("plugin, Python function, `vectorized=True`", run(columns, vectorized=True, **ours)),
+            *(
+                (f"`{method}`, {what}, `rtol=atol={rtol:g}`", run(fun, method=method, rtol=rtol))
+                for method, what, fun, rtol in (
+                    ("DOP853", "Python function", python, 1e-10),
+                    ("DOP853", "numba function", compiled, 1e-10),
+                    ("DOP853", "Python function", python, 3e-14),
+                    ("Radau", "Python function", python, 1e-8),
+                )
+            ),
+        ],
+    )
+
+
+def _diffrax() -> tuple[Problem, Array, list[tuple[str, Run]]]:
+    from integrators.plugins.diffrax import HBVM
+
+    import diffrax as dx  # isort: skip -- the plugin says what to install where it is missing
+    import jax
+
+    from problems import emit
+
+    jax.config.update("jax_enable_x64", True)
+    problem = problems.load("pendulum", t_end=PENDULUM)
+    term = dx.ODETerm(emit.jax(problem.system, "field"))
+    par, times = map(jax.numpy.asarray, (problem.par, np.linspace(0.0, problem.t_end, 11)[1:]))
+
+    def run(solver: Any, h: float | None, tolerance: float | None = None) -> Run:
+        controller = dx.ConstantStepSize() if tolerance is None else dx.PIDController(tolerance, tolerance)
+
+        @jax.jit
+        def solve(y0: Any) -> Any:
+            return dx.diffeqsolve(
+                term, solver, problem.t0, problem.t_end, h, y0, args=par, max_steps=100_000,
+                stepsize_controller=controller, saveat=dx.SaveAt(ts=times), adjoint=dx.ForwardMode(),
+            ).ys  # fmt: skip
+
+        return lambda: np.asarray(solve(problem.y0))
+
+    return (
+        problem,
+        np.array([float(x) for x in exact_state(problem, problem.t_end)]),
+        [
+            _native(problem, integrators.HBVM(k=8, s=4, h=0.1)),
+            ("plugin `HBVM(k=8, s=4)`, `dt0=0.1`", run(HBVM(k=8, s=4), 0.1)),
+            ("`Dopri8`, tolerances 1e-10", run(dx.Dopri8(), None, 1e-10)),
+            ("`Dopri8`, `dt0=0.05`", run(dx.Dopri8(), 0.05)),
+            ("`Kvaerno5`, tolerances 1e-8", run(dx.Kvaerno5(), None, 1e-8)),
+        ],
+    )
+
+
+def _rebound() -> tuple[Problem, Array, list[tuple[str, Run]]]:
+    from integrators.plugins.rebound import install, rebound
+
+    def make() -> Any:
+        simulation = rebound.Simulation()
+        simulation.add("outer solar system")
+        simulation.move_to_com()
+        return simulation
+
+    bodies = make().particles
+    masses = np.array([body.m for body in bodies])
+
+    def state(simulation: Any) -> Array:
+        q = np.array([body.xyz for body in simulation.particles]).ravel()
+        v = np.array([body.vxyz for body in simulation.particles]).ravel()
+        return np.concatenate([q, np.repeat(masses, 3) * v])
+
+    def run(prepare: Callable[[Any], None]) -> Run:
+        def go() -> Array:
+            simulation, states = make(), []
+            prepare(simulation)
+            for t in np.linspace(0.0, PLANETS, 11)[1:]:
+                simulation.integrate(t)
+                states.append(state(simulation))
+            return np.array(states)
+
+        return go
+
+    def whfast(h: float) -> Callable[[Any], None]:
+        def prepare(simulation: Any) -> None:
+            simulation.integrator = "whfast"
+            options: Any = simulation.integrator  # not the name, but what holds its options
+            options.corrector, options.kernel, options.safe_mode = 17, "LAZY", 0
+            simulation.dt = h
+
+        return prepare
+
+    def ias15(simulation: Any) -> None:
+        simulation.integrator = "ias15"
+
+    problem = _planets(masses, state(make()))
+    reference = integrators.integrate(problem, integrators.Taylor(high_accuracy=True, compact_mode=True)).y[
+        -1
+    ]
+    step = 8.0
+    ours = [integrators.Gauss(s=8, h=step), integrators.HBVM(k=10, s=8, h=step)]
+    return (
+        problem,
+        reference,
+        [
+            _native(problem, ours[0]),
+            *((f"plugin `{method!r}`", run(lambda sim, m=method: install(sim, m))) for method in ours),
+            ("`ias15`", run(ias15)),
+            *(
+                (f"`whfast`, corrector 17, kernel LAZY, dt = {h:g}", run(whfast(h)))
+                for h in (4.0, 1.0, 0.5, 0.25)
+            ),
+        ],
+    )
+
+
+def _planets(masses: Array, y0: Array) -> Problem:
+    """Return the gravitating bodies that REBOUND has, as a problem; G = 1."""
+    n = len(masses)
+
+    def H(q: Any, p: Any, par: Any, m: Any) -> Any:
+        def kinetic(i: Any) -> Any:
+            return sum(p[3 * i + d] * p[3 * i + d] for d in range(3)) / (2 * par.mass[i])
+
+        def pair(i: Any, j: Any) -> Any:
+            squares = [(q[3 * i + d] - q[3 * j + d]) * (q[3 * i + d] - q[3 * j + d]) for d in range(3)]
+            return par.mass[i] * par.mass[j] / m.sqrt(sum(squares))
+
+        pairs = [(i, j) for i in range(n) for j in range(i + 1, n)]
+        return m.sum(kinetic, range(n)) - m.sum(pair, pairs)
+
+    system = problems.Hamiltonian(H, dof=3 * n, parameters={"mass": masses.tolist()}, name="planets")
+    return Problem(system, q0=y0[: 3 * n], p0=y0[3 * n :], t_end=PLANETS)
+
+
+HOSTS = {"scipy": _scipy, "diffrax": _diffrax, "rebound": _rebound}
+
+
+def leak(span: float, parts: int = 10) -> Iterator[tuple[float, dict[str, float]]]:
+    """Yield times, and the relative energy errors of DOP853 and HBVM there, in equal parts of ``span``.
+
+    The same call of ``solve_ivp`` but for the method: the pendulum, ``rtol=atol=1e-8``.
+    """
+    from scipy.integrate import solve_ivp
+
+    from integrators.plugins.scipy import HBVM
+
+    methods: dict[str, Any] = {"DOP853": "DOP853", "HBVM": HBVM}
+    problem = problems.load("pendulum")
+    states = dict.fromkeys(methods, problem.y0)
+    for i in range(parts):
+        for name, method in methods.items():
+            solution = solve_ivp(
+                lambda t, y: [y[1], -np.sin(y[0])], (i * span / parts, (i + 1) * span / parts), states[name],
+                method=method, rtol=1e-8, atol=1e-8,
+            )  # fmt: skip
+            states[name] = solution.y[:, -1]
+        yield (
+            (i + 1) * span / parts,
+            {name: float(problem.errors(y[None])["energy"][0]) for name, y in states.items()},
+        )
+
+
+__all__ = ["Cost", "leak", "markdown", "measure"]

@@ -1,0 +1,1 @@
+"""The race: which integrator is the fastest at the same accuracy."""

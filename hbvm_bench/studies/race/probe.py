@@ -1,0 +1,135 @@
+"""What a fresh process pays before its first result, with empty and with filled caches.
+
+``python -m hbvm_bench.studies.race.probe PROBLEM METHOD`` integrates a thousandth of the span
+and prints the seconds as JSON; `probe` starts it with caches of its own.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from hbvm_bench.run.worker import ENVIRONMENT
+from hbvm_bench.studies.race.results import Contest, Probe
+from hbvm_bench.studies.race.settings import OURS
+
+TIMES = 3
+SLOW = 5.0  # seconds; what takes longer is measured once
+LIMIT = 180.0  # seconds
+SHARE = 1e-3
+OTHER = "pendulum(t_end=1.0)"  # fills the kernel's cache without the contest's vector field
+
+METHODS: dict[str, Sequence[str]] = {
+    OURS: ("Gauss(s=8, h={h})",),
+    "heyoka": ("Taylor(tol=1e-14)", "Taylor(tol=1e-14, compact_mode=True)"),
+    "ias15": ("IAS15(epsilon=1e-05, mode='global')",),
+    "dop853": ("DOP853(rtol=1e-12, atol=1e-12)",),
+}
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """What the process prints."""
+
+    compile_seconds: float
+    from_cache: bool | None
+    refused: str = ""
+
+
+def probe(contest: Contest, h: float, families: Sequence[str]) -> list[Probe]:
+    """Measure the compile times of a contest.
+
+    Parameters
+    ----------
+    contest : Contest
+        The problem.
+    h : float
+        A step for our method.
+    families : sequence of str
+        Which families; those that compile nothing are left out.
+    """
+    made: list[Probe] = []
+    for family in families:
+        for template in METHODS.get(family, ()):
+            method = template.format(h=h)
+            made += _probes(contest.problem, family, method)
+    return made
+
+
+def _probes(problem: str, family: str, method: str) -> list[Probe]:
+    empty: list[tuple[float, Answer]] = []
+    kernel: list[tuple[float, Answer]] = []
+    full: list[tuple[float, Answer]] = []
+    try:
+        for _ in range(TIMES):
+            with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
+                empty.append(_ask(problem, method, Path(cache)))
+                full.append(_ask(problem, method, Path(cache)))
+            if family == OURS:
+                with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
+                    _ask(OTHER, method, Path(cache))
+                    kernel.append(_ask(problem, method, Path(cache)))
+            if empty[0][0] > SLOW:
+                break
+    except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
+        reason = f"the process that compiles {method} failed: {type(error).__name__}"
+        return [Probe(family=family, method=method, caches="empty", reason=reason)]
+    return [
+        Probe(
+            family=family,
+            method=method,
+            caches=caches,
+            compile_seconds=[answer.compile_seconds for _, answer in answers],
+            process_seconds=[seconds for seconds, _ in answers],
+            from_cache=answers[0][1].from_cache,
+            reason=answers[0][1].refused,
+        )
+        for caches, answers in (("empty", empty), ("kernel", kernel), ("full", full))
+        if answers
+    ]
+
+
+def _ask(problem: str, method: str, cache: Path) -> tuple[float, Answer]:
+    # Every library keeps its compiled code below the user's own directories, so these are moved.
+    homes = {
+        "HOME": str(cache),
+        "XDG_CACHE_HOME": str(cache / "cache"),
+        "HBVM_BENCH_CACHE": str(cache / "kernel"),
+        "NUMBA_CACHE_DIR": str(cache / "numba"),
+    }
+    start = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-m", "hbvm_bench.studies.race.probe", problem, method],
+        env={**os.environ, **ENVIRONMENT, **homes},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        timeout=LIMIT,
+        check=True,
+    )
+    return time.perf_counter() - start, msgspec.json.decode(done.stdout, type=Answer)
+
+
+def main(problem_text: str, method_text: str) -> None:
+    """Reach a first result and say what its compilation took."""
+    import numpy as np
+
+    from hbvm_bench.campaign.identity import make_method, make_problem
+
+    problem, method = make_problem(problem_text), make_method(method_text)
+    if reason := method.accepts(problem):
+        answer = Answer(0.0, None, reason)
+    else:
+        program = method.compile(problem.system)
+        end = problem.t0 + SHARE * (problem.t_end - problem.t0)
+        program.start(problem.y0, problem.par, problem.t0).advance(np.array([end]))
+        answer = Answer(float(program.compile_seconds), program.from_cache)
+    sys.stdout.buffer.write(msgspec.json.encode(answer))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2])

@@ -1,0 +1,253 @@
+"""Two runs of the same cases: what changed beyond noise."""
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from statistics import fmean, median, variance
+
+import msgspec
+
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.measure import machine
+from hbvm_bench.measure.metrics import METRICS, Metric
+from hbvm_bench.store.records import Record, Value
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries.rows import format_value, seconds, status_of
+
+COSTS = ("s", "1/s", "MiB")  # units of what differs from run to run
+# Other sources, versions or machines round otherwise. A truncation error hardly feels that; an error
+# that is all rounding does.
+SAME_TO = 1e-6
+ROUNDING, ROUNDING_FACTOR = 1e-11, 4.0
+# Of times, below which nothing is said: the same sources on the same quiet machine differed by up to
+# 1.14 from run to run where a call takes 0.2 ms.
+SMALLEST_RATIO = 1.2
+DEVIATIONS = 4.0
+LEAST_SHARE = 0.9  # of a core; a sample that had less tells what else was running
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that differs between two runs of a case.
+
+    Attributes
+    ----------
+    problem, method : str
+        The case.
+    what : str
+        A metric's label, ``"outcome"`` or ``"time"``.
+    before, after : str
+        Formatted.
+    """
+
+    problem: str
+    method: str
+    what: str
+    before: str
+    after: str
+
+
+@dataclass
+class Comparison:
+    """What changed from a first run to a second one.
+
+    Attributes
+    ----------
+    cases : int
+        Those that both have.
+    only_first, only_second : list of str
+        Cases that one of them lacks.
+    behind : list of str
+        Versions, sources and machines that differ.
+    equal, rounded : int
+        Metrics that are the same number, and that differ by rounding only.
+    changed : list of Change
+        Outcomes and metrics that differ by more.
+    timed : int
+        Times compared, each divided by the calibration beside it.
+    noise : float or None
+        Ratio of two times that is not told from 1 in a typical case; ``None`` without times.
+    slower, faster : list of Change
+        Times that differ by more than the samples' scatter explains.
+    untimed : list of str
+        Why times were not compared.
+    """
+
+    cases: int = 0
+    only_first: list[str] = field(default_factory=list)
+    only_second: list[str] = field(default_factory=list)
+    behind: list[str] = field(default_factory=list)
+    equal: int = 0
+    rounded: int = 0
+    changed: list[Change] = field(default_factory=list)
+    timed: int = 0
+    noise: float | None = None
+    slower: list[Change] = field(default_factory=list)
+    faster: list[Change] = field(default_factory=list)
+    untimed: list[str] = field(default_factory=list)
+
+    @property
+    def unchanged(self) -> bool:
+        """Whether nothing changed beyond noise and no case is missing."""
+        return not (self.only_first or self.only_second or self.changed or self.slower or self.faster)
+
+
+def compare(first: Store, second: Store) -> Comparison:
+    """Compare two runs case by case.
+
+    A case of one run is that of the other if problem, method and sampling are the
+    same; sources, versions and machines may differ.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a directory holds no run.
+    """
+    one, other = _by_case(first.records()), _by_case(second.records())
+    both = [(record, other[key]) for key, record in one.items() if key in other]
+    found = Comparison(
+        cases=len(both),
+        only_first=[_name(record.case) for key, record in one.items() if key not in other],
+        only_second=[_name(record.case) for key, record in other.items() if key not in one],
+        behind=_behind(both),
+    )
+    for before, after in both:
+        _compare_numbers(before, after, found)
+    _compare_times(both, found)
+    return found
+
+
+def _by_case(records: Sequence[Record]) -> dict[bytes, Record]:
+    plain = {"settings": "chosen", "note": ""}  # words about the case
+    return {msgspec.json.encode(msgspec.structs.replace(record.case, **plain)): record for record in records}
+
+
+def _name(case: Case) -> str:
+    return f"{case.method} on {case.problem}"
+
+
+def _behind(both: Sequence[tuple[Record, Record]]) -> list[str]:
+    found: dict[str, None] = {}
+    for before, after in both:
+        for name in sorted(before.versions.keys() | after.versions.keys()):
+            was, now = before.versions.get(name, "none"), after.versions.get(name, "none")
+            if was != now:
+                found[f"{name} {was} → {now}"] = None
+        if before.versions == after.versions and before.id != after.id:
+            found["the sources of hbvm-bench or of a method"] = None
+        for name, was in before.machine.items():
+            if (now := after.machine.get(name, was)) != was and name not in machine.MEASURED:
+                found[f"{name.replace('_', ' ')} {was} → {now}"] = None
+    return list(found)
+
+
+def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
+    strict = before.id == after.id and machine.same(before.machine, after.machine)
+
+    def differs(what: str, was: str, now: str) -> None:
+        found.changed.append(Change(before.case.problem, before.case.method, what, was, now))
+
+    was, now = (_ending(record) for record in (before, after))
+    if was != now:
+        differs("outcome", was, now)
+    one, other = before.result.metrics, after.result.metrics
+    for key, metric in METRICS.items():
+        if metric.unit in COSTS or not (key in one or key in other):
+            continue
+        a, b = one.get(key, Value()), other.get(key, Value())
+        if a.value == b.value and a.void == b.void:
+            found.equal += 1
+        elif a.value is None or b.value is None or a.void != b.void:
+            differs(metric.label, _shown(metric, a), _shown(metric, b))
+        elif not strict and _is_rounding(metric, a.value, b.value):
+            found.rounded += 1
+        else:
+            differs(metric.label, f"{a.value:.17g}", f"{b.value:.17g}")
+
+
+def _ending(record: Record) -> str:
+    lost = ", on another trajectory" if record.result.violation else ""
+    return status_of(record) + lost
+
+
+def _shown(metric: Metric, value: Value) -> str:
+    text = format_value(metric, value).text
+    return f"({text}), {value.why}" if value.void else text if value.value is not None else value.why or text
+
+
+def _is_rounding(metric: Metric, a: float, b: float) -> bool:
+    if abs(a - b) <= SAME_TO * max(abs(a), abs(b)):
+        return True
+    if metric.scale != "log" or metric.better != "lower":
+        return False
+    small, large = sorted((abs(a), abs(b)))
+    return large <= ROUNDING and large <= ROUNDING_FACTOR * max(small, sys.float_info.epsilon)
+
+
+def _compare_times(both: Sequence[tuple[Record, Record]], found: Comparison) -> None:
+    pairs: list[tuple[Record, Record, list[float], list[float]]] = []
+    for before, after in both:
+        why = next(_untimed((before, after)), "")
+        if why:
+            found.untimed.append(f"{_name(before.case)}: {why}")
+        elif before.timing and after.timing:
+            pairs.append((before, after, _logarithms(before), _logarithms(after)))
+    found.timed = len(pairs)
+    if not pairs:
+        return
+    common = _typical_variance([logs for *_, one, other in pairs for logs in (one, other)])
+    found.noise = math.exp(
+        median(max(math.log(SMALLEST_RATIO), _doubt(one, other, common)) for *_, one, other in pairs)
+    )
+    for before, after, one, other in pairs:
+        shift = fmean(other) - fmean(one)
+        if abs(shift) <= max(math.log(SMALLEST_RATIO), _doubt(one, other, common)):
+            continue
+        was, now = (seconds(record.timing.summary["median"]) for record in (before, after) if record.timing)
+        change = Change(
+            before.case.problem,
+            before.case.method,
+            "time",
+            was,
+            f"{now}, {math.exp(shift):.2f} times as long",
+        )
+        (found.slower if shift > 0 else found.faster).append(change)
+
+
+def _untimed(records: Sequence[Record]) -> Iterator[str]:
+    for record in records:
+        timing = record.timing
+        if timing is None or not timing.rounds:
+            if timing is not None and timing.why:
+                yield timing.why
+            elif any(other.timing and other.timing.rounds for other in records):
+                yield "timed in one run only"
+        elif not all(one.calibration for one in timing.rounds):
+            yield "taken without the calibration"
+        elif timing.share < LEAST_SHARE:
+            yield f"a round had only {timing.share:.0%} of a core"
+
+
+def _logarithms(record: Record) -> list[float]:
+    """Return the logarithm of each round's median time in units of the calibration."""
+    assert record.timing is not None
+    return [math.log(median(one.calibrated)) for one in record.timing.rounds]
+
+
+def _typical_variance(groups: Sequence[Sequence[float]]) -> float:
+    """Return the variance between rounds of a typical case: the median, for outliers stay outliers.
+
+    The median of a sample variance of n normal numbers is below their variance by the
+    factor (1 - 2/9(n - 1))^3, Wilson and Hilferty's approximation.
+    """
+    scaled = [variance(group) / (1 - 2 / (9 * (len(group) - 1))) ** 3 for group in groups if len(group) > 1]
+    return median(scaled) if scaled else 0.0
+
+
+def _doubt(one: Sequence[float], other: Sequence[float], common: float) -> float:
+    total = 0.0
+    for group in (one, other):
+        own = variance(group) if len(group) > 1 else 0.0
+        total += max(own, common) / len(group)
+    return DEVIATIONS * math.sqrt(total)

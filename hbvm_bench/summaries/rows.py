@@ -1,0 +1,197 @@
+"""The results as rows: grouped, sorted, formatted; what the terminal and the reports print."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hbvm_bench.campaign.entries import Ensemble
+from hbvm_bench.measure.metrics import METRICS, Metric, find
+from hbvm_bench.store.records import Record, Value
+
+# In this order a reader needs them; position and its error stand beside the energy, always.
+HEADLINE = (
+    "energy_max",
+    "angular_momentum_max",
+    "guard_max",
+    "position_end",
+    "phase_end",
+    "z_end",
+    "z_error",
+    "steps",
+    "evaluations",
+    "warm_seconds",
+    "throughput",
+    "compile_seconds",
+)
+RANKED_BY = "position_end"
+
+GROUPS = {
+    "on": "On the trajectory that was asked for",
+    "off": "On another trajectory: the symmetry was lost; position and time are void",
+    "ended": "Did not reach the end",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One metric of one case, formatted.
+
+    Attributes
+    ----------
+    text : str
+        The number, or a dash.
+    void : bool
+        Whether the number must not be compared.
+    why : str
+        Why it is void or missing.
+    sort : float
+        For sorting; infinite where there is no number.
+    """
+
+    text: str
+    void: bool
+    why: str
+    sort: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One case.
+
+    Attributes
+    ----------
+    record : Record
+        As stored.
+    group : str
+        Key of `GROUPS`.
+    cells : dict of Cell
+        By metric key.
+    remark : str
+        What went otherwise than asked, and the campaign's note.
+    """
+
+    record: Record
+    group: str
+    cells: dict[str, Cell]
+    remark: str
+
+
+def columns(records: Sequence[Record], keys: Sequence[str] | None = None) -> list[Metric]:
+    """Return the metrics to show: those asked for, or the headline ones that any case has a value of."""
+    if keys:
+        return [find(key) for key in keys]
+    metrics = [item for record in records for item in record.result.metrics.items()]
+    present = {key for key, value in metrics if value.value is not None}
+    return [METRICS[key] for key in HEADLINE if key in present or not present]
+
+
+def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
+    """Return the rows, group by group.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Of one problem, in the order of the campaign.
+    sort : str, optional
+        Metric to sort by within the groups. Default: the position error; without
+        a reference the order of the campaign stays, for energy alone ranks nobody.
+    """
+    key = find(sort).key if sort else RANKED_BY
+    made = [_row(record) for record in records]
+    order = list(GROUPS)
+    # sorting is stable: what has no number keeps the campaign's order
+    return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
+
+
+def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[Record]]:
+    """Return the records of each table: one trajectory of a problem, or an ensemble, in order."""
+    made: dict[tuple[str, Ensemble | None], list[Record]] = {}
+    for record in records:
+        made.setdefault((record.case.problem, record.case.ensemble), []).append(record)
+    return made
+
+
+def at_once(ensemble: Ensemble | None) -> str:
+    """Return what follows a problem's name where it is an ensemble, else ``""``."""
+    return f", {ensemble.count} trajectories at once" if ensemble else ""
+
+
+def title_of(group: str, found: Sequence[Row]) -> str:
+    """Return the title of a group, with what it is sorted by where any of its rows has that."""
+    ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in found)
+    return GROUPS[group] + (", by position error at the end" if ranked else "")
+
+
+def numbers(records: Sequence[Record]) -> dict[str, int]:
+    """Return the number of every case by its id: that of its method, from 1 in the campaign's order."""
+    methods: dict[str, int] = {}
+    return {record.id: methods.setdefault(record.case.method, len(methods) + 1) for record in records}
+
+
+def group_of(record: Record) -> str:
+    """Return the key in `GROUPS` of a case."""
+    result = record.result
+    if result.outcome != "ok" or result.status != "finished":
+        return "ended"
+    return "off" if result.violation else "on"
+
+
+def status_of(record: Record) -> str:
+    """Say in a few words how a case ended: ``"ok"``, ``"stalled at t = 8.534"``, ..."""
+    result = record.result
+    if result.outcome == "ok":
+        if result.status == "finished":
+            return "ok"
+        words = result.status.replace("_", " ")
+    else:
+        words = result.outcome
+    return words if result.t_stop is None else f"{words} at t = {result.t_stop:.4g}"
+
+
+def format_value(metric: Metric, value: Value) -> Cell:
+    """Format one metric."""
+    if value.value is None:
+        return Cell("–", False, value.why, math.inf)
+    number = value.value
+    if metric.unit == "s":
+        text = seconds(number)
+    elif metric.key in ("steps", "evaluations", "throughput"):
+        text = f"{int(number):,}".replace(",", "\u202f")
+    elif metric.scale == "linear":
+        text = f"{number:.6f}" if 1e-3 < abs(number) < 10 else f"{number:.4g}"
+    else:
+        text = "0" if number == 0 else f"{number:.1e}"
+    return Cell(text, value.void, value.why, math.inf if value.void else number)
+
+
+def seconds(number: float) -> str:
+    """Format seconds with three digits and their unit."""
+    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
+        if number * factor >= 1 or unit == "µs":
+            return f"{number * factor:.3g} {unit}"
+    raise AssertionError
+
+
+def _sort_value(row: Row, key: str) -> float:
+    return row.cells[key].sort if key in row.cells else math.inf
+
+
+def _row(record: Record) -> Row:
+    metrics = record.result.metrics
+    cells = {key: format_value(METRICS[key], value) for key, value in metrics.items() if key in METRICS}
+    return Row(record, group_of(record), cells, _remark(record))
+
+
+def _remark(record: Record) -> str:
+    result = record.result
+    parts: list[str] = []
+    if result.outcome != "ok" or result.status != "finished":
+        head = status_of(record)
+        parts.append(f"{head}: {result.reason}" if result.reason else head)
+    elif result.violation:
+        parts.append(result.violation)
+    elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
+        parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
+    if record.case.note:
+        parts.append(record.case.note)
+    return "; ".join(part.rstrip(". ") for part in parts)

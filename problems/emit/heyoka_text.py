@@ -1,0 +1,33 @@
+"""Emission to heyoka: expressions of its own symbols, all sums written out."""
+
+from collections.abc import Callable
+
+from problems.emit.plan import Plan
+from problems.emit.printer import Printer
+from problems.trace.graph import FUNCTIONS, Affine, Node
+
+_FUNCTIONS = {name: f"hy.{name}" for name in FUNCTIONS} | {
+    "abs": "(hy.relu({0}) + hy.relu(-({0})))",
+    "sign": "(hy.relup({0}) - hy.relup(-({0})))",
+}
+
+
+class _HeyokaPrinter(Printer):
+    def let(self, node: Node, index: Callable[[Affine], str] | None = None) -> None:
+        if node.op == "symbol":  # an expression by itself: no variable is needed to hold it
+            space, place = node.data
+            self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
+        else:
+            super().let(node, index)
+
+    def store(self, place: int, value: str) -> None:
+        self.line(f"out[{place}] = {value}")
+
+
+def heyoka_text(plan: Plan, name: str) -> str:
+    """Return ``def name(t, y, par, hy)``, which returns the list of expressions."""
+    printer = _HeyokaPrinter(plan, _FUNCTIONS)
+    printer.line(f"out = [None]*{plan.n_out}")
+    printer.statements(plan.first)
+    printer.line("return out")
+    return printer.finished(f"{name}(t, y, par, hy)")

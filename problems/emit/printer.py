@@ -1,0 +1,119 @@
+"""A plan as Python text: what all targets have in common."""
+
+from collections.abc import Callable, Sequence
+
+from problems.emit.plan import Let, Plan, Reduce, Store
+from problems.trace.graph import Affine, Loop, Node
+
+_SUM, _PRODUCT, _LEAF = 1, 2, 3
+_OPERATORS = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}
+_LONGEST = 72
+_PREFIX = {"y": "y", "par": "c", "out": "a"}  # of the variables that hold inputs and outputs
+
+
+class Printer:
+    """Prints a plan's statements; a value used once is printed where it is used.
+
+    Parameters
+    ----------
+    plan : Plan
+        What to print.
+    functions : dict
+        Name of each function in the target, or a template with ``{}``.
+    """
+
+    def __init__(self, plan: Plan, functions: dict[str, str]) -> None:
+        self.plan = plan
+        self.names: dict[int, str] = {}
+        self.lines: list[str] = []
+        self.indent = "    "
+        self._functions = functions
+        self._pending: dict[int, tuple[str, int]] = {}
+        self._count = 0
+        self._tables: dict[str, str] = {}
+
+    # What a target does in its own way.
+    def store(self, place: int, value: str) -> None:
+        """Print that an output is complete."""
+        raise NotImplementedError
+
+    def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
+        """Print a declared sum."""
+        raise NotImplementedError
+
+    def statements(self, statements: Sequence[Let | Reduce | Store]) -> None:
+        """Print statements in order."""
+        for statement in statements:
+            match statement:
+                case Let(node):
+                    self.let(node)
+                case Store(place, node):
+                    self.store(place, self.text(node))
+                case Reduce(node, loop, body):
+                    self.reduce(node, loop, body)
+
+    def finished(self, signature: str) -> str:
+        """Return the function that the lines make, preceded by its tables if it has any."""
+        head = "".join(f"{name} = {text}\n" for text, name in self._tables.items())
+        return head + f"def {signature}:\n" + "\n".join(self.lines) + "\n"
+
+    def table(self, text: str) -> str:
+        """Return the name of a table of numbers, one for each text."""
+        return self._tables.setdefault(text, f"TABLE_{len(self._tables)}")
+
+    def line(self, text: str) -> None:
+        """Add a line."""
+        self.lines.append(self.indent + text)
+
+    def assign(self, node: Node, text: str, name: str = "") -> None:
+        """Add the line ``name = text`` and remember the name."""
+        if not name:
+            name = f"v{self._count}"
+            self._count += 1
+        self.names[node.id] = name
+        self.line(f"{name} = {text}")
+
+    def let(self, node: Node, index: Callable[[Affine], str] | None = None) -> None:
+        """Read an input, compute a value, or keep its text for the one place that uses it.
+
+        ``index`` returns the text of a place that differs from term to term of a loop.
+        """
+        if node.op == "symbol":
+            space, place = node.data
+            if space == "t":
+                self.names[node.id] = "t"
+            elif isinstance(place, int):
+                self.assign(node, f"{space}[{place}]", f"{_PREFIX[space]}{place}")
+            else:
+                assert index is not None
+                self.assign(node, f"{space}[{index(place)}]")
+        elif node.op != "const":
+            text, level = self._operation(node)
+            if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
+                self._pending[node.id] = (text, level)
+            else:
+                self.assign(node, text)
+
+    def waiting(self, node: Node) -> bool:
+        """Whether a value's text waits for the one place that uses it."""
+        return node.id in self._pending
+
+    def text(self, node: Node, level: int = _SUM) -> str:
+        """Return the text of a value, in parentheses if it binds less tightly than ``level``."""
+        if node.op == "const":
+            return repr(node.data) if repr(node.data)[0] != "-" else f"({node.data!r})"
+        if node.id in self.names:
+            return self.names[node.id]
+        text, binding = self._pending.pop(node.id)
+        return text if binding >= level else f"({text})"
+
+    def _operation(self, node: Node) -> tuple[str, int]:
+        if node.op in _OPERATORS:
+            symbol, level = _OPERATORS[node.op]
+            left = self.text(node.args[0], level)
+            return left + symbol + self.text(node.args[1], level + 1), level
+        if node.op == "neg":
+            return "-" + self.text(node.args[0], _LEAF), _SUM
+        name = self._functions[node.op]
+        text = self.text(node.args[0])
+        return (name.format(text) if "{" in name else f"{name}({text})"), _LEAF

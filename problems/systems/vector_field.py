@@ -1,0 +1,62 @@
+"""First-order systems, from their right-hand side written once in ordinary Python arithmetic."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from problems.calculus.function import function_of
+from problems.calls import checked
+from problems.errors import InputError
+from problems.systems.base import System, Value, check_count, name_of
+from problems.trace import arguments
+from problems.trace.source_line import line_of_function
+
+
+class VectorField(System):
+    """Any first-order system y' = f(t, y).
+
+    Parameters
+    ----------
+    f : callable
+        Returns the list of derivatives; names the arguments it needs among ``t, y, par, m``.
+    dim : int
+        Length of the state.
+    parameters, invariants, guards, name
+        As for `Hamiltonian`; there is no energy unless it is given as an invariant.
+    """
+
+    kind = "vector_field"
+
+    @checked
+    def __init__(
+        self,
+        f: Callable[..., Any],
+        *,
+        dim: int,
+        parameters: Mapping[str, Value] = MappingProxyType({}),
+        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        name: str | None = None,
+    ) -> None:
+        dim = check_count("dim", dim)
+        super().__init__(
+            dim=dim,
+            dof=None,
+            parameters=parameters,
+            invariants=invariants,
+            guards=guards,
+            name=name or name_of(f),
+        )
+        value = self._call(f, "f")
+        if not arguments.is_list(value) or len(value) != dim:
+            got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"
+            raise InputError(
+                f"{line_of_function(f)}: f returns {got}, not a list of dim={dim}; "
+                "return one derivative for each component of y."
+            )
+        nodes = [self._node(v, f, f"f's component {i}") for i, v in enumerate(value)]
+        self._functions["field"] = function_of(self._graph, nodes)
+        self._trace_declared(invariants, guards)
+
+    def __repr__(self) -> str:
+        return f"VectorField({self.name}, dim={self.dim})"

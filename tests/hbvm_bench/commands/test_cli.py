@@ -1,0 +1,200 @@
+"""Every way to misuse the command line: one sentence, exit code 2, nothing half-written."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hbvm_bench import cli
+from hbvm_bench.measure.metrics import METRICS
+from tests.hbvm_bench.conftest import SHORT
+
+COMMAND = [sys.executable, "-m", "hbvm_bench.cli"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def fails(capsys, *arguments, says):
+    assert cli.main(list(arguments)) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("hbvm-bench: ")
+    assert printed.err.count("\n") == 1
+    for words in says if isinstance(says, tuple) else (says,):
+        assert words in printed.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["run"], "-p"),
+        (["run", "sitnikof"], ("sitnikof", "did you mean 'sitnikov'")),
+        (["run", "missing.toml"], "missing.toml"),
+        (["run", "sitnikov", "-m", "IAS15()"], "not both"),
+        (["run", "-p", "sitnikov()"], "-m"),
+        (["run", "-m", "IAS15()"], "-p"),
+        (["run", "-p", "sitnikof()", "-m", "IAS15()"], "did you mean 'sitnikov'"),
+        (["run", "-p", "sitnikov(ee=0.6)", "-m", "IAS15()"], ("'ee'", "did you mean 'e'")),
+        (["run", "-p", "sitnikov(e=1.5)", "-m", "IAS15()"], "1.5"),
+        (["run", "-p", "sitnikov(z3=1e999)", "-m", "IAS15()"], "too large"),
+        (["run", "-p", "sitnikov(", "-m", "IAS15()"], "column"),
+        (["run", "-p", "sitnikov()", "-m", "IAS51()"], "did you mean 'IAS15'"),
+        (["run", "-p", "sitnikov()", "-m", "IAS15(epsilom=1)"], "did you mean 'epsilon'"),
+        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=3, h=0.1)"], "k"),
+        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=0, h=0.1)"], "s"),
+        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=2, h=0)"], "h"),
+        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=2, h=-0.1)"], "-0.1"),
+        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2)"], "needs"),
+        (["run", "-p", "sitnikov()", "-m", "IAS15()", "-m", "IAS15"], "twice"),
+        (["run", "-p", "sitnikov()", "-m", "IAS15()", "--step", "-1"], "--step"),
+        (["run", "-p", "sitnikov()", "-m", "IAS15()", "--step", "nan"], "--step"),
+        (["run", "sitnikov", "--jobs", "0"], "jobs"),
+        (["run", "sitnikov", "--job", "1"], "--job"),
+        (["run", "sitnikov", "extra"], "extra"),
+        (["rum"], "rum"),
+        (["list", "metods"], "did you mean 'methods'"),
+        (["report", "nowhere"], ("nowhere", "does not exist")),
+        (["report", "."], "has no results"),
+        (["show", "nowhere"], "does not exist"),
+        (["show", "."], "has no results"),
+        (["show", ".", "--metric", "energi"], "did you mean 'energy"),
+        (["show", ".", "--sort", "stepz"], "did you mean 'steps'"),
+        (["cite", "IAS51"], "did you mean 'IAS15'"),
+        (["reference", "sitnikof()"], "did you mean 'sitnikov'"),
+        (["run", "sitnikov", "--out", "file/below"], "file/below"),
+        (["run", "sitnikov", "--report", "file/below"], "file/below"),
+        (["run", "sitnikov", "--out", "/proc/nothing"], "/proc/nothing"),
+    ],
+)
+def test_a_mistake_is_one_sentence_and_exit_code_2(here, capsys, arguments, says):
+    (here / "file").write_text("x")
+    fails(capsys, *arguments, says=says)
+    left = [path for path in here.rglob("*") if path.is_file()]
+    assert left == [here / "file"]
+
+
+def test_a_directory_of_files_that_are_no_run_is_refused(here, capsys):
+    (here / "campaign.json").write_text("{}")
+    fails(capsys, "show", ".", says="not the index of a run")
+
+
+def test_help_version_and_lists(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("hbvm-bench 0.")
+    assert cli.main(["list"]) == 0
+    out = capsys.readouterr().out
+    assert all(name in out for name in ("sitnikov(", "HBVM(k=None, s=None, h=None, tol=None", *METRICS))
+    assert cli.main(["run", "--help"]) == 0
+    assert "--report" in capsys.readouterr().out
+
+
+def test_citations_are_printed_once(capsys):
+    assert cli.main(["cite", "HBVM(k=4, s=2, h=1)", "HBVM", "IAS15"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("BrugnanoIavernaro2016") == 1
+    assert "IAS15" in out
+
+
+def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
+    arguments = ["run", "-p", SHORT, "-m", "Steady()", "-m", "Raising()", "--out", "r"]
+    assert cli.main([*arguments, "--report", "rep"]) == 0
+    first = capsys.readouterr()
+    assert "Steady()" in first.out
+    assert "something <b>broke</b>" in first.out
+    assert "measuring on this machine: 2 to do" in first.err
+    assert {path.name for path in (here / "rep").iterdir()} == {"report.md", "index.html", "figures", "data"}
+    records = {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()}
+    assert cli.main(arguments) == 0
+    assert "2 already there" in capsys.readouterr().err
+    assert {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()} == records
+
+    assert cli.main(["show", "r", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(name))
+    assert [case["outcome"] for case in shown["cases"]] == ["ok", "crashed"]
+    steady = shown["cases"][0]
+    assert steady["timing"]["median"] > 0
+    assert len(steady["timing"]["rounds"]) == 3
+    assert steady["metrics"]["warm_seconds"]["value"] == steady["timing"]["median"]
+    assert set(steady["metrics"]) <= set(shown["metrics"])
+
+    assert cli.main(["show", "r", "--metric", "steps", "--sort", "steps"]) == 0
+    out = capsys.readouterr().out
+    assert "steps" in out
+    assert "energy" not in out.splitlines()[2]
+    assert cli.main(["report", "r"]) == 0
+    assert (here / "r" / "report" / "index.html").is_file()
+
+
+def test_a_report_of_a_run_without_a_finished_case_says_so(toys, here, capsys):
+    assert cli.main(["run", "-p", SHORT, "-m", "Refusing()", "--out", "r"]) == 0
+    for path in (here / "r" / "cases").iterdir():
+        path.unlink()
+    capsys.readouterr()
+    fails(capsys, "report", "r", "-o", "rep", says=("has finished", "run the campaign 'custom' again"))
+    fails(capsys, "show", "r", says="no finished case")
+
+
+def test_a_campaign_file_runs(toys, here, capsys):
+    head = f'name = "x"\nproblems = ["{SHORT}"]\ngrid = {{count = 2}}\n'
+    (here / "x.toml").write_text(head + '[[methods]]\nuse = "Steady()"\nnote = "<i>"\n')
+    assert cli.main(["run", "x.toml", "--no-timing"]) == 0
+    assert (here / "runs" / "x" / "campaign.json").is_file()
+    out = capsys.readouterr().out
+    assert "not timed" not in out
+    assert "<i>" in out
+
+
+def test_ctrl_c_keeps_what_is_finished_and_a_rerun_goes_on(toys, here):
+    arguments = [
+        "run",
+        "-p",
+        SHORT,
+        "-m",
+        "Steady()",
+        "-m",
+        "Steady(wait=20.0)",
+        "--no-timing",
+        "--jobs",
+        "1",
+    ]
+    running = subprocess.Popen(
+        [*COMMAND, *arguments], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    cases = here / "runs" / "custom" / "cases"
+    deadline = time.monotonic() + 30
+    while not list(cases.glob("*.json")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    children = Path(f"/proc/{running.pid}/task")
+    workers = {int(pid) for task in children.iterdir() for pid in (task / "children").read_text().split()}
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=20)
+    assert running.returncode == 130
+    assert "interrupted: 1 of 2 cases are kept in runs/custom" in err
+    assert "Traceback" not in err
+    assert workers
+    assert not any(Path(f"/proc/{pid}").exists() for pid in workers)
+    kept = {path.name: path.stat().st_mtime_ns for path in cases.iterdir()}
+
+    again = [argument.replace("wait=20.0", "wait=20.0, h=0.2") for argument in arguments]
+    again = [argument.replace("wait=20.0", "wait=0.1") for argument in again]
+    done = subprocess.run([*COMMAND, *again], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert "1 already there" in done.stderr
+    assert kept.items() <= {path.name: path.stat().st_mtime_ns for path in cases.iterdir()}.items()
+
+
+def test_output_into_a_closed_pipe_is_no_error():
+    shell = f"{sys.executable} -m hbvm_bench.cli list | true; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, env=os.environ, check=False)
+    assert done.stdout.strip() == "0"
+    assert "Traceback" not in done.stderr

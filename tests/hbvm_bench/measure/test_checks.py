@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+import problems
+from hbvm_bench.campaign.file import Checks, Ensemble, TimingPlan
+from hbvm_bench.campaign.grid import Grid
+from hbvm_bench.measure import ensemble, laws
+from hbvm_bench.measure.checks import check
+from hbvm_bench.measure.measured import measure
+from hbvm_bench.measure.metrics import evaluate
+from hbvm_bench.measure.solve import solve
+from hbvm_bench.measure.starts import PERTURBATION, cloud, scaled
+from hbvm_bench.reference.solutions import find
+from integrators import Gauss, Leapfrog
+from integrators.protocol import Status
+
+
+def measured_with(problem, method, checks, grid=None):
+    program = method.compile(problem.system)
+    times = (grid or Grid(count=200, spacing="log")).times(problem)
+    measured = measure(solve(problem, method, program, times), find(problem))
+    return measured, check(measured, method, program, checks)
+
+
+def test_scaled_starts_keep_a_symmetric_start_symmetric():
+    problem = problems.load("sitnikov")
+    starts = scaled(problem, 5)
+    assert np.array_equal(starts[0], problem.y0)
+    assert len({row.tobytes() for row in starts}) == 5
+    assert np.max(np.abs(starts / np.where(problem.y0 == 0, 1, problem.y0) - (problem.y0 != 0))) <= (
+        1.0001 * PERTURBATION
+    )
+    assert np.array_equal(starts[:, 0:2], -starts[:, 3:5])  # the primaries opposite to each other
+    assert not starts[:, 6:8].any()  # the planetoid on the axis
+
+
+def test_a_cloud_begins_with_the_problem_and_fills_its_box():
+    problem = problems.load("henon_heiles", q1=0.1)
+    starts = cloud(problem, 4000, 0.01)
+    assert np.array_equal(starts[0], problem.y0)
+    x = (starts / problem.y0 - 1) / 0.01
+    assert np.abs(x).max() <= 1 + 1e-12
+    counts, _ = np.histogramdd(x, bins=(2, 2, 2, 2), range=[(-1, 1)] * 4)
+    assert counts.min() > 200  # 250 each on average, 236 measured at least
+
+
+def test_the_law_of_a_symplectic_method_is_a_bound_and_its_phase_drifts():
+    problem = problems.load("pendulum", t_end=500.0)
+    measured, checked = measured_with(problem, Leapfrog(h=0.1, order=4), Checks(starts=3, reversal=0.2))
+    law = checked.laws["energy"]
+    assert law.law == "bounded"
+    assert law.starts == 3
+    assert checked.errors["energy"].shape == (3, checked.t.size)
+    assert (checked.errors["energy"] < 0).any() != (checked.errors["energy"] > 0).all()
+    assert checked.reversal < 1e-10  # 6.6e-13 measured
+    metrics = evaluate(measured)
+    assert 1e-6 < metrics["phase_max"].value < 1e-2  # 1.9e-3 measured
+
+
+def test_the_phase_error_is_the_time_by_which_a_run_is_ahead():
+    problem = problems.load("kepler")
+    known = find(problem)
+    program = Gauss(s=8, h=0.05).compile(problem.system)
+    solution = solve(problem, Gauss(s=8, h=0.05), program, known.t)
+    shifted = program.start(problem.y0).advance(np.append(known.t[1:] + 1e-5, problem.t_end + 1.0)).y[:-1]
+    solution.y[1:] = shifted
+    measured = measure(solution, known)
+    # 1e-5 is the shift; within 9.2e-13 of it measured
+    assert np.abs(measured.phase[1:] - 1e-5).max() < 1e-10
+
+
+def test_a_run_that_fails_has_no_law_and_says_why():
+    problem = problems.load("henon_heiles", energy=2.0, t_end=200.0)  # escapes
+    measured, checked = measured_with(problem, Gauss(s=2, h=0.5), Checks(starts=3))
+    assert not measured.complete
+    assert checked.laws["energy"].law is None
+    assert "ends at t = " in checked.laws["energy"].why
+
+
+def test_a_law_is_plain_numbers_and_draws_its_curve():
+    t = np.geomspace(1.0, 1e4, 300)
+    rng = np.random.default_rng(3)
+    rows = np.cumsum(rng.normal(size=(6, t.size)) * np.sqrt(np.diff(t, prepend=0.0)), axis=1)
+    law = laws.find(t, 1e-16 * rows, signed=True)
+    assert law.law == "square root"
+    assert law.slope_low < 0.5 < law.slope_high
+    assert laws.curve(law, np.array([1e4]))[0] == pytest.approx(1e-16 * 100.0, rel=1.0)
+    assert laws.find(t, np.full((1, t.size), np.nan), signed=True).law is None
+
+
+def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
+    pytest.importorskip("heyoka")
+    problem = problems.load("henon_heiles", energy=0.1, t_end=20.0)
+    asked = Ensemble(count=9, spread=0.01)
+    program = Gauss(s=8, h=0.5).compile(problem.system)
+    measured, status, reason = ensemble.measure(problem, program, asked)
+    assert status is Status.FINISHED
+    assert reason == ""
+    assert measured.y.shape == (9, 4)
+    metrics = evaluate(measured)
+    assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
+    assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
+    assert metrics["throughput"].why == "not timed"
+    timed = ensemble.time_round(problem, Gauss(s=8, h=0.5), asked, TimingPlan(samples=2, budget=1))
+    assert len(timed.samples) == 2
+    # a method without a batch path takes one after the other, to the same end
+    other, _, _ = ensemble.measure(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)
+    assert np.abs(other.y - measured.y).max() < 1e-12  # 1.2e-14 measured

@@ -1,0 +1,202 @@
+"""What kind of processor times belong to, and our code restricted to another kind."""
+
+import os
+import re
+import subprocess
+import sys
+
+import msgspec
+import pytest
+
+from hbvm_bench.cli import main
+from hbvm_bench.measure import machine, processor
+from hbvm_bench.run import timing_pass
+from hbvm_bench.store.records import Timing
+from hbvm_bench.studies.automatic import runs
+from hbvm_bench.studies.automatic.runs import Duel, Result, Side
+from hbvm_bench.studies.race import report, results, tables
+from hbvm_bench.studies.race.contests import CONTESTS
+from problems.errors import InputError
+from tests.hbvm_bench.studies.race.conftest import made_up
+
+OLD = {"processor": "AMD EPYC", "cores": 2, "vector_instructions": "AVX-512"}
+ZEN5 = OLD | {"llvm_processor": "znver5"}
+ZEN4 = ZEN5 | {
+    "llvm_processor": "znver4",
+    "family": "AMD family 25, model 17",
+    "vector_bits": 256,
+    "clock_ghz": "3.7",
+}
+
+
+def test_this_machine_has_a_kind_with_measured_width_and_clock():
+    here = machine.describe(measure=True)
+    assert here["vector_bits"] in (64, 128, 256, 512)
+    assert 0.5 < float(here["clock_ghz"]) < 10.0
+    said = machine.sentence(here)
+    for part in ("LLVM: ", "family", "bits wide", "GHz", str(here["llvm_processor"])):
+        assert part in said
+
+
+@pytest.mark.parametrize(("times", "bits"), [((2.0, 1.0), 0.5), ((1.0, 1.0), 1.0)])
+def test_an_instruction_that_takes_two_of_half_the_width_is_not_taken_whole(times, bits, monkeypatch):
+    wide, narrow = times
+    taken = iter([wide, narrow, 1e-3] * processor.ROUNDS)
+    monkeypatch.setattr(processor, "_time", lambda function: next(taken))
+    processor.measured.cache_clear()
+    try:
+        assert processor.measured()["vector_bits"] == bits * processor._widest()
+    finally:
+        processor.measured.cache_clear()
+
+
+def test_what_was_not_recorded_is_said_and_not_guessed():
+    assert "width of the arithmetic not recorded" in machine.sentence(ZEN5)
+    assert "znver5" in machine.sentence(ZEN5)
+    assert "arithmetic 256 bits wide, 3.7 GHz." in machine.sentence(ZEN4)
+    restricted = machine.sentence(ZEN4 | {"ours_built_for": "AVX2"})
+    assert "handed to REBOUND and SciPy, was restricted to AVX2, the peers' own code was not" in restricted
+    assert "not recorded" in machine.sentence({})
+
+
+def test_a_machine_is_itself_whatever_its_clock_says_today_and_what_older_results_lack():
+    assert machine.same(ZEN4, ZEN4 | {"clock_ghz": "2.6", "vector_bits": 512})
+    assert machine.same(OLD, ZEN4)
+    assert not machine.same(ZEN5, ZEN4)
+    assert not machine.same(ZEN4, ZEN4 | {"ours_built_for": "AVX2"})
+
+
+def test_the_timing_pass_goes_on_where_only_the_clock_differs():
+    class Kept:
+        timing = Timing(machine=ZEN4)
+
+    assert timing_pass._timing_of(Kept, ZEN4 | {"clock_ghz": "2.6"}) == Kept.timing
+    assert timing_pass._timing_of(Kept, ZEN5) == Timing(machine=ZEN5)
+
+
+RESTRICTED = """
+from hbvm_bench.measure import machine
+import problems
+from integrators.kernel.native import binary
+from integrators.kernel.native.field import assembly
+print(machine.describe().get("ours_built_for"))
+print(machine.kind(machine.describe()))
+print(assembly(problems.load("pendulum").system, "field", 8).count("zmm"))
+print(binary.platform())
+"""
+
+
+def test_restricted_to_avx2_our_code_has_no_wide_registers_and_another_cache_key(tmp_path):
+    if machine.describe()["vector_instructions"] != "AVX-512":
+        pytest.skip("a processor without AVX-512 has nothing to be restricted")
+    found = {}
+    for name, more in {"avx2": machine.restricted_to_avx2(), "all": {}}.items():
+        environment = os.environ | {"HBVM_BENCH_CACHE": str(tmp_path)} | more
+        ran = subprocess.run(
+            [sys.executable, "-c", RESTRICTED], env=environment, capture_output=True, text=True, check=True
+        )
+        found[name] = ran.stdout.splitlines()
+    built, kind, wide, *key = found["avx2"]
+    assert (built, wide) == ("AVX2", "0")
+    assert kind.endswith("-avx2")
+    _, _, others, *other = found["all"]
+    assert int(others) > 0
+    assert key != other
+
+
+def test_a_processor_without_avx2_is_refused(monkeypatch, capsys):
+    import llvmlite.binding as llvm
+
+    monkeypatch.setattr(llvm, "get_host_cpu_features", dict)
+    with pytest.raises(InputError, match="has no AVX2; leave --avx2 out"):
+        machine.restricted_to_avx2()
+    assert main(["race", "--quick", "--avx2"]) == 2
+    assert "--avx2" in capsys.readouterr().err
+    assert main(["automatic", "--general", "--avx2"]) == 2
+
+
+def of(kind, ratio=2.0, problem="kepler"):
+    ours = Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
+    theirs = Side("Taylor(tol=1e-15)", 2e-15, 2e-12, 90, [ratio, 1.1 * ratio])
+    return Result(
+        duels=[Duel(problem, 2.0, ours, theirs)],
+        machine=kind,
+        versions={"numpy": "2"},
+        command="hbvm-bench automatic",
+        started="2026-01-02T03:04:05+00:00",
+    )
+
+
+def test_results_of_several_kinds_lie_side_by_side(tmp_path):
+    runs.keep(of(ZEN4), tmp_path)
+    runs.keep(of(ZEN5, 3.0), tmp_path)
+    page = runs.keep(of(ZEN4, 1.5, "henon_heiles"), tmp_path).read_text(encoding="utf-8")
+    assert {path.name for path in tmp_path.iterdir()} == {"README.md", "znver4-256bit.json", "znver5.json"}
+    assert "| problem | against | goal | znver4-256bit | znver5 |" in page
+    assert re.search(r"kepler \| Taylor\(tol=1e-15\) \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
+    assert re.search(r"henon\\_heiles \| .* \| not run", page)
+    assert "256 bits wide" in page
+    (tmp_path / "znver4-256bit.json").write_bytes(b"{}")
+    with pytest.raises(InputError, match="not the result of automatic"):
+        runs.by_kind(tmp_path)
+
+
+def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
+    """Its machine, versions, command and date, when another problem is run on the same kind later."""
+    first = of(ZEN4 | {"cores": 2})
+    later = msgspec.structs.replace(
+        of(ZEN4 | {"cores": 64, "clock_ghz": "2.6"}, problem="henon_heiles"),
+        versions={"numpy": "3"},
+        command="hbvm-bench automatic henon_heiles",
+        started="2027-01-02T03:04:05+00:00",
+    )
+    runs.keep(first, tmp_path)
+    page = runs.keep(later, tmp_path).read_text(encoding="utf-8")
+    assert runs.load(tmp_path / "znver4-256bit.json") == [first, later]
+    assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
+    assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
+    again = msgspec.structs.replace(later, duels=of(ZEN4).duels)
+    runs.keep(again, tmp_path)
+    assert runs.load(tmp_path / "znver4-256bit.json") == [later, again]
+
+
+def test_arithmetic_of_another_width_is_another_kind(tmp_path):
+    for bits, ratio in ((512, 2.0), (256, 3.0)):
+        page = runs.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path).read_text(encoding="utf-8")
+    assert "| znver5-256bit | znver5-512bit |" in page
+    assert re.search(r"\| 3\.00× reached \| 2\.00× reached \|", page)
+
+
+def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
+    one = msgspec.structs.replace(made_up(), machine=ZEN5)
+    two = msgspec.structs.replace(one, machine=ZEN4 | {"ours_built_for": "AVX2"})
+    results.save(one, tmp_path / "race")
+    results.save(two, tmp_path / "race" / "znver4-avx2")
+    found = results.by_kind(tmp_path / "race", list(CONTESTS))
+    assert list(found) == ["znver5", "znver4-256bit-avx2"]
+    table = tables.kinds(found)
+    assert table.head == ("problem", "peer", "znver5", "znver4-256bit-avx2")
+    assert table.rows[0][1] == "heyoka"
+    assert table.rows[0][2] == table.rows[0][3] == "15.0× (15.0–15.0)"
+    path, _ = report.write([one], tmp_path / "race")
+    text = path.read_text(encoding="utf-8")
+    assert "LLVM: znver5" in text
+    assert "by kind of processor" in text
+    runs.keep(of(ZEN4), tmp_path / "automatic")
+    runs.keep(of(ZEN5, 1.5), tmp_path / "automatic")
+    assert main(["headline", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "was restricted to AVX2" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | heyoka | 1e-13, 1e-10 | ≥ 10 | 15.0×" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | Gauss(s=8, h=1.5) | Taylor() |" in said
+    assert "| problem | against | goal | znver4-256bit | znver5 |" in said
+    assert "| kepler | Taylor(tol=1e-15) | ≥ 2 | 2.00× reached | 1.50× missed |" in said
+    assert "earlier definition" not in said
+    results.save(msgspec.structs.replace(one, schema=1), tmp_path / "race")
+    assert main(["headline", str(tmp_path)]) == 0
+    assert "position errors are of an earlier definition" in capsys.readouterr().out
+
+
+def test_without_results_there_is_no_headline(tmp_path, capsys):
+    assert main(["headline", str(tmp_path)]) == 2
+    assert "no result of a race" in capsys.readouterr().err

@@ -1,0 +1,125 @@
+"""The clock runs for the library's own work only: the sampling it recommends, and nothing of setting up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import integrators
+import problems
+from hbvm_bench.campaign.file import Ensemble, TimingPlan
+from hbvm_bench.campaign.identity import make_method
+from hbvm_bench.measure import ensemble, timing
+from hbvm_bench.run import worker
+from integrators.protocol import MethodBase, Samples, Stats, Status
+from problems.errors import InputError
+
+
+class Noting:
+    """A program that notes how it is asked to advance; a start takes 1000 s of its clock, advancing 1 s."""
+
+    compile_seconds, from_cache = 0.0, None
+    stats = Stats(steps=1, evaluations=1)
+
+    def __init__(self):
+        self.asked, self.now = [], 0.0
+
+    def start(self, y0, par=None, t0=0.0):
+        self.now += 1000.0
+        return self
+
+    def advance(self, times, *, sample=None):
+        self.now += 1.0
+        self.asked.append(sample)
+        return Samples(times, np.zeros((1, 2)), Status.FINISHED)
+
+
+class Landing(MethodBase):
+    """A method that is at its best between steps, and whose library goes to an end by landing on it."""
+
+    to_end = "land"
+    order = 1
+
+    def accepts(self, problem):
+        return None
+
+    def compile(self, system):
+        return Noting()
+
+
+def test_a_run_goes_to_its_end_as_the_library_does():
+    problem = problems.load("pendulum", t_end=1.0)
+    run = timing.Run.of(problem, Landing())
+    run.until(0.5).seconds()
+    run.seconds(2)
+    assert run.program.asked == ["land"] * 3
+    assert (run.t_end, run.until(0.5).t_end) == (1.0, 0.5)
+    assert timing.Run.of(problem, integrators.Gauss(s=2, h=0.1)).sample is None
+
+
+def test_making_a_stepper_is_outside_every_clock():
+    problem, program = problems.load("pendulum", t_end=1.0), Noting()
+    assert timing.Run.of(problem, Landing(), program).seconds(3, lambda: program.now)[0] == 1.0
+    starts = np.tile(problem.y0, (4, 1))
+    assert ensemble.EnsembleRun(program, starts, problem, "land").seconds(2, lambda: program.now)[0] == 4.0
+    assert set(program.asked) == {"land"}
+
+
+class Batching(Noting):
+    """A program whose batch takes 1000 s to prepare, and 1 s."""
+
+    def prepare_batch(self, Y0, par=None, *, times, t0=0.0):
+        self.now += 1000.0
+        return lambda: self.went(len(Y0))
+
+    def went(self, n):
+        self.now += 1.0
+        return SimpleNamespace(
+            y=np.zeros((n, 1, 2)), status=[Status.FINISHED] * n, reason=[""], steps=np.ones(n)
+        )
+
+
+def test_preparing_a_batch_is_outside_the_clock():
+    problem, program = problems.load("pendulum", t_end=1.0), Batching()
+    starts = np.tile(problem.y0, (4, 1))
+    assert ensemble.EnsembleRun(program, starts, problem, None).seconds(3, lambda: program.now)[0] == 1.0
+
+
+@pytest.mark.parametrize("method", ["Gauss(s=4, h=0.1)", "Taylor(tol=1e-12)"])
+def test_a_batch_is_prepared_before_it_runs(method):
+    pytest.importorskip("heyoka")
+    problem = problems.load("kepler", e=0.3, t_end=3.0)
+    starts = problem.y0 * (1 + 1e-3 * np.arange(11))[:, None]
+    program = make_method(method).compile(problem.system)
+    go = program.prepare_batch(starts, problem.par, times=[1.0, 3.0])
+    there, made = program.batch(starts, problem.par, times=[1.0, 3.0]), go()
+    assert np.array_equal(made.y, there.y)
+    assert np.array_equal(made.steps, there.steps)
+    with pytest.raises(InputError, match="Y0 must have shape"):
+        program.prepare_batch(np.empty((0, 4)), times=[1.0])
+
+
+def test_a_case_s_clock_begins_when_all_is_compiled(tmp_path):
+    system = problems.load("pendulum").system
+
+    class Late(Batching):
+        def prepare_batch(self, Y0, par=None, *, times, t0=0.0):
+            assert not (tmp_path / worker.COMPILED).exists()
+            return super().prepare_batch(Y0, par, times=times, t0=t0)
+
+    class Method(Landing):
+        def compile(self, system):
+            return Late()
+
+    case = SimpleNamespace(ensemble=Ensemble(count=3, spread=0.1))
+    resolved = SimpleNamespace(case=case, method=Method(), problem=problems.load("pendulum", t_end=1.0))
+    program = worker._Telling(resolved, tmp_path).compile(system)
+    assert program.now == 1000.0
+    assert (tmp_path / worker.COMPILED).exists()
+
+
+def test_a_campaign_s_round_is_of_such_runs(monkeypatch):
+    seen = []
+    monkeypatch.setattr(timing, "sampled", lambda run, program, plan: seen.append(run) or "not timed")
+    timing.time_round(problems.load("pendulum", t_end=1.0), Landing(), TimingPlan())
+    assert [run.sample for run in seen] == ["land"]

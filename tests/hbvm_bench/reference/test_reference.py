@@ -1,0 +1,80 @@
+import msgspec
+import numpy as np
+import pytest
+
+import problems
+from hbvm_bench.reference import solutions
+from problems.errors import InputError
+
+Z_END = "-0.21429082377414021577602211142057"
+
+
+def test_every_stored_reference_belongs_to_a_problem_and_starts_where_it_starts():
+    for path in solutions.folder().glob("*.json"):
+        stored = msgspec.json.decode(path.read_bytes(), type=solutions.ReferenceFile)
+        name = stored.problem.partition("(")[0]
+        assert name in problems.names()
+        start = [float.fromhex(text) for text in stored.start]
+        assert start == [float.fromhex(stored.t[0]), *(float(value) for value in stored.y[0])]
+        assert "check" in stored.provenance
+        # the file is what its encoder writes, so that recomputing it gives no other difference
+        assert solutions.encode(stored) == path.read_text()
+
+
+def test_sitnikov_has_the_value_that_was_computed_twice():
+    problem = problems.load("sitnikov")
+    stored = solutions.find_file(problem)
+    assert stored is not None
+    assert stored.y[-1][8].startswith(Z_END)
+    # measured with tol 1e-30 instead of 1e-28: z agrees to 1e-21, x1 to 4e-24
+    assert stored.y[-1][0].startswith("-2.4241362715986335486617150")
+    assert [float.fromhex(t) for t in stored.t] == [25.0 * n for n in range(61)]
+
+
+def test_the_planetoid_of_the_reference_stays_on_the_axis():
+    known = solutions.find(problems.load("sitnikov"))
+    assert known is not None
+    assert np.all(known.high[:, 6:8] == 0)
+    assert np.all(known.low[:, 6:8] == 0)
+
+
+def test_two_doubles_hold_more_than_one(tmp_path):
+    known = solutions.find(problems.load("sitnikov"))
+    assert known is not None
+    assert 0 < np.max(np.abs(known.low[1:])) < 2.0**-52
+
+
+@pytest.mark.parametrize("arguments", [{"e": 0.6}, {"z3": 2e-9}, {"m3": 2e-5}])
+def test_another_start_has_no_reference(arguments):
+    assert solutions.find(problems.load("sitnikov", **arguments)) is None
+
+
+def test_a_shorter_span_has_the_same_reference():
+    assert solutions.find(problems.load("sitnikov", t_end=100.0)) is not None
+
+
+def test_recomputing_a_short_span_gives_the_stored_digits():
+    pytest.importorskip("heyoka")
+    problem = problems.load("sitnikov", t_end=25.0)
+    fresh = solutions.compute(problem, intervals=1)
+    stored = solutions.find_file(problem)
+    assert stored is not None
+    cut = msgspec.structs.replace(stored, t=stored.t[:2], y=stored.y[:2])
+    # measured 2.4e-29: the two runs take different steps to their first output
+    assert solutions.difference(cut, fresh) < 1e-26
+
+
+def test_references_of_different_problems_are_not_compared():
+    stored = solutions.find_file(problems.load("sitnikov"))
+    assert stored is not None
+    with pytest.raises(InputError, match="different problems"):
+        solutions.difference(stored, msgspec.structs.replace(stored, t=stored.t[:-1]))
+
+
+def test_a_reference_written_elsewhere_is_found_there(tmp_path):
+    problem = problems.load("sitnikov")
+    stored = solutions.find_file(problem)
+    assert stored is not None
+    assert solutions.find(problem, tmp_path) is None
+    (tmp_path / "sitnikov-mine.json").write_text(solutions.encode(stored))
+    assert solutions.find_file(problem, tmp_path) == stored

@@ -1,0 +1,292 @@
+"""The page in a real browser: it asks nothing of the network, and every control works."""
+
+import csv
+import io
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+pytest.importorskip("playwright.sync_api")
+
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect, sync_playwright
+
+from hbvm_bench.report.write import write_report
+from hbvm_bench.store.store import Store
+from tests.hbvm_bench import made_up_run
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = next((path for name in NAMES if (path := shutil.which(name))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium on this machine")
+
+PATIENCE = 30_000  # milliseconds, on a machine with other work
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    target = tmp_path_factory.mktemp("report")
+    write_report(made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run"))), target)
+    return target
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory):
+    target = tmp_path_factory.mktemp("large")
+    texts = [f"pendulum(p={1 + number / 10})" for number in range(2)]
+    write_report(made_up_run.write(Store(tmp_path_factory.mktemp("run")), texts, 200, missing=3), target)
+    return target
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=CHROMIUM)
+        yield opened
+        opened.close()
+
+
+@contextmanager
+def opened(browser, folder, **options) -> Iterator[Page]:
+    """Open a report; what it logs as an error or asks of anybody fails the test."""
+    context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    said: list[str] = []
+    page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: said.append(f"asked for {request.url[:80]}"))
+    url = (folder / "index.html").as_uri()
+    page.goto(url)
+    page.wait_for_selector("html[data-data=ready]", state="attached")
+    yield page
+    harmless = (f"asked for {url[:80]}", "asked for blob:", "asked for data:image/svg")  # nothing leaves
+    left = [text for text in said if not text.startswith(harmless)]
+    assert left == []
+    context.close()
+
+
+def visible_rows(page):
+    return page.locator("table.results tbody tr:not(.group):visible")
+
+
+def test_the_page_is_small_and_the_plots_come_behind_it(browser, folder, large):
+    assert (folder / "index.html").stat().st_size <= 3_000_000
+    assert (large / "index.html").stat().st_size <= 5_000_000
+    with opened(browser, folder) as page:
+        expect(page.locator("#energy .picture svg")).to_be_attached()
+        page.wait_for_selector("html[data-plots=ready]", state="attached")
+
+
+def wait_for_change(page, expression, before):
+    """Wait until `expression` is no longer `before`; the page draws in its own time."""
+    page.wait_for_function(f"before => ({expression}) !== before", arg=before)
+
+
+def test_hostile_names_do_nothing_in_a_browser(browser, folder):
+    with opened(browser, folder) as page:
+        said: list[str] = []
+        page.on("dialog", lambda dialog: said.append(dialog.message))
+        page.click("#energy [data-view=explore]")
+        page.wait_for_selector("#energy .area[data-drawn]")
+        assert said == []
+        assert page.locator("script").count() == 4  # with the plotting library, unpacked
+
+
+def test_sorting_and_filtering(browser, folder):
+    with opened(browser, folder) as page:
+        assert visible_rows(page).count() == len(made_up_run.METHODS)
+        page.get_by_role("button", name="energy", exact=True).click()
+        head = page.locator("table.results th[aria-sort]")
+        assert head.get_attribute("aria-sort") == "ascending"
+        first = page.locator("tbody[data-group=on] tr:not(.group) td:nth-child(3)")
+        up = [float(text.split()[0]) for text in first.all_inner_texts()]
+        assert up == sorted(up)
+        head.get_by_role("button").click()
+        assert head.get_attribute("aria-sort") == "descending"
+        down = [float(text.split()[0]) for text in first.all_inner_texts()]
+        assert down == sorted(up, reverse=True)
+
+        page.fill("[name=words]", "hbvm k=18")
+        expect(page.locator("#filter output")).to_have_text(f"1 of {len(made_up_run.METHODS)} cases")
+        page.get_by_role("button", name="Clear").click()
+        expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS))
+        page.uncheck("[name=group][value=ended]")
+        expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS) - 1)
+        page.select_option("[name=library]", "scipy")
+        expect(visible_rows(page)).to_have_count(1)
+
+
+def test_the_theme_changes_pages_and_plots(browser, folder):
+    with opened(browser, folder) as page:
+        page.click("#energy [data-view=explore]")
+        page.wait_for_selector("#energy .area[data-drawn]")
+        ink = "document.querySelector('#energy .xtitle').style.fill"
+        ground = "getComputedStyle(document.body).backgroundColor"
+        before = page.evaluate(ground), page.evaluate(ink)
+        page.click("#theme")
+        wait_for_change(page, ground, before[0])
+        wait_for_change(page, ink, before[1])
+
+
+def test_cases_are_switched_off_and_the_numbers_are_in_a_table(browser, folder):
+    with opened(browser, folder) as page:
+        page.click("#energy [data-view=explore]")
+        page.wait_for_selector("#energy .area[data-drawn]")
+        curves = page.locator("#energy .scatterlayer .trace")
+        full = curves.count()
+        page.locator("#energy input[data-case]").first.uncheck()
+        expect(curves).to_have_count(full - 1)
+        page.locator("#energy").get_by_role("button", name="None").click()
+        expect(curves).to_have_count(0)
+        page.locator("#energy").get_by_role("button", name="All").click()
+        expect(curves).to_have_count(full)
+        page.locator("#energy details.numbers summary").click()
+        # The table is made when `toggle` arrives, a task after the click.
+        expect(page.locator("#energy details.numbers tbody tr")).to_have_count(len(made_up_run.METHODS))
+        page.click("#energy [data-view=picture]")
+        expect(page.locator("#energy .picture")).to_be_visible()
+        expect(page.locator("#energy .plot")).to_be_hidden()
+
+
+def points(text):
+    rows = list(csv.reader(io.StringIO(text)))
+    return [[*row[:4], *(float(cell) if cell else None for cell in row[4:])] for row in rows[1:]]
+
+
+def test_everything_is_saved_from_the_page_itself(browser, folder):
+    with opened(browser, folder) as page:
+
+        def saved(selector):
+            with page.expect_download() as download:
+                page.locator(selector).click()
+            return download.value.path().read_bytes()
+
+        assert b"var(" not in (svg := saved("#energy [data-save=svg]"))
+        assert svg.startswith(b"<svg")
+        assert saved("#energy [data-save=png]").startswith(b"\x89PNG")
+        assert saved("[data-save=csv]") == (folder / "data" / "results.csv").read_bytes()
+        assert b'"cases"' in saved("[data-save=json]")
+        here = points(saved("#energy [data-save=numbers]").decode())
+        beside = points((folder / "data" / "energy.csv").read_text(encoding="utf-8"))
+        assert here == beside
+
+
+def test_the_system_moves_pauses_and_goes_where_it_is_told(browser, folder):
+    with opened(browser, folder) as page:
+        page.locator("#motion").scroll_into_view_if_needed()
+        page.wait_for_selector("#motion[data-playing=true]")
+        picture = "document.querySelector('#motion canvas').toDataURL()"
+        wait_for_change(page, picture, page.evaluate(picture))
+        page.locator("#motion .play").click()
+        expect(page.locator("#motion .play")).to_have_text("Play")
+        page.wait_for_timeout(100)  # a frame asked for before the pause is still drawn
+        still = page.evaluate(picture)
+        page.wait_for_timeout(300)
+        assert page.evaluate(picture) == still
+        page.locator("#motion .scrub").fill("1000")
+        expect(page.locator("#motion .time")).to_have_text("t = 1000.0")
+        page.locator("#motion select").first.select_option(index=0)
+        page.locator("#motion .scrub").fill("1500")  # a planetoid that is far away is told, and harms nothing
+        expect(page.locator("#motion .told").first).to_contain_text("far away")
+        page.locator("#motion canvas").first.focus()
+        turned = page.evaluate(picture)
+        page.keyboard.press("ArrowLeft")
+        wait_for_change(page, picture, turned)
+
+
+def test_nothing_moves_where_motion_is_unwelcome(browser, folder):
+    with opened(browser, folder, reduced_motion="reduce") as page:
+        page.locator("#motion").scroll_into_view_if_needed()
+        page.wait_for_timeout(300)
+        expect(page.locator("#motion .picture")).to_be_visible()
+        expect(page.locator("#motion .moving")).to_be_hidden()
+        page.click("#motion [data-view=move]")
+        expect(page.locator("#motion .play")).to_have_text("Play")
+
+
+def test_the_keyboard_reaches_every_control(browser, folder):
+    with opened(browser, folder, reduced_motion="reduce") as page:
+        page.click("#energy [data-view=explore]")
+        page.wait_for_selector("#energy .area[data-drawn]")
+        page.click("#motion [data-view=move]")
+        wanted = page.evaluate(
+            "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
+            ".filter((e) => e.checkVisibility()).length"
+        )
+        page.evaluate("document.addEventListener('focusin', (e) => { e.target.dataset.reached = 'yes'; })")
+        page.locator(".skip").focus()
+        for _ in range(3 * wanted):
+            page.keyboard.press("Tab")
+            if page.evaluate("document.activeElement === document.body"):
+                break
+        missed = page.evaluate(
+            "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
+            ".filter((e) => e.checkVisibility() && !e.dataset.reached).map((e) => e.outerHTML.slice(0, 80))"
+        )
+        assert missed == []
+        page.locator("#energy .area").focus()
+        view = "document.querySelector('#energy .area')._fullLayout.yaxis.range.join()"
+        before = page.evaluate(view)
+        page.keyboard.press("+")
+        wait_for_change(page, view, before)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_serious_is_found_by_axe(browser, folder, scheme):
+    with opened(browser, folder, color_scheme=scheme, reduced_motion="reduce", bypass_csp=True) as page:
+        page.click("#energy [data-view=explore]")
+        page.wait_for_selector("#energy .area[data-drawn]")
+        page.locator("#energy details.numbers summary").click()
+        expect(page.locator("#energy details.numbers tbody tr")).not_to_have_count(0)
+        found = Axe().run(page).response["violations"]
+        serious = [v for v in found if v["impact"] in ("serious", "critical")]
+        assert [(v["id"], v["nodes"][0]["html"][:200]) for v in serious] == []
+
+
+def test_the_results_fit_a_laptop_and_the_lesser_columns_come_on_demand(browser, folder):
+    with opened(browser, folder) as page:
+        scroll = page.locator(".scroll.table")
+        wider = "e => e.scrollWidth - e.clientWidth"
+        lesser = page.locator("table.results .minor:visible")
+        expect(lesser).to_have_count(0)
+        assert scroll.evaluate(wider) == 0
+        page.check("[name=all]")
+        expect(lesser).not_to_have_count(0)
+        page.get_by_role("button", name="Clear").click()
+        expect(lesser).to_have_count(0)
+
+
+@pytest.mark.parametrize("width", [360, 1280, 1920])
+def test_no_page_is_wider_than_its_window(browser, folder, large, width):
+    for target in (folder, large):
+        with opened(browser, target, viewport={"width": width, "height": 800}) as page:
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_large_campaign_stays_usable(browser, large):
+    with opened(browser, large) as page:
+        rows = page.locator("table.results tbody tr:not(.group)")
+        assert rows.count() == 400 - 3
+        expect(page.locator(".missing").first).to_contain_text("3 of 400 cases have no result yet")
+        page.fill("[name=words]", "taylor")
+        page.select_option("[name=problem]", "2")
+        expect(page.locator("#filter output")).to_contain_text("of 397 cases")
+        shown = visible_rows(page).count()
+        assert 0 < shown < 200
+        page.get_by_role("button", name="time", exact=True).click()
+        page.click("#work-precision [data-view=explore]")
+        page.wait_for_selector("#work-precision .area[data-drawn]")
+
+
+def test_a_script_that_gets_into_the_page_does_not_run(browser, folder, tmp_path):
+    attack = '<script>document.title = "hit"</script><img src="x" onerror="document.title = \'hit\'">'
+    page_text = (folder / "index.html").read_text(encoding="utf-8")
+    (tmp_path / "index.html").write_text(page_text.replace("<main>", f"<main>{attack}"), encoding="utf-8")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto((tmp_path / "index.html").as_uri())
+    page.wait_for_selector("html[data-data=ready]", state="attached", timeout=PATIENCE)  # ours does
+    assert page.title() != "hit"
+    context.close()

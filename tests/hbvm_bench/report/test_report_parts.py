@@ -1,0 +1,140 @@
+"""Parts of the reports: numbers behind figures, packing, sections, merging, the list of reports."""
+
+import base64
+import csv
+import gzip
+import io
+from typing import Literal
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hbvm_bench.report import pack
+from hbvm_bench.report.content import gather
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv, as_json, numbers
+from hbvm_bench.report.figures.portraits import crossings
+from hbvm_bench.report.index import write_index
+from hbvm_bench.store.merge import merge
+from hbvm_bench.store.records import Result
+from hbvm_bench.store.store import Store
+from problems.errors import InputError
+from tests.hbvm_bench import made_up_run
+
+
+def plot(kind: Literal["lines", "dots"] = "lines"):
+    x = np.linspace(0.0, 10.0, 101)
+    case = Trace(3, 'a "b", c', x, np.where(x > 9.0, np.nan, x**2))
+    law = Trace(3, "a", x, x, role="law", note="t^1/2")
+    return Plot([Panel("p", Axis("x"), Axis("y", log=True), [case, law])], kind)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.binary(max_size=3000))
+def test_what_is_packed_can_be_unpacked_and_cannot_end_a_script(data):
+    text = pack.packed(data)
+    assert gzip.decompress(base64.b85decode(text.replace(",", "<"))) == data
+    assert not set(text) & set("<'\"\\/\n ")
+    assert pack.packed(data) == text
+
+
+def test_the_plotting_library_is_the_installed_one():
+    text = gzip.decompress(base64.b85decode(pack.library().replace(",", "<"))).decode()
+    assert "plotly.js v" in text[:500]
+
+
+def test_the_numbers_of_a_figure_are_those_that_it_draws():
+    table = numbers(plot())
+    (row,) = table.rows
+    assert row[:2] == ("3", 'a "b", c')
+    assert row[-1] == "t^1/2"
+    assert float(row[-2]) == 81.0  # the largest that is finite
+    assert row[table.head.index("at 4")] == "16"
+    assert row[table.head.index("at 10")] == "–"
+    spread = numbers(plot("dots")).rows[0]
+    assert spread[3:6] == ("101", "0", "10")
+
+
+def test_a_figures_csv_has_every_point_and_gaps_stay_gaps():
+    made = plot()
+    rows = list(csv.DictReader(io.StringIO(as_csv(made))))
+    assert len(rows) == 202
+    assert rows[0]["name"] == 'a "b", c'
+    assert rows[100]["y"] == ""
+    encoded = msgspec.json.decode(msgspec.json.encode(as_json(made)))
+    assert encoded["panels"][0]["traces"][0]["y"][100] is None
+
+
+def test_crossings_of_a_circle_are_where_it_passes_the_axis():
+    t = np.linspace(0.0, 40.0, 4001)
+    y = np.c_[np.sin(t), 0.3 + 0.0 * t, np.cos(t), 0.1 * t]
+    q2, p2 = crossings(y)
+    assert q2 == pytest.approx(np.full(6, 0.3))
+    # measured: 4e-15, as the momentum is linear in t
+    assert p2 == pytest.approx(0.1 * 2 * np.pi * np.arange(1, 7), abs=1e-6)
+    assert crossings(y[::400])[0].size == 0  # samples too far apart: a crossing would be a guess
+    y[:, 0] = np.nan
+    assert crossings(y)[0].size == 0
+
+
+def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
+    first = made_up_run.write(Store(tmp_path / "a"), ["pendulum(p=1.0)"], 4, missing=1)
+    second = made_up_run.write(Store(tmp_path / "b"), ["pendulum(p=1.0)", "pendulum(p=1.2)"], 3)
+    newer = second.records()[1]
+    second.save(msgspec.structs.replace(newer, finished="2026-11-22T10:00:00+00:00", seconds=7.0))
+    content = gather([first, second])
+    assert len(content.records) == 4 + 3  # the case that the first run lacks is in the second
+    assert [record.seconds for record in content.records if record.id == newer.id] == [7.0]
+    assert content.runs[0].missing == []
+    assert content.title.startswith("2 runs together")
+    assert content.measured == "2026-11-21 to 2026-11-22"
+    numbers_ = {record.case.method: content.looks[record.id].number for record in content.records}
+    assert len(set(numbers_.values())) == 4  # a method has one number and one look on every problem
+
+
+def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
+    """A later failure does not stand for what an earlier run measured."""
+    first = made_up_run.write(Store(tmp_path / "a"), ["pendulum(p=1.0)"], 3)
+    second = made_up_run.write(Store(tmp_path / "b"), ["pendulum(p=1.0)"], 3)
+    measured = first.records()[0]
+    failed = msgspec.structs.replace(
+        measured, finished="2026-11-23T10:00:00+00:00", result=Result(outcome="timeout"), timing=None
+    )
+    second.save(failed)
+    (kept,) = (record for record in gather([first, second]).records if record.id == measured.id)
+    out = Store(tmp_path / "out")
+    merge([first, second], out)
+    assert kept.result.outcome == "ok"
+    assert kept == out.load(measured.id)
+
+
+def test_what_is_missing_is_named(tmp_path):
+    store = made_up_run.write(Store(tmp_path), ["pendulum(p=1.0)"], 3, missing=1)
+    content = gather([store])
+    assert [case.method for case in content.runs[0].missing] == [made_up_run.methods(3)[0]]
+    assert [case.method for case in content.sections[0].missing] == [made_up_run.methods(3)[0]]
+
+
+def test_the_list_of_reports_says_what_each_is_with_a_picture_and_its_command(tmp_path):
+    folder = tmp_path / "one"
+    folder.mkdir()
+    (folder / "report.md").write_text(
+        "# A title\n\nWhat it is about.\n\n![x](figures/x.png)\n\n    hbvm-bench run one\n", encoding="utf-8"
+    )
+    (folder / "index.html").write_text("", encoding="utf-8")
+    (tmp_path / "unwritten").mkdir()
+    text = write_index(tmp_path).read_text(encoding="utf-8")
+    for part in ("A title", "What it is about.", 'src="one/figures/x.png"', "one/index.html", "run one"):
+        assert part in text
+    assert "unwritten" not in text
+    before = text
+    assert write_index(tmp_path).read_text(encoding="utf-8") == before
+
+
+def test_a_directory_without_reports_has_no_list(tmp_path):
+    with pytest.raises(InputError, match="holds no report"):
+        write_index(tmp_path)
+    with pytest.raises(InputError, match="does not exist"):
+        write_index(tmp_path / "nowhere")

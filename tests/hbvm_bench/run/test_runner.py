@@ -1,0 +1,225 @@
+"""Whatever a method does, it is a row with its reason, and the rest is unharmed."""
+
+import concurrent.futures
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
+from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.run import executors, loop, supervise, timing_pass
+from hbvm_bench.run import task as execute
+from hbvm_bench.store.store import Store
+from tests.hbvm_bench.conftest import SHORT
+
+GENEROUS = Limits(wall_seconds=30, memory_gib=2)
+PLAN = TimingPlan(rounds=2, samples=2, shortest=1e-4, budget=1)
+
+
+@pytest.fixture
+def store(tmp_path):
+    made = Store(tmp_path / "run")
+    made.prepare()
+    return made
+
+
+def case(method):
+    return Case(problem=SHORT, method=method, grid=Grid(count=4))
+
+
+def run(store, method, limits=GENEROUS):
+    record = loop.run_case(case(method), str(store.directory), limits)
+    assert store.load(record.id) == record
+    return record
+
+
+def test_a_case_that_works_has_metrics_and_series(toys, store):
+    record = run(store, "Steady()")
+    assert (record.result.outcome, record.result.status, record.role) == ("ok", "finished", "peer")
+    assert record.versions["toys"] == "1.0"
+    # the toy stays at rest, so its energy is exact
+    assert record.result.metrics["energy_max"].value == 0.0
+    assert record.result.metrics["position_end"].why == "the reference does not reach the end time"
+    assert record.peak_memory_gib > 0.01
+    assert store.series(record.id)["y"].shape == (5, 18)
+
+
+@pytest.mark.parametrize(
+    ("method", "outcome", "reason"),
+    [
+        ("Crashing()", "crashed", "SIGSEGV"),
+        (f"Crashing(number={int(signal.SIGABRT)})", "crashed", "SIGABRT"),
+        (f"Crashing(number={int(signal.SIGKILL)})", "killed", "SIGKILL"),
+        ("Raising()", "crashed", "RuntimeError: something <b>broke</b>"),
+        ("Exiting()", "crashed", "no readable result"),
+        ("Exiting(code=3)", "crashed", "exit code 3"),
+        ("Garbage(what='shape')", "crashed", "shape"),
+        ("Garbage(what='times')", "crashed", "not asked for"),
+        ("Garbage(what='few')", "crashed", "2 of 5"),
+        ("Garbage(what='nan')", "crashed", "not finite from t = 1"),
+        ("Garbage(what='complex')", "crashed", "complex128, not real numbers"),
+        ("Garbage(what='result')", "crashed", "no readable result"),
+        ("Garbage(what='series')", "crashed", "no readable result"),
+        ("Refusing()", "refused", "it accepts nothing"),
+        ("Missing()", "refused", "pip install nowhere"),
+    ],
+)
+def test_a_failure_is_a_row_with_its_reason(toys, store, method, outcome, reason):
+    record = run(store, method)
+    assert record.result.outcome == outcome
+    assert reason in record.result.reason
+    assert record.result.metrics == {}
+    assert store.series(record.id) == {}
+
+
+def test_a_stall_keeps_what_came_before(toys, store):
+    record = run(store, "Stalling()")
+    assert (record.result.outcome, record.result.reason) == ("stalled", "it crawled.")
+    assert record.result.metrics["energy_max"].void
+    assert store.series(record.id)["t"].tolist() == [0.0, 0.25]
+
+
+def test_noise_on_the_output_does_no_harm(toys, store):
+    assert run(store, "Garbage(what='noise')").result.outcome == "ok"
+
+
+def test_what_never_returns_is_ended_at_its_limit(toys, store):
+    start = time.monotonic()
+    record = run(store, "Endless()", Limits(wall_seconds=3))
+    assert (record.result.outcome, record.result.reason) == ("timeout", "did not end within 3 s")
+    assert time.monotonic() - start < 10
+
+
+def test_compiling_does_not_count_against_the_limit_of_a_case(toys, store):
+    record = run(store, "Compiling(wait=1.5)", Limits(wall_seconds=1.0))
+    assert record.result.outcome == "ok"
+
+
+def test_a_timeout_while_compiling_is_not_kept_for_ever(toys, store):
+    limits = Limits(compile_seconds=1.0)
+    record = run(store, "Compiling(wait=60.0)", limits)
+    assert (record.result.outcome, record.result.status) == ("timeout", "compiling")
+    assert "still compiling after 1 s" in record.result.reason
+    assert not loop.is_done(record, limits)
+
+
+def test_what_eats_memory_is_killed_at_its_limit(toys, store):
+    record = run(store, "Hungry()", Limits(wall_seconds=30, memory_gib=0.6))
+    assert (record.result.outcome, record.result.reason) == ("killed", "used more than 0.6 GiB of memory")
+    # it eats 30 MiB every 10 ms and is looked at every 20 ms
+    assert record.peak_memory_gib < 1.2
+
+
+def test_memory_of_processes_that_it_starts_counts_too():
+    eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
+    start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
+    ended = supervise.run([sys.executable, "-c", start], {}, Limits(wall_seconds=15, memory_gib=0.2))
+    assert ended.cause == "memory"
+    assert 0.2 < ended.peak_gib < 0.6  # measured 0.21 to 0.31
+    assert ended.seconds < 10
+
+
+def test_all_processes_are_walked_over_once_in_a_second_only(monkeypatch):
+    walks = []
+    monkeypatch.setattr(supervise, "_processes", lambda: walks.append(time.monotonic()) or [])
+    supervise.run([sys.executable, "-c", "import time; time.sleep(1.6)"], {}, GENEROUS)
+    assert len(walks) == 1  # one at every poll would be more than ten
+
+
+def test_a_lost_symmetry_voids_position_and_time(toys, store):
+    record = run(store, "Straying()")
+    assert "off axis reached 0.001" in record.result.violation
+    metrics = record.result.metrics
+    assert metrics["z_end"].void
+    assert not metrics["energy_max"].void
+    assert metrics["guard_max"].value == 1e-3
+
+
+def test_cases_run_on_any_executor(toys, store):
+    cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        records = list(loop.run_accuracy(cases, store, GENEROUS, executors.of(pool)))
+    assert {record.id for record in records} == {one.id for one in cases}
+
+
+def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
+    cases = [resolve(case(method)) for method in ("Steady()", "Crashing()", "Stalling()")]
+    for one in cases:
+        loop.run_case(one.case, str(store.directory), GENEROUS)
+    assert timing_pass.missing_visits(cases, store, PLAN) == 2 * [cases[0].id]
+    visits = []
+    timing_pass.time_cases(
+        cases, store, PLAN, GENEROUS, lambda round_, one: visits.append((round_, one.case.method))
+    )
+    assert visits == [(0, "Steady()"), (1, "Steady()")]
+    record = store.load(cases[0].id)
+    assert [len(one.samples) for one in record.timing.rounds] == [2, 2]
+    assert all(0 < one.share < 1.5 for one in record.timing.rounds)
+    assert record.timing.compile.seconds == 0.25
+    assert record.result.metrics["warm_seconds"].value == record.timing.summary["median"]
+    assert record.result.metrics["compile_seconds"].value == 0.25
+    timing_pass.time_cases(cases, store, PLAN, GENEROUS, lambda *visit: pytest.fail("timed again"))
+    more = msgspec.structs.replace(PLAN, rounds=3)
+    assert timing_pass.missing_visits(cases, store, more) == [cases[0].id]
+
+
+def test_a_timing_that_fails_says_why(toys, store):
+    one = resolve(case("Steady(wait=0.5)"))
+    loop.run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
+    record = store.load(one.id)
+    assert record.timing.why == "not timed: the time limit"
+    assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
+    assert set(timing_pass.missing_visits([one], store, PLAN)) == {one.id}
+    once = TimingPlan(rounds=1, samples=1, shortest=1e-4, budget=0.1)
+    timing_pass.time_cases([one], store, once, GENEROUS)
+    assert store.load(one.id).timing.why == ""
+    assert timing_pass.missing_visits([one], store, once) == []
+
+
+def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
+    pool = concurrent.futures.ThreadPoolExecutor(1)
+    future = pool.submit(loop.run_case, case("Endless()"), str(store.directory), GENEROUS)
+    while not supervise._children:
+        time.sleep(0.01)
+    (child,) = supervise._children
+    supervise.stop_all()
+    try:
+        with pytest.raises(execute.InterruptedRunError):
+            future.result(timeout=10)
+    finally:
+        supervise.allow()
+        pool.shutdown()
+    assert not Path(f"/proc/{child.pid}").exists()
+    assert list(store.cases.iterdir()) == []
+
+
+def test_a_worker_dies_with_its_runner(toys, tmp_path):
+    code = (
+        "import sys; from hbvm_bench.run import loop; from hbvm_bench.campaign.file import *;"
+        f"loop.run_case(Case(problem={SHORT!r}, method='Endless()'), {str(tmp_path)!r}, Limits())"
+    )
+    (tmp_path / "cases").mkdir()
+    parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ)
+    child = None
+    deadline = time.monotonic() + 20
+    while child is None and time.monotonic() < deadline:
+        time.sleep(0.05)
+        text = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text()
+        child = int(text.split()[0]) if text.split() else None
+    assert child is not None
+    parent.kill()
+    parent.wait()
+    deadline = time.monotonic() + 30  # it may still be starting
+    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
+        if "zombie" in Path(f"/proc/{child}/status").read_text():
+            break
+        time.sleep(0.05)
+    else:
+        assert not Path(f"/proc/{child}").exists()

@@ -1,0 +1,174 @@
+import math
+
+import pytest
+
+from hbvm_bench.campaign.file import Campaign, Case, Ensemble, MethodEntry
+from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.store import Index
+from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
+from hbvm_bench.summaries.profiles import Goal
+
+
+def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
+    metrics = {
+        "warm_seconds": Value(value=seconds),
+        "position_end": Value(value=position),
+        "phase_end": Value(value=position),
+        "energy_max": Value(value=energy),
+        "distance_max": Value(value=1.0),
+    }
+    result = Result(
+        outcome=options.pop("outcome", "ok"),
+        status=options.pop("status", "finished"),
+        reason=options.pop("reason", ""),
+        violation=options.pop("violation", ""),
+        metrics=options.pop("metrics", metrics),
+        laws=options.pop("laws", {}),
+    )
+    case = Case(problem=problem, method=method, settings=options.pop("settings", "recommended"))
+    if options.pop("many", False):
+        case = Case(problem=problem, method=method, ensemble=Ensemble(count=3))
+    return Record(
+        id=f"{problem}{method}{len(options)}",
+        case=case,
+        role="peer",
+        library="heyoka" if method.startswith("Taylor") else "hbvm-bench",
+        order=None,
+        result=result,
+        versions={"heyoka": "7.13"},
+        **options,
+    )
+
+
+RUN = [
+    record("Gauss(s=2, h=0.1)", seconds=1.0, position=1e-3),
+    record("Gauss(s=8, h=0.1)", seconds=2.0, position=1e-9),
+    record("Gauss(s=8, h=0.01)", seconds=20.0, position=1e-8),
+    record("Taylor()", seconds=1.0, position=1e-9, energy=1e-12),
+    record("Gauss(s=8, h=0.1)", problem="pendulum()", seconds=1.0),
+    record("Taylor()", problem="pendulum()", seconds=8.0),
+    record("Gauss(s=8, h=0.1)", problem="toda()", position=0.5),
+    record("Taylor()", problem="toda()", violation="another trajectory"),
+]
+
+
+def test_an_envelope_is_what_nothing_beats_in_both():
+    found = points.envelopes(RUN, "kepler()", "warm_seconds", "position_end")
+    assert [(p.work, p.error) for p in found["Gauss"]] == [(1.0, 1e-3), (2.0, 1e-9)]
+    assert list(found) == ["Gauss", "Taylor"]
+    assert points.points(RUN, "toda()", "warm_seconds", "position_end")[0].family == "Gauss"
+    assert len(points.points(RUN, "toda()", "warm_seconds", "position_end")) == 1  # the other is void
+    assert points.work_of(RUN) == "warm_seconds"
+    assert points.work_of([]) == "evaluations"
+
+
+def test_an_ensemble_is_in_no_summary_of_single_trajectories():
+    many = record("Taylor()", many=True)
+    assert points.points([many], "kepler()", "warm_seconds", "position_end") == []
+    assert profiles.profile([many], Goal(1e-4), "warm_seconds").ratios == {}
+    assert outcomes.matrix([many]) == ([], {})
+
+
+def test_a_profile_counts_problems_within_a_factor_of_the_best():
+    found = profiles.profile(RUN, Goal(1e-8), "warm_seconds")
+    assert found.problems == ["kepler()", "pendulum()"]
+    assert found.unsolved == ["toda()"]
+    assert found.ratios == {"Gauss": [2.0, 1.0], "Taylor": [1.0, 8.0]}
+    assert found.share("Gauss", 1.0) == 0.5
+    assert found.share("Gauss", 2.0) == 1.0
+    assert found.curve("Taylor") == ([1.0, 8.0], [0.5, 1.0])
+    assert (found.wins("Gauss"), found.solved("Taylor")) == (1, 2)
+
+
+def test_who_does_not_reach_the_goal_has_an_infinite_ratio():
+    found = profiles.profile(RUN, Goal(1e-8, 1e-13), "warm_seconds")
+    assert found.ratios["Taylor"] == [math.inf, 8.0]
+    assert found.solved("Taylor") == 1
+    assert "energy to 1e-13" in found.goal.words
+
+
+def test_needs_name_the_families_near_the_best_most_often():
+    cheap = next(a for a in needs.answers(RUN) if a.title == "a position right to 1e-8, in little time")
+    assert cheap.problems == 2
+    assert [c.family for c in cheap.candidates] == ["Gauss", "Taylor"]
+    assert (cheap.candidates[0].near, cheap.candidates[1].near) == (2, 1)
+    assert cheap.text == "Gauss (2 of 2, 1.5 times the best); Taylor (1 of 2, 4.5 times the best)"
+    assert all(answer.candidates for answer in needs.answers(RUN))
+
+
+def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
+    families, rows = outcomes.matrix(
+        [
+            *RUN,
+            record("IAS15()", outcome="stalled", status="stalled", reason="dt shrinks", metrics={}),
+            record("WHFast(h=1)", outcome="refused", status="", reason="no bodies", metrics={}),
+        ]
+    )
+    assert families == ["Gauss", "Taylor", "IAS15", "WHFast"]
+    assert rows["kepler()"]["Gauss"] == outcomes.Outcome("ok", 3, 3, [])
+    assert rows["kepler()"]["IAS15"].state == "ended"
+    assert rows["kepler()"]["WHFast"] == outcomes.Outcome("refused", 0, 1, ["refused: no bodies"])
+    assert rows["toda()"]["Taylor"].state == "off"
+    assert rows["toda()"]["IAS15"].state == "absent"
+
+
+@pytest.mark.parametrize(
+    ("law", "text"),
+    [
+        (Law(law="bounded", floor=2e-9), "bounded at 2.0e-09"),
+        (Law(law="bounded"), "0"),
+        (Law(law="linear", slope=1.01, slope_low=0.9, slope_high=1.1), "t (1.01, 0.90 to 1.10)"),
+        (Law(law="square root", slope=0.5), "t^1/2 (0.50)"),
+        (Law(law="drift", slope=0.57, mean=-8.51e-14, mean_error=9.4e-15), "drift (-8.5e-14 ± 9e-15)"),
+        (Law(law="exponential", growth=0.25), "exp(0.25 t)"),
+        (Law(why="too short"), "too short"),
+    ],
+)
+def test_a_law_in_a_few_signs(law, text):
+    assert laws.text(law) == text
+
+
+def test_laws_are_counted_by_family_on_the_trajectory_only():
+    kept = {"energy": Law(law="bounded", floor=1e-9), "angular_momentum": Law(law="linear")}
+    run = [record("Gauss(s=2, h=0.1)", laws=kept), record("Taylor()", laws=kept, violation="lost")]
+    assert laws.counts(run) == {"Gauss": {"bounded": 1}}
+    assert [row.invariant for row in laws.rows(run)] == ["energy", "angular_momentum"]
+
+
+def index_of(run):
+    made = Campaign(name="x", problems=["kepler()"], methods=[MethodEntry(use="Taylor()")])
+    return Index(
+        campaign=made, ids=[r.id for r in run], version="0", command="x", cases=[r.case for r in run]
+    )
+
+
+def test_fairness_counts_settings_and_names_what_was_left_out():
+    run = [record("Gauss(s=2, h=0.1)"), record("Taylor()", settings="default")]
+    fair = fairness.fairness(index_of([*run, record("IAS15()")]), run)
+    assert fair.equal == 1
+    assert [(f.family, f.kinds) for f in fair.families] == [
+        ("Gauss", {"recommended": 1}),
+        ("Taylor", {"default": 1}),
+    ]
+    assert fair.families[1].version == "7.13"
+    assert [(e.method, e.kind) for e in fair.excluded] == [("IAS15()", "missing")]
+    assert "every method has 1 setting" in fairness.sentences(run)[0]
+    unequal = [*run, record("Gauss(s=4, h=0.1)")]
+    assert "Gauss 2, Taylor 1" in fairness.sentences(unequal)[0]
+    assert fairness.fairness(index_of(unequal), unequal).equal is None
+
+
+def test_times_of_a_busy_machine_are_doubtful():
+    def timed(share, calibration):
+        one = TimingRound(
+            samples=[1.0], repeats=1, compile=Compile(seconds=0.0, cached=None), share=share,
+            calibration=calibration,
+        )  # fmt: skip
+        return record("Taylor()", timing=Timing(rounds=[one]))
+
+    assert fairness.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
+    assert "disturbed" in fairness.doubts([timed(0.5, [])])[0]
+    assert "not steady" in fairness.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
+    assert "No times" in fairness.doubts([record("Taylor()")])[0]
+    slow = record("Radau(rtol=1, atol=1)", outcome="timeout", status="", metrics={})
+    assert "time limit ended 1 cases (Radau 1)" in " ".join(fairness.doubts([slow]))
