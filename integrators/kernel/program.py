@@ -17,7 +17,6 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
-from integrators.legendre import legendre
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
@@ -263,6 +262,8 @@ class AdaptiveProgram(HBVMProgram):
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
         started = binary.clock()
+        from integrators.legendre import legendre  # 50 digits, which take their time to be imported
+
         self.tol, self.defect, self.first = tol, defect, h
         self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps
         c = self.constants
