@@ -196,7 +196,7 @@ class _Work:
         context.strategy = self.program.solver.strategy
         context.wanted = context.slow = 0
         context.t0, context.h = self.t0, self.h
-        engine.kernel(engine.RESET, context.address, *[0] * 7, start.ctypes.data)
+        engine.kernel(engine.RESET, context.address, out=start.ctypes.data)
 
     def _report(self, i: int, ctx: Context) -> None:
         result = self.result

@@ -145,7 +145,7 @@ class HBVMStepper:
         self._uncounted = ctx.steps  # steps that are not of this trajectory
         ctx.t0 = t0
         self._first_length(t0)
-        self._engine(engine.RESET, ctx.address, *[0] * 7, y.ctypes.data)
+        self._engine(engine.RESET, ctx.address, out=y.ctypes.data)
 
     def _first_length(self, t0: float) -> None:
         """Set the length of the first step from t0."""

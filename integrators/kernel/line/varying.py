@@ -79,7 +79,7 @@ def first_length(m):
 
 @compiled
 def ready(m):
-    """Solve the step ahead with a length that the tolerance allows; H is its length."""
+    """Solve the step ahead with a length that the tolerance allows; `Trajectory.h` is its length."""
     if m.solved:
         return DONE
     t = m.t0 + m.time_low

@@ -148,7 +148,7 @@ def take_over(ctx):
 
 @compiled
 def learn(ctx):
-    """Set HELD, the steps to wait for the implicit solver, when that has given way to the fixed point again.
+    """Set `Context.held`, the steps to wait for the implicit solver, when that has given way again.
 
     If it did so as soon as it might, steps have not become longer.
     """
@@ -173,7 +173,7 @@ def remaining(ctx, t):
 
 @compiled
 def within(ctx, h):
-    """Return the length of a step, no longer than LONGEST and not beyond STOP."""
+    """Return the length of a step, no longer than `Context.longest` and not beyond `Context.stop`."""
     longest, stop = ctx.longest, ctx.stop
     if abs(h) > longest:
         h = longest if h > 0.0 else -longest
@@ -186,7 +186,7 @@ def within(ctx, h):
 
 @compiled
 def ready(ctx):
-    """Solve the step ahead with a length that the tolerance allows; H is its length."""
+    """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
     if ctx.solved:
         return DONE
     if ctx.slow >= max(ctx.held, HELD_BACK_STEPS):
