@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from integrators.kernel.context import ALWAYS_IMPLICIT, DENSE, DONE, LAND, SIDE, Context, Shape
 from integrators.kernel.native import engine
+from integrators.kernel.step.engine import steps
 from integrators.kernel.stepper import HBVMStepper, Program, failure
 from integrators.options import Count
 from integrators.pace import Pace
@@ -157,7 +158,7 @@ class _Work:
             while made < times.size:
                 try:
                     with pace:
-                        made = engine.kernel(
+                        made = steps(
                             engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
                             times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
                             made, y[group[0] :].ctypes.data, pace.steps,
@@ -196,7 +197,7 @@ class _Work:
         context.strategy = self.program.solver.strategy
         context.wanted = context.slow = 0
         context.t0, context.h = self.t0, self.h
-        engine.kernel(engine.RESET, context.address, out=start.ctypes.data)
+        steps(engine.RESET, context.address, out=start.ctypes.data)
 
     def _report(self, i: int, ctx: Context) -> None:
         result = self.result

@@ -10,12 +10,14 @@ from integrators.caveats import sees_kinks
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
-from integrators.kernel.native import binary, engine
+from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
+from integrators.kernel.step.engine import steps
 from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
@@ -80,7 +82,7 @@ class HBVMProgram:
         lanes = tables.lanes_for(k)
         self.constants = tables.constants(k, s, self.second, lanes)
         self.field = field_of(system, "force" if self.second else "field", lanes)
-        kernel = engine.kernel.code()
+        kernel = steps.code()
         block, group = blocks(system)
         rows = system.dim
         if self.second:
@@ -179,7 +181,7 @@ class HBVMProgram:
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
         if self._linearization is None:
-            made = engine.implicit.code()
+            made = solver_engine.solver.code()
             self._linearization = linearization(self.system, second=self.second)
             self.from_cache = self.from_cache and made.from_cache
         return Workspace(self.shape, self.solver.kind, self._linearization)

@@ -24,8 +24,10 @@ from integrators.kernel.context import (
     UNDERFLOW,
     Context,
 )
+from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.native import engine
+from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.one_thread import one_thread
 from integrators.options import SHORTEST
@@ -114,7 +116,7 @@ class HBVMStepper:
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = ("values", "strict", "floored")
     _state: ClassVar[tuple[str, str]] = ("state", "error")
-    _engine: ClassVar[engine.Engine] = engine.kernel
+    _engine: ClassVar[engine.Engine] = steps
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
@@ -246,7 +248,7 @@ class HBVMStepper:
         if self._implicit is None:
             self._implicit = (self._program.implicit(), self._program.implicit())
             for context, workspace in zip((self._context, self._side), self._implicit, strict=True):
-                context.solver = engine.implicit.code().address
+                context.solver = solver_engine.solver.code().address
                 context.solver_memory = workspace.address
                 context.point({"increment": workspace.increment})
         return self._implicit

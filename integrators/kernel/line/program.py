@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from integrators.kernel.context import blocks
 from integrators.kernel.line.dependence import independent
+from integrators.kernel.line.engine import steps
 from integrators.kernel.line.memory import INVARIANTS, POISSON, Trajectory
 from integrators.kernel.line.stepper import LineStepper, VaryingLineStepper
-from integrators.kernel.native import binary, engine
+from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
 from integrators.kernel.stepper import HBVMStepper
 from integrators.legendre import tables
@@ -73,7 +74,7 @@ class LineProgram:
             self.values = parts[1].address
             self.slopes = what
         self.field = parts[0].address
-        parts.append(engine.line.code())
+        parts.append(steps.code())
         self.block, self.group = blocks(system)
         self.order, self.ends = order_of_sums(system)
         self.tables = _shared(k, s)

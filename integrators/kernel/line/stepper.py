@@ -3,8 +3,9 @@
 from typing import Any, ClassVar
 
 from integrators.kernel.context import SIDE
+from integrators.kernel.line.engine import steps
 from integrators.kernel.line.memory import NOT_KEPT, Trajectory
-from integrators.kernel.native import engine
+from integrators.kernel.native.engine import Engine
 from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
 from integrators.protocol import Array, Samples, Stats, Status
 from integrators.times import Counts
@@ -15,7 +16,7 @@ class _OfLine(HBVMStepper):
 
     _program: Any
     _context: Trajectory
-    _engine: ClassVar[engine.Engine] = engine.line
+    _engine: ClassVar[Engine] = steps
     _state = ("y", "e")
     _arrays = ("previous", "reference", "active")
     _words = (
