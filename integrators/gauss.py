@@ -104,7 +104,7 @@ class Gauss(MethodBase):
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
         if self.tol is not None:
-            from integrators.kernel.adaptive.program import AdaptiveProgram
+            from integrators.kernel.program import AdaptiveProgram
 
             return AdaptiveProgram(
                 system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,

@@ -219,7 +219,7 @@ class HBVM(MethodBase):
 
             return LineProgram(system, k=k, s=s, h=self.h, tol=self.tol)
         if self.tol is not None:
-            from integrators.kernel.adaptive.program import AdaptiveProgram
+            from integrators.kernel.program import AdaptiveProgram
 
             return AdaptiveProgram(
                 system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, **self.control()

@@ -23,7 +23,7 @@ import problems.registry
 from hbvm_bench.campaign.file import Case, Checks
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
-from integrators.kernel import store as kept
+from integrators.kernel.native import store as kept
 from integrators.protocol import MethodBase
 from problems import emit
 from problems.errors import InputError

@@ -7,7 +7,7 @@ from typing import Any
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
-from integrators.kernel import field
+from integrators.kernel.native import field
 from problems import emit
 from problems.problem import Problem
 

@@ -10,14 +10,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel import engine, layout
-from integrators.kernel.stepper import failure
-from integrators.kernel.workspace import Context
+from integrators.kernel.context import ALWAYS_IMPLICIT, DENSE, DONE, LAND, SIDE, Context, Shape
+from integrators.kernel.native import engine
+from integrators.kernel.step.engine import steps
+from integrators.kernel.stepper import HBVMStepper, Program, failure
 from integrators.options import Count
 from integrators.pace import Pace
 from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
@@ -25,11 +26,8 @@ from integrators.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown
 
-if TYPE_CHECKING:
-    from integrators.kernel.program import HBVMProgram
-
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
-SAMPLINGS = {"side": layout.SIDE, "land": layout.LAND, "dense": layout.DENSE}
+SAMPLINGS = {"side": SIDE, "land": LAND, "dense": DENSE}
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +44,15 @@ class Batch(Trajectories):
     evaluations: Counts
 
 
+class BatchProgram(Program, Protocol):
+    """What a batch asks of its program."""
+
+    varying: bool
+    shape: Shape
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
+
+
 def members_for(rows: int, route: int) -> int:
     """Return how many trajectories to take through their steps together.
 
@@ -57,7 +64,7 @@ def members_for(rows: int, route: int) -> int:
 
 
 def prepare_batch(
-    program: "HBVMProgram",
+    program: BatchProgram,
     Y0: ArrayLike,
     par: ArrayLike | None,
     times: ArrayLike,
@@ -88,7 +95,7 @@ def prepare_batch(
 def _done(work: "_Work", threads: int) -> Batch:
     program, result = work.program, work.result
     n = len(result.status)
-    if program.varying or program.solver.strategy == layout.ALWAYS_IMPLICIT:
+    if program.varying or program.solver.strategy == ALWAYS_IMPLICIT:
         work.share(work.alone, range(n), threads)
         return result
     size = min(n, members_for(program.shape.rows, program.constants.route))
@@ -102,7 +109,7 @@ def _done(work: "_Work", threads: int) -> Batch:
 class _Work:
     """A batch under way; groups of its trajectories may run on several threads."""
 
-    program: "HBVMProgram"
+    program: BatchProgram
     result: Batch
     starts: Array
     parameters: Array
@@ -151,7 +158,7 @@ class _Work:
             while made < times.size:
                 try:
                     with pace:
-                        made = engine.call(
+                        made = steps(
                             engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
                             times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
                             made, y[group[0] :].ctypes.data, pace.steps,
@@ -162,7 +169,7 @@ class _Work:
                 if self.stop.is_set():
                     return
             for member, i in enumerate(group):
-                if broken or contexts[member].words[layout.WANTED]:
+                if broken or contexts[member].wanted:
                     self.alone(i)
                 else:
                     self._report(i, contexts[member])
@@ -186,21 +193,19 @@ class _Work:
         result.evaluations[i] = stats.evaluations or 0
 
     def _reset(self, context: Context, start: Array) -> None:
-        for slot in (layout.STEPS, layout.ITERATIONS, layout.EVALUATIONS, layout.RESTARTS, layout.PARTIAL):
-            context.words[slot] = 0
-        context.words[layout.STRATEGY] = self.program.solver.strategy
-        for slot in (layout.WANTED, layout.SLOW):
-            context.words[slot] = 0
-        context.reals[layout.T0], context.reals[layout.H] = self.t0, self.h
-        engine.call(engine.RESET, context.address, start.ctypes.data)
+        context.steps = context.iterations = context.evaluations = context.restarts = context.partial = 0
+        context.strategy = self.program.solver.strategy
+        context.wanted = context.slow = 0
+        context.t0, context.h = self.t0, self.h
+        steps(engine.RESET, context.address, out=start.ctypes.data)
 
-    def _report(self, i: int, context: Context) -> None:
-        words, reals, result = context.words, context.reals, self.result
-        result.steps[i] = words[layout.STEPS]
-        result.iterations[i] = words[layout.ITERATIONS]
-        result.evaluations[i] = words[layout.EVALUATIONS]
-        if words[layout.OUTCOME] != layout.DONE:
-            t = float(reals[layout.T0]) + int(words[layout.N]) * float(reals[layout.H])
-            result.y[i, words[layout.MADE] :] = np.nan
+    def _report(self, i: int, ctx: Context) -> None:
+        result = self.result
+        result.steps[i] = ctx.steps
+        result.iterations[i] = ctx.iterations
+        result.evaluations[i] = ctx.evaluations
+        if ctx.outcome != DONE:
+            t = ctx.t0 + ctx.n * ctx.h
+            result.y[i, ctx.made :] = np.nan
             result.t_stop[i] = t
-            result.status[i], result.reason[i] = failure(int(words[layout.OUTCOME]), t, reals)
+            result.status[i], result.reason[i] = failure(ctx.outcome, ctx, t)

@@ -15,9 +15,10 @@ from time import perf_counter
 import numpy as np
 
 import problems
-from integrators.kernel import layout, native
-from integrators.kernel.field import assembly
+from integrators.kernel.native import binary
+from integrators.kernel.native.field import assembly
 from integrators.kernel.program import HBVMProgram
+from integrators.kernel.tables import WIDE
 from problems import emit
 from problems.problem import Problem
 
@@ -120,14 +121,14 @@ def _say(problem: Problem, k: int, s: int, h: float) -> None:
     print(f"  field    {lanes * plain} flops" + (f", {others}" if others else ""))
     if constants.route in (8, 16):
         print(f"  product  {2 * shape.rows * constants.route * lanes} flops")
-    elif constants.route == layout.WIDE:
+    elif constants.route == WIDE:
         print(f"  product  {2 * shape.rows * lanes * lanes} flops")
     else:
         modes = 8 * -(-(s + constants.first) // 8)
         print(f"  product  {4 * shape.rows * lanes * modes} flops, through {s} coefficients")
     cost = measure(problem, k, s, h)
     print(f"  measured {cost.iteration:.1f} ns per iteration, {cost.iterations:.1f} iterations per step,")
-    print(f"           {cost.step:.0f} ns per step besides ({native.processor()})")
+    print(f"           {cost.step:.0f} ns per step besides ({binary.processor()})")
 
 
 def main() -> None:

@@ -1,25 +1,50 @@
-"""HBVM(k, s) compiled for one system: a `Program` over the compiled kernel."""
+"""HBVM(k, s) compiled for one system, with steps of one length or of varying length: a `Program`."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel import engine, layout, native, tables
-from integrators.kernel import field as fields
+from integrators.caveats import sees_kinks
+from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
-from integrators.kernel.foreign import field_of
+from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
-from integrators.kernel.implicit.workspace import solver as implicit_solver
-from integrators.kernel.stepper import HBVMStepper
-from integrators.kernel.workspace import Context, Shape
+from integrators.kernel.native import binary
+from integrators.kernel.native import field as fields
+from integrators.kernel.native.foreign import field_of
+from integrators.kernel.native.memory import aligned
+from integrators.kernel.step import fused
+from integrators.kernel.step.engine import steps
+from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
 from integrators.protocol import Array, check_parameters, check_start, check_state
-from integrators.times import Counts
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
 
 TOLERANCE = 1e-16
+
+FIRST_RATE = 0.01
+
+MARGIN = 0.82
+"""Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
+
+Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
+much as one that is taken: with 1 a fifth of the steps are rejected and all problems of the
+race take 5 to 20 % longer.
+"""
+
+OF_A_BODY, OF_A_COMPONENT = 1e-6, 1e-4
+"""What the field of a block counts as at least, as a part of the largest in its group.
+
+A light body is an object of its own; single components next to nodes or turning points
+of a lattice are moved by the others' rounding.
+"""
+
+UNSEEN = 1e-12
+"""Part of a block's size that the error at a kink of the field may always be."""
 
 
 class HBVMProgram:
@@ -47,7 +72,7 @@ class HBVMProgram:
     def __init__(
         self, system: System, *, k: int, s: int, h: float, form: str | None = None, solver: str = "auto"
     ):
-        started = native.clock()
+        started = binary.clock()
         self.system = system
         self.h = h
         self.solver, self._named = SOLVERS[solver], solver
@@ -57,7 +82,7 @@ class HBVMProgram:
         lanes = tables.lanes_for(k)
         self.constants = tables.constants(k, s, self.second, lanes)
         self.field = field_of(system, "force" if self.second else "field", lanes)
-        kernel = engine.kernel()
+        kernel = steps.code()
         block, group = blocks(system)
         rows = system.dim
         if self.second:
@@ -79,15 +104,15 @@ class HBVMProgram:
             made.from_cache for made in (self.field, kernel, self.fused) if made is not None
         )
         self._linearization: Linearization | None = None
-        if self.solver.strategy == layout.ALWAYS_IMPLICIT:
+        if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
-        self.compile_seconds = native.clock() - started
+        self.compile_seconds = binary.clock() - started
 
-    def _sweeps(self, rows: int, lanes: int) -> native.Native | None:
+    def _sweeps(self, rows: int, lanes: int) -> binary.Native | None:
         """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
-        if rows > fields.FUSED_ROWS or self.constants.route not in (8, 16) or not self.lanes:
+        if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
-        return fields.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
+        return fused.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
 
     @property
     def description(self) -> str:
@@ -156,7 +181,7 @@ class HBVMProgram:
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
         if self._linearization is None:
-            made = implicit_solver()
+            made = solver_engine.solver.code()
             self._linearization = linearization(self.system, second=self.second)
             self.from_cache = self.from_cache and made.from_cache
         return Workspace(self.shape, self.solver.kind, self._linearization)
@@ -172,17 +197,17 @@ class HBVMProgram:
         """Return fresh memory for a trajectory, or for its partial steps."""
         if side not in self._fresh:
             scaled = self.scaled(self.h)
-            shared = {"PROJECTION": scaled["PROJECTION"]} if side else scaled
+            shared = {"projection": scaled["projection"]} if side else scaled
             made = Context(self.shape, {**self._fixed, **shared})
-            made.reals[layout.TOLERANCE] = TOLERANCE
+            made.tolerance = TOLERANCE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
     def load(self, context: Context, par: Array) -> None:
         """Put parameters, and the velocities that follow from them, into a context."""
-        context["PAR"][:] = par
+        context.par[:] = par
         if self.second:
-            context["VELOCITY"][: self.shape.rows] = self._velocity(par)
+            context.velocity[: self.shape.rows] = self._velocity(par)
 
     def _velocity(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
@@ -196,18 +221,125 @@ class HBVMProgram:
         return velocity
 
 
-def blocks(system: System) -> tuple[Counts, Counts]:
-    """Return the block of each component, and the group (q or p) of each block.
+class AdaptiveProgram(HBVMProgram):
+    """HBVM(k, s) with steps as long as a tolerance allows, compiled for one system.
 
-    The change of an iteration is measured relative to the size of a block: the
-    coordinates or momenta of one body, where the system says that it has bodies, so
-    that a planetoid's tiny momentum is resolved, and else every component by itself.
+    Parameters
+    ----------
+    system : System
+        What to integrate.
+    k, s : int
+        Stages and degree, k >= s >= 1, k > 1.
+    tol : float
+        Local error per step, relative to the size of each block of the state.
+    defect : float, optional
+        The same for the error of the quadrature, by which the energy changes; by default any.
+    h : float, optional
+        Length of the first step.
+    solver : {"auto", "fixed_point", "newton", "blended"}, optional
+        How the stage equations are solved; see `integrators.hbvm.HBVM`.
+    max_step : float, optional
+        Length that no step exceeds.
+    breakpoints : sequence of float, optional
+        Times that steps end at, ascending.
+    max_steps : int, optional
+        Steps of a trajectory, at most.
     """
-    dim, dof = system.dim, system.dof
-    bodies = getattr(system, "bodies", None)
-    width = bodies.dimension if bodies is not None else 1
-    block = np.arange(dim) // width
-    group = np.zeros(dim // width, dtype=np.int64)
-    if dof is not None:
-        group[dof // width :] = 1
-    return block, group
+
+    varying = True
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        k: int,
+        s: int,
+        tol: float,
+        defect: float | None = None,
+        h: float | None = None,
+        solver: str = "auto",
+        max_step: float | None = None,
+        breakpoints: Sequence[float] = (),
+        max_steps: int | None = None,
+    ):
+        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
+        started = binary.clock()
+        from integrators.legendre import legendre  # 50 digits, which take their time to be imported
+
+        self.tol, self.defect, self.first = tol, defect, h
+        self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps
+        c = self.constants
+        if c.route != tables.THROUGH:
+            # What rounding does to a row acts in every step; see `integrators.kernel.tables`.
+            a = c.arrays
+            raw = tables.keep_moments(a["matrix"], a["matrix_low"], a["basis"])
+            columns = c.route if c.route > 1 else None
+            self._fixed["raw_matrix"] = tables.packed(raw, columns=columns, repeat=True)
+        # P_s vanishes at the nodes of the rule with s nodes.
+        self.degree = s if k > s else s - 1
+        basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
+        m = self.degree
+        middle = max(1, (k - 4) // 2)
+        degrees = [0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1]
+        degrees += [min(middle, k - 1), min(middle + 1, k - 1)]
+        rows = [*basis.T[degrees], *(basis @ legendre(np.array([0.0, 1.0]), k).T).T]
+        self._estimators = aligned(len(rows) * 8 * -(-k // 8))
+        self._estimators.reshape(len(rows), -1)[:, :k] = rows
+        # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
+        self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
+        self._doubt, self._slowest = _decays(k, m, tol, middle, sees_kinks(k, system))
+        self.compile_seconds += binary.clock() - started
+
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        c = self.constants
+        return (
+            f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
+            f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self.breakpoints.tolist()!r}, "
+            f"max_steps={self.max_steps!r})"
+        )
+
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
+        """Return a stepper at ``t0``; as `HBVMProgram.start`."""
+        values = check_parameters(par, self.system)
+        return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+
+    def context(self, *, side: bool = False) -> Context:
+        """Return fresh memory for a trajectory, or for its partial steps."""
+        context = super().context(side=True)  # with a matrix of its own
+        context.point({"estimators": self._estimators})
+        context.varying = 1
+        context.error_degree = self.degree
+        context.allowed_error = self.tol
+        bodies = getattr(self.system, "bodies", None) is not None
+        context.least_slope = OF_A_BODY if bodies else OF_A_COMPONENT
+        context.allowed_defect = math.inf if self.defect is None else self.defect
+        context.error_aim = math.log(self.tol) / (2 * self.degree + 1) + math.log(MARGIN)
+        context.error_decay = self.tol ** (0.5 / self.degree)
+        if self.defect is not None:
+            last = self.constants.k - 1
+            context.defect_aim = math.log(self.defect) / (2 * last + 1) + math.log(MARGIN)
+            context.defect_decay = self.defect ** (0.5 / last)
+        context.doubt, context.slowest_decay = self._doubt, self._slowest
+        context.negligible = self._negligible
+        context.longest = math.inf if self.max_step is None else self.max_step
+        context.stop = context.length_limit = math.inf
+        context.log_rate = math.log(FIRST_RATE)
+        return context
+
+
+def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float, float]:
+    """Return `Context.doubt` and `Context.slowest_decay`, which tell a smooth field from one with a kink.
+
+    Where the error is the tolerance, coefficients of a smooth field fall off by
+    ``tol^(1/2m)`` from one degree to the next. Those of a kink fall off like 1/j^2, from the
+    middle ones, of degrees ``middle`` and the next, to the last one. Infinite where
+    nobody ``looks``.
+    """
+    if not looks:
+        return math.inf, math.inf
+    smooth, last = tol ** (0.5 / m), k - 1
+    at_a_kink = ((middle + 0.5) / last) ** 2
+    doubt = min(10.0 * smooth ** (last - min(3, m - 1)), 0.1 / last**2)
+    return doubt, max(at_a_kink / 4.0, 6.0 * smooth ** (last - middle - 1))

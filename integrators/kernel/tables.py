@@ -17,11 +17,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel import layout as at
-from integrators.kernel import native, store
+from integrators.kernel.native import binary, store
+from integrators.kernel.native.memory import aligned
 from problems.analysis.double_double import DD
 
 Array = NDArray[np.float64]
+
+# Routes of a product that are not a number of columns: a larger matrix, and by way of coefficients.
+WIDE, THROUGH = 0, 1
 
 MODES = 13  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 MOMENTS = 3
@@ -44,7 +47,7 @@ class Constants:
     second : bool
         Whether for the second-order form.
     route : int
-        How a product is done; see `layout`.
+        How a product is done: a number of columns, `WIDE` or `THROUGH`.
     columns : int
         Of the matrix.
     arrays : dict of str to ndarray
@@ -64,7 +67,7 @@ class Constants:
     @property
     def first(self) -> int:
         """Coefficients that come before gamma_0: on the route THROUGH the first ones are there twice."""
-        return min(MOMENTS, self.s) if self.route == at.THROUGH else 0
+        return min(MOMENTS, self.s) if self.route == THROUGH else 0
 
 
 def lanes_for(k: int) -> int:
@@ -73,11 +76,11 @@ def lanes_for(k: int) -> int:
 
 
 def route_for(k: int, s: int, lanes: int) -> int:
-    """Return the cheapest route of a product; see `layout`."""
+    """Return the cheapest route of a product."""
     if k <= lanes:
         return lanes
     chunks, modes = _up(k) // 8, _up(s + MOMENTS) // 8
-    return at.THROUGH if 2 * modes < chunks else at.WIDE
+    return THROUGH if 2 * modes < chunks else WIDE
 
 
 @lru_cache(maxsize=64)
@@ -92,7 +95,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     name = store.key(
         "tables",
         f"{k} {s} {second} {route}",
-        native.sources("tables", "../legendre", "../../problems/analysis/double_double"),
+        binary.sources("tables", "../legendre", "../../problems/analysis/double_double"),
     )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
@@ -110,7 +113,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
 
 def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
     modes = min(k, MODES)
-    inner = s if route == at.THROUGH else k
+    inner = s if route == THROUGH else k
     return [(k, 1)] * 6 + [(k, inner)] * 2 + [(s, k), (modes, k), (k, modes), (k, min(MOMENTS, k))]
 
 
@@ -121,7 +124,7 @@ def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
     modes = min(k, MODES)
     integrals = t.double_integrals if second else t.integrals
     matrix = (integrals.hi, integrals.lo)
-    if route != at.THROUGH:
+    if route != THROUGH:
         matrix = _product(matrix, (t.projection.hi, t.projection.lo))
     basis = legendre.legendre(t.nodes.hi, max(modes, MOMENTS))
     return {
@@ -190,7 +193,7 @@ def unit(constants: Constants, velocity: Array) -> bool:
 
 
 def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]:
-    """Return MATRIX, EXTRAPOLATION and PROJECTION for the step h, in the kernel's layout.
+    """Return ``matrix``, ``extrapolation`` and ``projection`` for the step h, as `Context` has them.
 
     Parameters
     ----------
@@ -207,7 +210,7 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
     if squared:
         high, low = _times(high, low, h)
     projection = a["projection"]
-    if constants.route == at.THROUGH:
+    if constants.route == THROUGH:
         # What rounding takes from the first columns goes into columns of its own, before
         # the others, so that a chain of products holds it before it is rounded.
         first = constants.first
@@ -219,29 +222,29 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         extrapolation = high @ a["beyond"] @ a["into_modes"]
     columns = constants.route if constants.route > 1 else None
     return {
-        "MATRIX": packed(matrix, columns=columns, repeat=True),
-        "EXTRAPOLATION": packed(extrapolation, columns=columns, repeat=True),
-        "PROJECTION": packed(projection),
+        "matrix": packed(matrix, columns=columns, repeat=True),
+        "extrapolation": packed(extrapolation, columns=columns, repeat=True),
+        "projection": packed(projection),
     }
 
 
 def fixed(constants: Constants) -> dict[str, Array]:
-    """Return the tables that do not depend on the step, in the kernel's layout."""
+    """Return the tables that do not depend on the step, as `Context` has them."""
     a = constants.arrays
     columns = constants.route if constants.route > 1 else None
     raw = a["matrix"]
-    if constants.route == at.THROUGH:
+    if constants.route == THROUGH:
         raw = np.hstack([np.zeros((constants.k, constants.first)), raw])
     return {
-        "RAW_MATRIX": packed(raw, columns=columns, repeat=True),
-        "MODE_PROJECTION": packed(a["into_modes"]),
-        "NODES": _vector(a["nodes"], repeat=True),
-        "NODES_LOW": _vector(a["nodes_low"], repeat=True),
-        "WEIGHTS": _vector(a["weights"]),
-        "WEIGHTS_LOW": _vector(a["weights_low"]),
-        "POSITION_WEIGHTS": _vector(a["position_weights"]),
-        "POSITION_WEIGHTS_LOW": _vector(a["position_weights_low"]),
-        "RECURRENCE": _recurrence(constants.modes),
+        "raw_matrix": packed(raw, columns=columns, repeat=True),
+        "mode_projection": packed(a["into_modes"]),
+        "nodes": _vector(a["nodes"], repeat=True),
+        "nodes_low": _vector(a["nodes_low"], repeat=True),
+        "weights": _vector(a["weights"]),
+        "weights_low": _vector(a["weights_low"]),
+        "position_weights": _vector(a["position_weights"]),
+        "position_weights_low": _vector(a["position_weights_low"]),
+        "recurrence": _recurrence(constants.modes),
     }
 
 
@@ -265,13 +268,6 @@ def _product(left: tuple[Array, Array], right: tuple[Array, Array]) -> tuple[Arr
     for j in range(left[0].shape[1]):
         total = total + DD(left[0][:, j : j + 1], left[1][:, j : j + 1]) * DD(right[0][j], right[1][j])
     return total.hi, total.lo
-
-
-def aligned(n: int) -> Array:
-    """Return n zeros at an address that is a multiple of 64."""
-    room = np.zeros(n + 8)
-    start = (-room.ctypes.data % 64) // 8
-    return room[start : start + n]
 
 
 def _up(n: int) -> int:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from integrators.kernel import native, store
+from integrators.kernel.native import binary, store
 from problems.emit import cache
 
 from .fault import Fault, is_met
@@ -20,7 +20,7 @@ OBTAIN = textwrap.dedent(
     """
     import os, sys, time
     from pathlib import Path
-    from integrators.kernel import native
+    from integrators.kernel.native import binary
 
     def make():
         log = os.open(sys.argv[1], os.O_WRONLY | os.O_APPEND | os.O_CREAT)
@@ -28,10 +28,10 @@ OBTAIN = textwrap.dedent(
         time.sleep(float(sys.argv[2]))
         return " ", b"code"
 
-    native.load = len
+    binary.load = len
     print("ready", flush=True)
-    started = native.clock()
-    print(native.obtain("some key", make).from_cache, native.clock() - started < 1.0, flush=True)
+    started = binary.clock()
+    print(binary.obtain("some key", make).from_cache, binary.clock() - started < 1.0, flush=True)
     """
 )
 
@@ -127,6 +127,6 @@ def test_generated_code_without_a_place_is_a_sentence(tmp_path, monkeypatch):
 
 def test_a_kernel_is_compiled_under_a_lock(tmp_path, monkeypatch):
     monkeypatch.setenv(cache.VARIABLE, str(tmp_path))
-    monkeypatch.setattr(native, "load", len)
-    assert not native.obtain("a key of this test", lambda: (" ", b"code")).from_cache
+    monkeypatch.setattr(binary, "load", len)
+    assert not binary.obtain("a key of this test", lambda: (" ", b"code")).from_cache
     assert len(list((tmp_path / "locks").iterdir())) == 1

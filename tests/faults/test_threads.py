@@ -11,7 +11,8 @@ import pytest
 
 import problems
 from integrators import HBVM, LineIntegral, registry
-from integrators.kernel import engine, foreign, layout, program
+from integrators.kernel import program
+from integrators.kernel.native import engine, foreign
 from integrators.protocol import Status
 from tests.faults.fault import Fault, is_met
 
@@ -49,7 +50,7 @@ def test_memory_is_there_for_other_threads_only_when_it_is_complete():
 
     class Watched(dict):
         def __setitem__(self, key, value):
-            seen.append(value.reals[layout.TOLERANCE])
+            seen.append(value.tolerance)
             super().__setitem__(key, value)
 
     made._fresh = Watched()
@@ -167,7 +168,7 @@ def test_a_stepper_at_work_is_refused_to_another_thread(method):
 FORK = """
 import os, threading, time, problems
 from integrators import HBVM
-from integrators.kernel import native
+from integrators.kernel.native import binary
 
 started = threading.Event()
 
@@ -177,7 +178,7 @@ def compile_something():
         time.sleep(0.3)
         raise LookupError
     try:
-        native.obtain("0" * 64, make)
+        binary.obtain("0" * 64, make)
     except LookupError:
         pass
 

@@ -6,14 +6,16 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel import native, store
-from integrators.kernel.implicit.layout import BLENDED
+from integrators.kernel.native import binary, store
 from integrators.kernel.tables import Constants, constants
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MOST_EIGENVECTORS = 22  # degree up to which X_s has eigenvectors to speak of: their condition is 1e12 there
+NEWTON, BLENDED = range(2)
+"""How corrections are computed."""
+
 LOW = 3
 
 
@@ -85,7 +87,7 @@ def _tables(k: int, s: int) -> tuple[Array, Array, Array, Array]:
     """Return integrals, the low parts of their first columns, the basis and X_s, kept on disk."""
     shapes = [(k, s), (k, min(LOW, s)), (k, s), (s, s)]
     ends = np.cumsum([rows * columns for rows, columns in shapes])
-    name = store.key("implicit", f"{k} {s}", native.sources("implicit/constants", "../legendre"))
+    name = store.key("implicit", f"{k} {s}", binary.sources("implicit/constants", "../legendre"))
     kept = store.get(name)
     if kept is None or len(kept) != 8 * ends[-1]:
         import integrators.legendre as legendre  # 50 digits, which take their time to be imported

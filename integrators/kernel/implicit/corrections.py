@@ -19,21 +19,21 @@ E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, Springer
 implicit methods for ODEs*, Applied Numerical Mathematics 42 (2002) 29-45.
 """
 
-from integrators.kernel import layout as at
-from integrators.kernel.implicit import layout as of
+from integrators.kernel.context import DIVERGED, DONE, NOT_FINITE
+from integrators.kernel.implicit.constants import BLENDED
 from integrators.kernel.implicit.jacobian import factorize, linearize, resolve
 from integrators.kernel.implicit.linear import factor, solve
-from integrators.kernel.implicit.stages import project, set_velocities, swap_stages
-from integrators.kernel.line.views import compiled
-from integrators.kernel.memory import get_float, get_int
-from integrators.kernel.products import evaluate, offset
+from integrators.kernel.implicit.stages import project, set_velocities
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.step.stages import offset
+from integrators.kernel.step.sweep import evaluate
 
 # Which Jacobian a correction takes: the one at hand, one at the mean of the stages, one at each stage.
 KEPT, MEAN, EACH = range(3)
 
 
 @compiled
-def newton(ctx, m, factors):
+def newton(ctx, m):
     """Set the correction from the residual: one complex system per pair of eigenvalues."""
     s, components = m.residual.shape
     for j in range(s):
@@ -46,7 +46,7 @@ def newton(ctx, m, factors):
                 a += m.left_re[i, j] * m.residual[j, d]
                 b += m.left_im[i, j] * m.residual[j, d]
             m.v_re[d], m.v_im[d] = a, b
-        resolve(ctx, m, factors, i)
+        resolve(ctx, m, i)
         for j in range(s):
             a, b = m.right_re[j, i], m.right_im[j, i]
             for d in range(components):
@@ -54,7 +54,7 @@ def newton(ctx, m, factors):
 
 
 @compiled
-def blended(ctx, m, factors):
+def blended(ctx, m):
     """Set the correction from the residual: theta twice, on two rows at a time as real and imaginary part."""
     s, components = m.residual.shape
     rho = m.eigen_re[0]
@@ -70,7 +70,7 @@ def blended(ctx, m, factors):
             m.v_re[d] = m.residual[i, d] - m.correction[i, d]
             m.v_im[d] = m.residual[j, d] - m.correction[j, d]
         for twice in range(2):
-            resolve(ctx, m, factors, 0)
+            resolve(ctx, m, 0)
             if twice == 0:
                 for d in range(components):
                     m.v_re[d] += m.correction[i, d]
@@ -83,47 +83,47 @@ def blended(ctx, m, factors):
 
 @compiled
 def take_stage(ctx, m, stage):
-    """Set `Memory.point` to one of the stages."""
-    lanes = get_int(ctx, at.LANES)
-    start = get_int(ctx, at.Q) + 8 * (stage // lanes) * get_int(ctx, at.PADDED) * lanes
-    for d in range(m.point.size):
-        m.point[d] = get_float(start, lanes * d + stage % lanes)
+    """Set `Workspace.state` to one of the stages."""
+    lanes = ctx.lanes
+    start = ctx.stages + (stage // lanes) * ctx.padded * lanes
+    for d in range(m.state.size):
+        m.state[d] = start[lanes * d + stage % lanes]
 
 
 @compiled
 def take_mean(ctx, m):
-    """Set `Memory.point` to the mean of the stages."""
-    lanes = get_int(ctx, at.LANES)
-    for d in range(m.point.size):
-        m.point[d] = 0.0
-    for chunk in range(get_int(ctx, at.CHUNKS)):
-        start = get_int(ctx, at.Q) + 8 * offset(ctx, chunk)
-        for d in range(m.point.size):
+    """Set `Workspace.state` to the mean of the stages."""
+    lanes = ctx.lanes
+    for d in range(m.state.size):
+        m.state[d] = 0.0
+    for chunk in range(ctx.chunks):
+        start = ctx.stages + offset(ctx, chunk)
+        for d in range(m.state.size):
             for l in range(8):
-                m.point[d] += m.weights[8 * chunk + l] * get_float(start, lanes * d + l)
+                m.state[d] += m.weights[8 * chunk + l] * start[lanes * d + l]
 
 
 @compiled
-def full(ctx, m, source):
+def full(ctx, m):
     """Set the correction with the Jacobian of every stage; return whether that is possible.
 
     One real matrix of s R rows; in the second-order form q' is eliminated.
     """
     s, rows = m.gamma.shape[0], m.factor.size
-    second = get_int(ctx, at.SECOND)
+    second = ctx.second
     first = rows if second else 0
-    h = get_float(ctx, at.H)
+    h = ctx.h
     n = s * rows
     for r in range(n):
         for c in range(n):
             m.whole_re[r, c], m.whole_im[r, c] = 0.0, 0.0
         m.whole_re[r, r] = 1.0
         m.whole_x[r], m.whole_y[r] = m.residual[r // rows, first + r % rows], 0.0
-    for stage in range(get_int(ctx, at.STAGES)):
+    for stage in range(ctx.k):
         take_stage(ctx, m, stage)
-        linearize(ctx, m, source, get_float(get_int(ctx, at.TIMES), stage))
+        linearize(ctx, m, ctx.times[stage])
         for e in range(m.entries.size):
-            r, c = m.rows[e], m.columns[e]
+            r, c = m.entry_rows[e], m.entry_columns[e]
             slope = m.entries[e] * m.factor[c]
             known = 0.0
             if second:
@@ -134,7 +134,7 @@ def full(ctx, m, source):
                 for i in range(s):
                     m.whole_re[j * rows + r, i * rows + c] -= part * m.reach[stage, i]
                 m.whole_x[j * rows + r] += m.moments[j, stage] * (h * m.entries[e] * known)
-    m.count[of.FACTORIZATIONS] += 1
+    m.factorizations += 1
     if not factor(m.whole_re, m.whole_im, m.whole_pivots, 0, n):
         return False
     solve(m.whole_re, m.whole_im, m.whole_pivots, 0, m.whole_x, m.whole_y)
@@ -147,7 +147,7 @@ def full(ctx, m, source):
                 total = 0.0
                 for j in range(s):
                     total += m.x[i, j] * m.correction[j, rows + d]
-                m.correction[i, d] = m.residual[i, d] + get_float(get_int(ctx, at.ROW_FACTOR), d) * total
+                m.correction[i, d] = m.residual[i, d] + ctx.row_factor[d] * total
     return True
 
 
@@ -157,7 +157,7 @@ def set_residual(ctx, m):
     s, components = m.gamma.shape
     evaluate(ctx)
     project(ctx, m, m.residual, components - m.factor.size)
-    if get_int(ctx, at.SECOND):
+    if ctx.second:
         for j in range(s):
             for d in range(m.factor.size, components):
                 m.correction[j, d] = m.gamma[j, d]
@@ -180,32 +180,32 @@ def is_finite(values):
 
 
 @compiled
-def correct(ctx, m, method, source, factors, which):
+def correct(ctx, m, which):
     """Correct gamma once; return DONE, DIVERGED or NOT_FINITE."""
     s, components = m.gamma.shape
-    m.count[of.TRIED] += 1
+    m.tried += 1
     set_residual(ctx, m)
     if not is_finite(m.residual):
-        return at.NOT_FINITE
+        return NOT_FINITE
     possible = True
-    if which == EACH and m.whole_x.size > 0:
-        possible = full(ctx, m, source)
+    if which == EACH and m.whole > 0:
+        possible = full(ctx, m)
     else:
         if which != KEPT:
             take_mean(ctx, m)
-            half = get_int(ctx, at.N) + 0.5
-            linearize(ctx, m, source, get_float(ctx, at.T0) + half * get_float(ctx, at.H))
-        if m.count[of.FACTORED] == 0:
-            possible = factorize(ctx, m, factors)
+            half = ctx.n + 0.5
+            linearize(ctx, m, ctx.t0 + half * ctx.h)
+        if m.factored == 0:
+            possible = factorize(ctx, m)
         if possible:
-            if method == of.BLENDED:
-                blended(ctx, m, factors)
+            if m.method == BLENDED:
+                blended(ctx, m)
             else:
-                newton(ctx, m, factors)
+                newton(ctx, m)
     if not possible:
-        return at.DIVERGED if is_finite(m.entries) else at.NOT_FINITE
+        return DIVERGED if is_finite(m.entries) else NOT_FINITE
     for j in range(s):
         for d in range(components):
             m.gamma[j, d] += m.correction[j, d]
-    swap_stages(ctx)
-    return at.DONE
+    ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
+    return DONE

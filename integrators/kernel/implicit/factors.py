@@ -1,17 +1,30 @@
 """Factors of large matrices, kept by SciPy and asked for by compiled code."""
 
 import ctypes
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel.implicit import layout as of
-
 Complex = NDArray[np.complex128]
 
+FACTORIZE, SOLVE = range(2)
+"""What is asked of the function at `Factors.address`."""
+
 DENSE = 0.3  # part of the entries that are stored from which a matrix is treated as dense
+
+
+class Matrices(Protocol):
+    """What of a solver's memory `Factors` works on; see `integrators.kernel.implicit.workspace`."""
+
+    entry_rows: Any
+    entry_columns: Any
+    entries: Any
+    factor: Any
+    eigen_re: Any
+    eigen_im: Any
+    b_re: Any
+    b_im: Any
 
 
 class Factors:
@@ -19,24 +32,24 @@ class Factors:
 
     Parameters
     ----------
-    arrays : mapping of str to ndarray
-        The arrays of the solver's `Memory`, by name.
+    arrays : Matrices
+        The solver's memory.
     second : bool
         Second-order form: the matrices are I - z_i^2 h^2 J diag(q'/p).
 
     Attributes
     ----------
     address : int
-        Of the C function ``int64(what, pair)`` that works on `Memory`.
+        Of the C function ``int64(what, pair)`` that works on it.
     error : BaseException or None
         What went wrong last in a call, which compiled code takes for a failure.
     """
 
-    def __init__(self, arrays: Mapping[str, Any], *, second: bool):
+    def __init__(self, arrays: Matrices, *, second: bool):
         self._arrays = arrays
         self._power = 2 if second else 1
-        rows, columns = arrays["rows"], arrays["columns"]
-        n = arrays["factor"].size
+        rows, columns = arrays.entry_rows, arrays.entry_columns
+        n = arrays.factor.size
         self._size = n
         self._solvers: list[Any] = []
         self.error: BaseException | None = None
@@ -48,7 +61,7 @@ class Factors:
 
     def _called(self, what: int, pair: int) -> int:
         try:
-            if what == of.FACTORIZE:
+            if what == FACTORIZE:
                 self._factorize()
             else:
                 self._solve(pair)
@@ -59,10 +72,10 @@ class Factors:
 
     def _factorize(self) -> None:
         a = self._arrays
-        slopes = a["entries"] * a["factor"][a["columns"]]
+        slopes = a.entries * a.factor[a.entry_columns]
         if not np.isfinite(slopes).all():
             raise FloatingPointError("the Jacobian is not finite")
-        values = (a["eigen_re"] + 1j * a["eigen_im"]) ** self._power
+        values = (a.eigen_re + 1j * a.eigen_im) ** self._power
         self._solvers = []
         for value in values:
             real = value.imag == 0.0
@@ -74,7 +87,7 @@ class Factors:
             from scipy.linalg import lu_factor, lu_solve
 
             matrix = np.eye(self._size, dtype=entries.dtype)
-            matrix[self._arrays["rows"], self._arrays["columns"]] += entries
+            matrix[self._arrays.entry_rows, self._arrays.entry_columns] += entries
             factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
             return lambda x: lu_solve(factors, x, check_finite=False)
         from scipy.sparse.linalg import splu
@@ -82,9 +95,9 @@ class Factors:
         return splu(self._pattern.matrix(entries)).solve
 
     def _solve(self, pair: int) -> None:
-        x_re, x_im = self._arrays["b_re"], self._arrays["b_im"]
+        x_re, x_im = self._arrays.b_re, self._arrays.b_im
         solve = self._solvers[pair]
-        if self._arrays["eigen_im"][pair] == 0.0:
+        if self._arrays.eigen_im[pair] == 0.0:
             x = solve(np.stack([x_re, x_im], axis=1))
             x_re[:], x_im[:] = x[:, 0], x[:, 1]
         else:

@@ -1,6 +1,6 @@
 """Factorization of small dense complex matrices, real and imaginary parts apart."""
 
-from integrators.kernel.line.views import compiled
+from integrators.kernel.native.jit import compiled
 
 
 @compiled

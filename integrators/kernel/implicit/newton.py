@@ -1,28 +1,26 @@
 """A step by an implicit solver: which start, which Jacobian, when to stop, when to give up."""
 
-from integrators.kernel import layout as at
-from integrators.kernel.implicit import layout as of
+from integrators.kernel.context import AUTO, BY_INCREMENT, DIVERGED, DONE, RUNNING, SCATTERED
+from integrators.kernel.implicit.constants import BLENDED, NEWTON
 from integrators.kernel.implicit.corrections import EACH, KEPT, correct
 from integrators.kernel.implicit.jacobian import contraction, linearize
 from integrators.kernel.implicit.stages import (
     FLOORED,
     STRICT,
     changes,
+    measure,
     project,
     set_factor,
     set_stages,
     set_values,
     set_velocities,
-    take_sizes,
 )  # fmt: skip
-from integrators.kernel.line.views import compiled
-from integrators.kernel.memory import get_float, get_int, put_float, put_int
-from integrators.kernel.step import FARTHEST, prepare, start_elsewhere
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.step.begin import FARTHEST, INFINITY, prepare, start_elsewhere
+from integrators.kernel.step.size import STAGNATION, is_rounding
 
 MOST_CORRECTIONS = 40
 MOST_BLENDED = 250
-STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
-ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
 PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION ...
 FALLING = 0.5  # ... unless the changes of all but the smallest components still decrease so fast
 FORESEEN = 0.1  # a change that is going to be this part of the tolerance need not be seen
@@ -34,84 +32,83 @@ OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is kn
 # with varying ones, which it may shorten a little.
 GENTLE, GENTLE_VARYING = 0.25, 0.5
 CALM = 1e-3  # sizes are measured until changes are this small
-SCATTERED = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
-INFINITY = float("inf")
+OFF = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
 
 
 @compiled
-def iterate(ctx, m, method, source, factors, which):
+def iterate(ctx, m, which):
     """Correct gamma, by the Jacobian that ``which`` tells, until the stages do not change.
 
     What ends the iteration is the change of the stages, relative to their blocks, as
-    in `integrators.kernel.solve`. Return DONE, DIVERGED, or NOT_FINITE if the start is
+    in `integrators.kernel.step.iterate`. Return DONE, DIVERGED, or NOT_FINITE if the start is
     one at which the field or its Jacobian is not finite.
     """
-    most = MOST_BLENDED if method == of.BLENDED else MOST_CORRECTIONS
-    tolerance = get_float(ctx, at.TOLERANCE)
+    most = MOST_BLENDED if m.method == BLENDED else MOST_CORRECTIONS
+    tolerance = ctx.tolerance
     best, rough, worst = INFINITY, INFINITY, 0.0
-    rate = m.real[of.RATE] if method == of.NEWTON and which == KEPT else 1.0
+    rate = m.rate if m.method == NEWTON and which == KEPT else 1.0
     stalled, hopeless = 0, 0
     for tried in range(most + 1):
         if tried:
-            outcome = correct(ctx, m, method, source, factors, which)
-            if outcome != at.DONE:
-                return outcome if tried == 1 else at.DIVERGED
+            outcome = correct(ctx, m, which)
+            if outcome != DONE:
+                return outcome if tried == 1 else DIVERGED
         set_stages(ctx, m)
         if rough > CALM:
-            take_sizes(ctx, m)
+            measure(ctx, m)
         if tried == 0:
             continue
         strict, before = changes(ctx, m, STRICT), rough
         rough = changes(ctx, m, FLOORED)
-        m.real[of.CHANGE] = rough
+        m.change = rough
         if not rough < INFINITY:
-            return at.DIVERGED
+            return DIVERGED
         if before < CALM and rough > STAGNATION:
             worst = max(worst, rough / before)
         if strict <= tolerance or strict * max(worst, rate) < FORESEEN * tolerance:
             break
         stalled = 0 if strict < best else stalled + 1
         best = min(best, strict)
-        if stalled and rough < (ROUNDING if stalled < PATIENCE or rough < FALLING * before else STAGNATION):
+        if stalled and is_rounding(rough, stalled >= PATIENCE and not rough < FALLING * before):
             break
         hopeless = 0 if rough < before else hopeless + 1
         if hopeless == PATIENCE and rough < STAGNATION:
             break
         if hopeless == HOPELESS:
-            return at.DIVERGED
+            return DIVERGED
     else:
-        return at.DIVERGED
+        return DIVERGED
     if worst > 0.0:
-        m.real[of.RATE] = worst if rate == 1.0 else max(worst, FORGET * rate)
-    if worst > SLOW and method == of.NEWTON:
-        m.count[of.STALE] = 1
-    return at.DONE
+        m.rate = worst if rate == 1.0 else max(worst, FORGET * rate)
+    if worst > SLOW and m.method == NEWTON:
+        m.stale = 1
+    return DONE
 
 
 @compiled
 def nearer(ctx, m):
     """Whether the extrapolated coefficients were nearer to the solution than constant stages."""
     far, still = 0.0, 0.0
-    scale = get_int(ctx, at.FLOORED)
+    scale = ctx.floored
     for d in range(m.factor.size):
         a, b = 0.0, 0.0
         for j in range(m.gamma.shape[0]):
             a = max(a, abs(m.gamma[j, d] - m.predicted[j, d]))
             b = max(b, abs(m.gamma[j, d]))
-        far, still = max(far, a * get_float(scale, d)), max(still, b * get_float(scale, d))
+        far, still = max(far, a * scale[d]), max(still, b * scale[d])
     return far < still
 
 
 @compiled
-def renew(ctx, m, source):
+def renew(ctx, m):
     """Take the Jacobian at the state, and the contraction of the fixed-point iteration with it."""
-    for d in range(m.point.size):
-        m.point[d] = get_float(get_int(ctx, at.ROW_STATE), d)
-    linearize(ctx, m, source, get_float(ctx, at.T0) + get_int(ctx, at.N) * get_float(ctx, at.H))
-    m.real[of.CONTRACTION] = m.real[of.RADIUS] * contraction(m)
-    m.real[of.CONTRACTION_H] = get_float(ctx, at.H)
-    m.count[of.STALE] = 0
-    m.real[of.RATE] = 1.0
+    for d in range(m.state.size):
+        m.state[d] = ctx.row_state[d]
+    linearize(ctx, m, ctx.t0 + ctx.n * ctx.h)
+    m.contraction = m.radius * contraction(m)
+    m.contraction_h = ctx.h
+    m.stale = 0
+    m.rate = 1.0
 
 
 @compiled
@@ -126,95 +123,86 @@ def is_scattered(m):
     for d in range(components):
         first += abs(m.gamma[0, d])
         last += abs(m.gamma[s - 1, d])
-    return last > SCATTERED * first
+    return last > OFF * first
 
 
 @compiled
-def solve_step(ctx, m, method, source, factors, started):
-    """Solve the step of a context; return the outcome, DONE with F the field's polynomial part.
+def solve_step(ctx, m, started):
+    """Solve the step of a context; return the outcome, DONE with the values of the field's polynomial part.
 
     Parameters
     ----------
-    ctx : address
-        The context, with SOLVED = 0.
-    m : Memory
+    ctx : Context
+        Of a step that is not solved.
+    m : Workspace
         This solver's.
-    method : {NEWTON, BLENDED}
-        How corrections are computed.
-    source : address
-        Of the Jacobian; 0 for differences.
-    factors : address
-        Of the function that keeps the factors; 0: they are in `Memory`.
     started : int
-        1: the context is prepared and, if PREDICTED, F holds the extrapolated field, as for
+        1: the context is prepared and, if it is predicted, holds the extrapolated values, as for
         partial steps, which leave nothing to later ones. 0: a step of the trajectory.
     """
-    m.count[of.TRIED] = 0
-    jacobians = m.count[of.JACOBIANS]
-    h = get_float(ctx, at.H)
+    m.tried = 0
+    jacobians = m.jacobians
+    h = ctx.h
     if started:
-        m.count[of.LINEARIZED] = 0
+        m.linearized = 0
     else:
         prepare(ctx)
-        length = get_float(ctx, at.LENGTH)
-        put_int(ctx, at.PREDICTED, 0)
+        length = ctx.length
+        ctx.predicted = 0
         if length != 0.0 and abs(h / length) <= FARTHEST:
-            start_elsewhere(ctx, ctx, 0.0 if get_int(ctx, at.REJECTED) else 1.0, h / length)
+            start_elsewhere(ctx, ctx, 0.0 if ctx.rejected else 1.0, h / length)
     set_factor(ctx, m)
-    extrapolated = get_int(ctx, at.PREDICTED)
+    extrapolated = ctx.predicted
     if extrapolated:
         project(ctx, m, m.predicted, m.gamma.shape[1] - m.factor.size)
-        if get_int(ctx, at.SECOND):
+        if ctx.second:
             set_velocities(ctx, m, m.predicted)
-    fresh = m.count[of.LINEARIZED] == 0 or m.count[of.STALE] == 1 or m.count[of.SINCE] >= OLDEST
-    use = extrapolated and (started or m.count[of.PREDICT])
+    fresh = m.linearized == 0 or m.stale == 1 or m.since >= OLDEST
+    use = extrapolated and (started or m.predict)
     which, trying = KEPT, 1
-    outcome = at.RUNNING
+    outcome = RUNNING
     while trying:
         if fresh:
-            renew(ctx, m, source)
-        if m.real[of.FACTORED_H] != h:
-            m.count[of.FACTORED] = 0
+            renew(ctx, m)
+        if m.factored_h != h:
+            m.factored = 0
         for j in range(m.gamma.shape[0]):
             for d in range(m.gamma.shape[1]):
                 m.gamma[j, d] = m.predicted[j, d] if use else 0.0
-        outcome = iterate(ctx, m, method, source, factors, which)
+        outcome = iterate(ctx, m, which)
         trying = 0
-        if outcome != at.DONE:
+        if outcome != DONE:
             # First without what may have been bad: the extrapolation, an old Jacobian; then
             # with the Jacobian of each stage, or where that is too large, of their mean.
             if use:
-                put_int(ctx, at.RESTARTS, get_int(ctx, at.RESTARTS) + 1)
-            if use or m.count[of.SINCE]:
+                ctx.restarts += 1
+            if use or m.since:
                 trying, use, fresh = 1, 0, True
-            elif outcome == at.DIVERGED and which == KEPT:
-                m.count[of.RESCUES] += 1
+            elif outcome == DIVERGED and which == KEPT:
+                m.rescues += 1
                 trying, which, fresh = 1, EACH, False
-    m.count[of.SINCE] += 1
+    m.since += 1
     if which != KEPT:
-        m.count[of.STALE] = 1
-        if outcome == at.DONE and is_scattered(m):
-            outcome = at.SCATTERED
-    if outcome == at.DONE:
+        m.stale = 1
+        if outcome == DONE and is_scattered(m):
+            outcome = SCATTERED
+    if outcome == DONE:
         if not started:
-            m.count[of.PREDICT] = 1 if extrapolated == 0 or nearer(ctx, m) else 0
+            m.predict = 1 if extrapolated == 0 or nearer(ctx, m) else 0
         set_values(ctx, m)
-        put_int(ctx, at.SOLVED, at.BY_INCREMENT)
-    if not started and get_int(ctx, at.STRATEGY) == at.AUTO:
-        left = get_int(ctx, at.LEFT) - 1
-        put_int(ctx, at.LEFT, left)
-        longer = abs(h / m.real[of.CONTRACTION_H])
-        if get_int(ctx, at.SECOND):
+        ctx.solved = BY_INCREMENT
+    if not started and ctx.strategy == AUTO:
+        ctx.left -= 1
+        longer = abs(h / m.contraction_h)
+        if ctx.second:
             longer *= longer
-        gentle = GENTLE_VARYING if get_int(ctx, at.ERROR_DEGREE) else GENTLE
-        if left < 0 and longer * m.real[of.CONTRACTION] < gentle:
-            put_int(ctx, at.IMPLICIT, 0)
-    tried = m.count[of.TRIED]
-    put_float(ctx, at.LAST, m.real[of.CHANGE])
-    m.count[of.CORRECTIONS] += tried
-    put_int(ctx, at.ITERATIONS, get_int(ctx, at.ITERATIONS) + tried)
-    evaluations = tried * get_int(ctx, at.STAGES)
-    if source == 0:
-        evaluations += (m.count[of.JACOBIANS] - jacobians) * (1 + get_int(ctx, at.ROWS))
-    put_int(ctx, at.EVALUATIONS, get_int(ctx, at.EVALUATIONS) + evaluations)
+        gentle = GENTLE_VARYING if ctx.varying else GENTLE
+        if ctx.left < 0 and longer * m.contraction < gentle:
+            ctx.implicit = 0
+    ctx.last = m.change
+    m.corrections += m.tried
+    ctx.iterations += m.tried
+    ctx.evaluations += m.tried * ctx.k
+    if m.source == 0:
+        ctx.evaluations += (m.jacobians - jacobians) * (1 + ctx.rows)
     return outcome

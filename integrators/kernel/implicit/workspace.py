@@ -1,50 +1,27 @@
 """The implicit solver's code for a system, and its memory for a trajectory."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.kernel import field as fields
-from integrators.kernel import layout, native, store
-from integrators.kernel.implicit import layout as of
-from integrators.kernel.implicit.constants import Method, method, solver_of
+from integrators.kernel.context import ALWAYS_IMPLICIT, AUTO, FIXED_POINT, Shape
+from integrators.kernel.implicit.constants import BLENDED, NEWTON, method, solver_of
 from integrators.kernel.implicit.factors import Factors
-from integrators.kernel.tables import aligned, packed
-from integrators.kernel.workspace import Shape
+from integrators.kernel.native import binary, store
+from integrators.kernel.native import field as fields
+from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table
+from integrators.kernel.tables import packed
 from problems import emit
 from problems.calculus.jacobian import Jacobian
 from problems.errors import InputError
 from problems.systems.base import System
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 LARGEST_DENSE = 64  # rows up to which the factors are dense and in the solver's memory
 LARGEST_WHOLE = 128  # rows up to which there is a matrix with a Jacobian for each stage
-
-# The modules whose code is in the solver: an edit of any of them makes another one.
-SOURCES = (
-    *("lanes", "memory", "layout", "products", "step", "native", "line/views"),
-    *(
-        f"implicit/{name}"
-        for name in ("layout", "external", "linear", "stages", "jacobian", "corrections", "newton", "entry")
-    ),
-)
-
-
-@lru_cache(maxsize=1)
-def solver() -> native.Native:
-    """Return the solver's C function ``int64(context, memory, started)``, compiled or loaded."""
-
-    def make() -> tuple[str, bytes]:
-        from integrators.kernel.implicit import entry  # imports numba
-
-        return " ", entry.build()
-
-    return native.obtain(store.key("implicit solver", native.sources(*SOURCES)), make)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +37,7 @@ class Linearization:
     """
 
     jacobian: Jacobian | None
-    code: native.Native | None
+    code: binary.Native | None
 
     @property
     def address(self) -> int:
@@ -85,8 +62,8 @@ def linearization(system: System, *, second: bool) -> Linearization:
     except InputError:  # differences take the field alone
         return Linearization(None, None)
     text = emit.source(system, found, "numba").text
-    name = store.key("jacobian", text, native.sources(*fields.SOURCES))
-    made = native.obtain(
+    name = store.key("jacobian", text, binary.sources(*fields.SOURCES))
+    made = binary.obtain(
         name, lambda: (fields.ONE_BY_ONE, fields.build_one_by_one(emit.numba(system, found).py_func, 1))
     )
     return Linearization(found, made)
@@ -99,7 +76,7 @@ class Solver:
     Attributes
     ----------
     strategy : {FIXED_POINT, AUTO, ALWAYS_IMPLICIT}
-        Of `integrators.kernel.layout`.
+        Of `integrators.kernel.context`.
     kind : {NEWTON, BLENDED}
         The implicit solver.
     """
@@ -109,15 +86,19 @@ class Solver:
 
 
 SOLVERS = {
-    "auto": Solver(layout.AUTO, of.NEWTON),
-    "fixed_point": Solver(layout.FIXED_POINT, of.NEWTON),
-    "newton": Solver(layout.ALWAYS_IMPLICIT, of.NEWTON),
-    "blended": Solver(layout.ALWAYS_IMPLICIT, of.BLENDED),
+    "auto": Solver(AUTO, NEWTON),
+    "fixed_point": Solver(FIXED_POINT, NEWTON),
+    "newton": Solver(ALWAYS_IMPLICIT, NEWTON),
+    "blended": Solver(ALWAYS_IMPLICIT, BLENDED),
 }
 
 
-class Workspace:
-    """The memory of a solver for the steps of one context.
+class Workspace(Memory):
+    """The memory of a solver for the steps of one context: degree s, R rows, p pairs of eigenvalues of X_s.
+
+    There are D = `dim` unknowns of each degree: R, and 2 R in the second-order form, the
+    coefficients of q' and then those of p'. A stage table takes coefficients to stages, in the
+    packing of `integrators.kernel.tables`; its first columns are the low parts of the next.
 
     Parameters
     ----------
@@ -127,119 +108,163 @@ class Workspace:
         How corrections are computed; beyond some degree they are blended.
     linearization : Linearization
         The Jacobian.
-
-    Attributes
-    ----------
-    count, real : ndarray
-        See `integrators.kernel.implicit.layout`.
-    increment : ndarray, shape (dim,)
-        What the solved step adds to the state.
-    traced : bool
-        Whether the Jacobian is traced, or taken by differences.
-    factors : Factors or None
-        What keeps the factors, where they are not dense and small.
     """
+
+    method = Integer()  # how corrections are computed: NEWTON, BLENDED
+    source = Integer()  # address of the Jacobian, void(t, y, par, entries); 0 for differences
+    factors = Integer()  # address of what keeps the factors, int64(what, pair); 0: they are here
+    rows = Integer()
+    padded = Integer()
+    k = Integer()
+    s = Integer()
+    dim = Integer()
+    pairs = Integer()
+    entry_count = Integer()
+    factored_rows = Integer()  # p R, or 0
+    whole = Integer()  # s R, rows of a matrix with a Jacobian for each stage; 0 if that is too large
+    packed_groups = Integer()
+    trial_size = Integer()
+
+    # --- of the method ---
+    stage_table = Array()
+    projection = Array()  # values -> coefficients, packed
+    basis = Array()  # coefficients -> the polynomial at the nodes, packed
+    weights = Array()  # of the stages in a mean, one per lane of stage memory
+    integrals = Table("k", "s")  # the stage table
+    reach = Table("k", "s")  # the same; in the second-order form times X_s
+    moments = Table("s", "k")  # the projection
+    left_re = Table("pairs", "s")  # rows of the inverse of the eigenvectors' matrix
+    left_im = Table("pairs", "s")
+    right_re = Table("s", "pairs")  # eigenvectors, twice where a conjugate belongs to them
+    right_im = Table("s", "pairs")
+    eigen_re = Table("pairs")
+    eigen_im = Table("pairs")
+    x = Table("s", "s")  # X_s
+    inverse = Table("s", "s")  # X_s^{-1}
+    radius = Real()  # part of X_s in a fixed-point iteration's contraction: its spectral radius, or squared
+
+    # --- the unknowns ---
+    gamma = Table("s", "dim")
+    increment = Table("dim")  # h gamma_0, what the step adds to the state
+    predicted = Table("s", "dim")
+    residual = Table("s", "dim")
+    correction = Table("s", "dim")
+    factor = Table("rows")  # h, or h^2 q'/p in the second-order form
+    slope_strict = Table("rows")  # 1 / size of a row's block in h q', second-order form
+    slope_floored = Table("rows")  # small blocks raised
+    predict = Integer()  # 1: the extrapolated start is nearer than the constant one
+    change = Real()  # of the last correction
+    rate = Real()  # by which corrections have contracted with this Jacobian; 1 where that is not known
+    contraction = Real()  # by which one fixed-point iteration contracts, an estimate ...
+    contraction_h = Real()  # ... of a step of this length
+
+    # --- the Jacobian and the factors ---
+    entry_rows = Table("entry_count", of=int)
+    entry_columns = Table("entry_count", of=int)
+    entries = Table("entry_count")
+    state = Table("rows")  # where the Jacobian is taken
+    lu_re = Table("factored_rows", "rows")
+    lu_im = Table("factored_rows", "rows")
+    pivots = Table("factored_rows", of=int)
+    whole_re = Table("whole", "whole")
+    whole_im = Table("whole", "whole")
+    whole_pivots = Table("whole", of=int)
+    whole_x = Table("whole")
+    whole_y = Table("whole")
+    linearized = Integer()  # 1: the entries are those at `state`
+    stale = Integer()  # 1: take a new Jacobian at the next step
+    since = Integer()  # steps since the Jacobian was taken
+    factored = Integer()  # 1: the factors are those of the entries and of the step ...
+    factored_h = Real()  # ... of this length
+
+    # --- room ---
+    b_re = Table("rows")  # right-hand side and solution of a system
+    b_im = Table("rows")
+    v_re = Table("dim")  # a vector of the first-order form
+    v_im = Table("dim")
+    packed = Array(8, "padded", "packed_groups")  # coefficients in the packing of stage memory
+    trial = Array("trial_size")  # one block of stages, its times, and the field there
+
+    # --- counters ---
+    tried = Integer()
+    corrections = Integer()
+    jacobians = Integer()
+    factorizations = Integer()
+    rescues = Integer()
 
     def __init__(self, shape: Shape, kind: int, linearization: Linearization):
         c = shape.constants
-        kind = solver_of(c.s, kind)
-        self.method: Method = method(c.k, c.s, shape.second, c.lanes, kind)
+        m = method(c.k, c.s, shape.second, c.lanes, solver_of(c.s, kind))
+        rows, columns = linearization.places(shape.rows)
+        pairs, whole, padded = m.eigenvalues.size, c.s * shape.rows, -(-shape.rows // 8) * 8
         elsewhere = shape.rows > LARGEST_DENSE
-        self._kept = _arrays(shape, self.method, linearization.places(shape.rows), elsewhere)
-        self.count: Integers = self._kept["count"]
-        self.real: Array = self._kept["real"]
-        self.increment: Array = self._kept["increment"]
-        self.real[of.RADIUS] = self.method.radius
-        self.factors = Factors(self._kept, second=shape.second) if elsewhere else None
+        weights = np.zeros(-(-c.k // c.lanes) * c.lanes)
+        weights[: c.k] = c.arrays["weights"].reshape(-1)
+        low = m.integrals_low.shape[1]
+        numbers = {
+            "method": solver_of(c.s, kind), "source": linearization.address, "rows": shape.rows,
+            "padded": padded, "k": c.k, "s": c.s, "dim": shape.dim, "pairs": pairs, "entry_count": rows.size,
+            "factored_rows": 0 if elsewhere else pairs * shape.rows,
+            "whole": whole if whole <= LARGEST_WHOLE else 0, "packed_groups": -(-(c.s + low) // 8),
+            "trial_size": c.lanes * (1 + 2 * padded), "radius": m.radius,
+        }  # fmt: skip
+        tables: dict[str, Any] = {
+            "stage_table": packed(np.hstack([m.integrals_low, m.integrals]), repeat=True),
+            "projection": packed(c.arrays["projection"]),
+            "basis": packed(m.basis, repeat=True),
+            "weights": weights,
+            "integrals": m.integrals, "reach": m.integrals @ m.x if shape.second else m.integrals,
+            "moments": c.arrays["projection"],
+            "left_re": m.left.real, "left_im": m.left.imag,
+            "right_re": m.right.real, "right_im": m.right.imag,
+            "eigen_re": m.eigenvalues.real, "eigen_im": m.eigenvalues.imag,
+            "x": m.x, "inverse": m.inverse, "entry_rows": rows, "entry_columns": columns,
+        }  # fmt: skip
+        super().__init__(numbers, {name: np.ascontiguousarray(array) for name, array in tables.items()})
         self.traced = linearization.jacobian is not None
-        head = np.zeros(of.HEAD, dtype=np.int64)
-        head[of.METHOD], head[of.JACOBIAN] = kind, linearization.address
-        head[of.ROWS], head[of.STAGES], head[of.DEGREE] = shape.rows, c.k, c.s
-        head[of.WHOLE] = self._kept["whole_x"].size
-        head[of.PAIRS], head[of.ENTRIES] = self.method.eigenvalues.size, self._kept["rows"].size
-        head[of.FACTORS] = 0 if self.factors is None else self.factors.address
-        addresses = [self._kept[name].ctypes.data for name in of.Memory._fields]
-        self._words = np.concatenate([head, np.array(addresses, dtype=np.int64)])
-
-    @property
-    def address(self) -> int:
-        """Of the memory, for compiled functions."""
-        return self._words.ctypes.data
+        """Whether the Jacobian is traced, or taken by differences."""
+        self.elsewhere = Factors(self, second=shape.second) if elsewhere else None
+        """What keeps the factors, where they are not dense and small."""
+        self.factors = 0 if self.elsewhere is None else self.elsewhere.address
 
     @property
     def name(self) -> str:
         """Of the iteration."""
-        return "blended" if self._words[of.METHOD] == of.BLENDED else "Newton"
-
-    @property
-    def _lasting(self) -> tuple[Any, ...]:
-        """What goes from step to step, but for the factors, which follow from the Jacobian's entries."""
-        return self.count, self.real, self.increment, self._kept["entries"]
+        return "blended" if self.method == BLENDED else "Newton"
 
     def save(self) -> tuple[Any, ...]:
         """Return copies of all that the continuation depends on."""
-        return tuple(array.copy() for array in self._lasting)
+        return self.words[_LASTING], self.increment.copy(), self.entries.copy()
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what `save` returned; the counters of the work done keep counting."""
-        work = self.count[of.TRIED :].copy()
-        for array, kept in zip(self._lasting, saved, strict=True):
-            array[:] = kept
-        self.count[of.TRIED :] = work
-        self.count[of.FACTORED] = 0
+        self.words[_LASTING], self.increment[:], self.entries[:] = saved
+        self.factored = 0
 
     def raise_what_is_no_failure(self) -> None:
         """Raise what stopped a factorization, unless that is a singular matrix: Ctrl-C, no memory left."""
-        if self.factors is not None and self.factors.error is not None:
-            error, self.factors.error = self.factors.error, None
+        if self.elsewhere is not None and self.elsewhere.error is not None:
+            error, self.elsewhere.error = self.elsewhere.error, None
             if not isinstance(error, (ArithmeticError, RuntimeError, ValueError)):
                 raise error
 
 
-def _arrays(shape: Shape, m: Method, places: tuple[Integers, Integers], elsewhere: bool) -> dict[str, Any]:
-    c = shape.constants
-    rows, s, pairs, dim = shape.rows, c.s, m.eigenvalues.size, shape.dim
-    padded, blocks = -(-rows // 8) * 8, -(-c.k // c.lanes)
-    weights = np.zeros(blocks * c.lanes)
-    weights[: c.k] = c.arrays["weights"].reshape(-1)
-    low = m.integrals_low.shape[1]
-    factors = 0 if elsewhere else pairs * rows
-    whole = s * rows if s * rows <= LARGEST_WHOLE else 0
-    tables: dict[str, Any] = {
-        "stage_table": packed(np.hstack([m.integrals_low, m.integrals]), repeat=True),
-        "projection": packed(c.arrays["projection"]),
-        "basis": packed(m.basis, repeat=True),
-        "weights": weights,
-        "integrals": m.integrals, "reach": m.integrals @ m.x if shape.second else m.integrals,
-        "moments": c.arrays["projection"],
-        "left_re": m.left.real, "left_im": m.left.imag,
-        "right_re": m.right.real, "right_im": m.right.imag,
-        "eigen_re": m.eigenvalues.real, "eigen_im": m.eigenvalues.imag,
-        "x": m.x, "inverse": m.inverse,
-        "rows": places[0], "columns": places[1],
-        "packed": aligned(8 * padded * -(-(s + low) // 8)),
-        "trial": aligned(c.lanes * (1 + 2 * padded)),
-        "count": np.zeros(of.COUNTS, dtype=np.int64),
-        "pivots": np.zeros(factors, dtype=np.int64), "whole_pivots": np.zeros(whole, dtype=np.int64),
-    }  # fmt: skip
-    sizes = {
-        "real": of.REALS, "point": rows, "gamma": s * dim, "increment": dim, "predicted": s * dim,
-        "residual": s * dim, "correction": s * dim, "factor": rows, "slope_strict": rows,
-        "slope_floored": rows, "entries": places[0].size, "lu_re": factors * rows, "lu_im": factors * rows,
-        "whole_re": whole**2, "whole_im": whole**2, "whole_x": whole, "whole_y": whole,
-        "b_re": rows, "b_im": rows, "v_re": dim, "v_im": dim,
-    }  # fmt: skip
-    room = {name: np.zeros(n) for name, n in sizes.items()}
-    return {name: np.ascontiguousarray(array) for name, array in {**tables, **room}.items()}
+# What goes from step to step, but for the factors, which follow from the Jacobian's entries.
+_LASTING = [
+    slot.place
+    for slot in (
+        Workspace.linearized, Workspace.stale, Workspace.predict, Workspace.since, Workspace.factored_h,
+        Workspace.change, Workspace.rate, Workspace.contraction, Workspace.contraction_h,
+    )
+]  # fmt: skip
 
 
-def report(workspaces: tuple[Workspace, Workspace]) -> dict[str, Any]:
-    """Return what solvers have done, for `Stats.extra`."""
-    counts = workspaces[0].count + workspaces[1].count
+def report(own: Workspace, part: Workspace) -> dict[str, Any]:
+    """Return what the solvers of own and of partial steps have done, for `Stats.extra`."""
     return {
-        "jacobians": int(counts[of.JACOBIANS]),
-        "jacobian": "traced" if workspaces[0].traced else "differences",
-        "factorizations": int(counts[of.FACTORIZATIONS]),
-        "corrections": int(counts[of.CORRECTIONS]),
-        "rescues": int(counts[of.RESCUES]),
+        "jacobians": own.jacobians + part.jacobians,
+        "jacobian": "traced" if own.traced else "differences",
+        "factorizations": own.factorizations + part.factorizations,
+        "corrections": own.corrections + part.corrections,
+        "rescues": own.rescues + part.rescues,
     }

@@ -1,32 +1,16 @@
-"""The compiled steps in this process, called with addresses."""
+"""The compiled steps of line integral methods in this process."""
 
-import ctypes
-from functools import lru_cache
 from typing import Any
 
-from integrators.kernel import native, store
-
-# The modules whose code is in the kernel: an edit of any of them makes another kernel.
-SOURCES = (
-    "native",
-    "products",
-    "control",
-    *(f"line/{name}" for name in ("layout", "views", "invariants", "solve", "sample", "varying", "loops")),
-)
+from integrators.kernel.native.engine import ENTRY, Engine
+from integrators.kernel.step.engine import SOURCES
 
 
-def kernel() -> native.Native:
-    """Return the compiled steps: `loops.entry`, compiled, loaded, or loaded before."""
+def _entry() -> Any:
+    from integrators.kernel.line.loops import entry  # imports numba
 
-    def make() -> tuple[str, bytes]:
-        from integrators.kernel.line import loops  # imports numba
-
-        return " ", loops.build()
-
-    return native.obtain(store.key("line", native.sources(*SOURCES)), make)
+    return entry
 
 
-@lru_cache(maxsize=1)
-def entry() -> Any:
-    """Return `loops.entry` as a function of Python numbers; the interpreter's lock is released meanwhile."""
-    return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 10, ctypes.c_double)(kernel().address)
+steps = Engine(_entry, ENTRY, *SOURCES, "line")
+"""``steps(what, ctx, ...)``, as `integrators.kernel.step.engine.steps`."""

@@ -18,8 +18,7 @@ bodies first. Where bodies mirror each other, the sums that vanish by symmetry
 then vanish exactly, and a fixed-order factorization leaves them so.
 """
 
-from integrators.kernel.line import layout as at
-from integrators.kernel.line.views import compiled
+from integrators.kernel.native.jit import compiled
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only
@@ -72,7 +71,7 @@ def leave_rest(m, i):
 def set_right(m):
     """Set r."""
     sums, rest, weights, right = m.sums, m.rest, m.weights, m.right
-    n, dim = m.n, m.dim
+    n, dim = m.invariants, m.dim
     for a in range(n):
         for d in range(dim):
             sums[a, d] = 0.0
@@ -91,7 +90,7 @@ def set_gram(m):
     """Set the matrix of the equations for alpha, its lower half."""
     sums, legendre, metric, gram = m.sums, m.legendre, m.metric, m.gram
     dim = m.dim
-    for a in range(m.n):
+    for a in range(m.invariants):
         for b in range(a + 1):
             first, second = dim * (1 + a), dim * (1 + b)
             for d in range(dim):
@@ -108,7 +107,7 @@ def set_gram(m):
 def solve_gram(m, right, threshold):
     """Replace ``right`` by the solution, by LDL' in the order of the invariants, without small pivots."""
     gram, lower, pivots, active = m.gram, m.lower, m.pivots, m.active
-    n = m.n
+    n = m.invariants
     for a in range(n):
         pivot = gram[a, a]
         for b in range(a):
@@ -137,11 +136,11 @@ def keep_invariants(m, h):
     project(m, m.width)
     set_gram(m)
     set_right(m)
-    for a in range(m.n):
+    for a in range(m.invariants):
         alpha[a] = missing[a] / h
     solve_gram(m, alpha, REGULAR)
     solve_gram(m, right, DEPENDENT)
-    for a in range(m.n):
+    for a in range(m.invariants):
         alpha[a] += right[a]
     for j in range(m.s):
         for d in range(m.dim):
@@ -153,7 +152,7 @@ def correction(m, j, d):
     """Return component d of W sum_i phi_ij alpha_i."""
     legendre, alpha, dim = m.legendre, m.alpha, m.dim
     value = 0.0
-    for a in range(m.n):
+    for a in range(m.invariants):
         value += legendre[j, dim * (1 + a) + d] * alpha[a]
     return m.metric[d] * value
 
@@ -174,8 +173,8 @@ def measure_gap(m):
         m.missing,
         m.active,
     )
-    y, e, previous, length, dim = m.y, m.e, m.previous, m.real[at.LENGTH], m.dim
-    for a in range(m.n):
+    y, e, previous, length, dim = m.y, m.e, m.previous, m.length, m.dim
+    for a in range(m.invariants):
         gap = right[a] - reference[a]
         scale = abs(right[a]) + abs(reference[a])
         for d in range(dim):
@@ -190,7 +189,7 @@ def measure_gap(m):
         elif not abs(gap) <= ROUNDING * scale:
             reference[a] = right[a]
             gap = 0.0
-            m.count[at.LOST] += 1
+            m.lost += 1
         missing[a] = GAIN * gap
 
 
@@ -203,7 +202,7 @@ def find_change(m, threshold):
     """
     sums, weights, stages = m.sums, m.weights, m.stages
     dim = m.dim
-    for a in range(m.n):
+    for a in range(m.invariants):
         first = dim * (1 + a)
         for d in range(dim):
             sums[0, d] = 0.0
@@ -216,6 +215,6 @@ def find_change(m, threshold):
         slope = abs(total(m, 0))
         terms = total(m, 1)
         if not slope <= threshold * terms:  # a gradient that is not finite is no good either
-            m.real[at.DEFECT] = slope / terms
+            m.defect = slope / terms
             return a
     return -1

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.kernel import field as fields
-from integrators.kernel import native
-from integrators.kernel.line import engine
-from integrators.kernel.line import layout as at
+from integrators.kernel.context import blocks
 from integrators.kernel.line.dependence import independent
-from integrators.kernel.line.stepper import LineStepper
-from integrators.kernel.program import blocks
+from integrators.kernel.line.engine import steps
+from integrators.kernel.line.memory import INVARIANTS, POISSON, Trajectory
+from integrators.kernel.line.stepper import LineStepper, VaryingLineStepper
+from integrators.kernel.native import binary
+from integrators.kernel.native import field as fields
+from integrators.kernel.stepper import HBVMStepper
 from integrators.legendre import tables
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
@@ -55,12 +56,13 @@ class LineProgram:
         tol: float | None = None,
         invariants: Sequence[str] = (),
     ):
-        started = native.clock()
+        started = binary.clock()
         self.system = system
         self.k, self.s, self.h, self.tol = k, s, h, tol
-        self.mode = at.INVARIANTS if invariants else at.POISSON
+        self.first, self.max_step, self.max_steps, self.breakpoints = h, None, None, np.empty(0)
+        self.mode = INVARIANTS if invariants else POISSON
         self.components = [part for name in invariants for part in components(system, name)]
-        if self.mode == at.POISSON:
+        if self.mode == POISSON:
             parts = [fields.compile_field(system, "gradient, structure", 1)]
             self.values = 0
         else:
@@ -72,12 +74,12 @@ class LineProgram:
             self.values = parts[1].address
             self.slopes = what
         self.field = parts[0].address
-        parts.append(engine.kernel())
+        parts.append(steps.code())
         self.block, self.group = blocks(system)
         self.order, self.ends = order_of_sums(system)
         self.tables = _shared(k, s)
         self.from_cache = all(part.from_cache for part in parts)
-        self.compile_seconds = native.clock() - started
+        self.compile_seconds = binary.clock() - started
 
     @property
     def description(self) -> str:
@@ -85,7 +87,7 @@ class LineProgram:
         kept = f"invariants={self.components!r}" if self.components else "Poisson form"
         return f"LineIntegral(k={self.k}, s={self.s}, h={self.h!r}, tol={self.tol!r}, {kept})"
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> LineStepper:
+    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper:
         """Return a stepper at ``t0``; ``par`` defaults to the system's own parameters.
 
         Raises
@@ -94,31 +96,27 @@ class LineProgram:
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return LineStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        kind: Any = LineStepper if self.tol is None else VaryingLineStepper
+        return kind(self, check_state(y0, self.system.dim), values, check_start(t0))
 
-    def memory(self, y: Array, par: Array, t0: float) -> tuple[list[int], dict[str, Any]]:
-        """Return a trajectory's sizes and arrays, as in `layout`."""
+    def memory(self, y: Array, par: Array, t0: float) -> Trajectory:
+        """Return the memory of a trajectory that starts at (t0, y)."""
         dim, n = y.size, len(self.components)
-        sizes = {
+        numbers = {
             "mode": self.mode, "field": self.field, "values": self.values,
-            "k": self.k, "s": self.s, "dim": dim, "n": n,
-            "row": dim * (1 + (n if self.mode == at.INVARIANTS else dim)), "width": dim * (1 + n),
-            "after": self.s + 1, "rows": max(2, n), "parameters": par.size, "blocks": self.group.size,
-            "reals": at.REALS, "counts": at.COUNTS, "one": 1,
+            "k": self.k, "s": self.s, "dim": dim, "invariants": n,
+            "row": dim * (1 + (n if self.mode == INVARIANTS else dim)), "width": dim * (1 + n),
+            "after": self.s + 1, "rows": max(2, n), "blocks": self.group.size,
+            "tolerance": self.tol or 0.0, "length_limit": np.inf,
         }  # fmt: skip
         metric = metric_of(self.system, par)
         given: dict[str, Any] = {
-            "par": par, **self.tables, "metric": metric, "y": y,
+            "par": par, **self.tables, "metric": metric,
             "order": self.order, "ends": self.ends, "block": self.block, "group": self.group,
         }  # fmt: skip
         if n:
             given["active"] = independent(self.system, self.slopes, metric, y, par, t0).astype(np.int64)
-        arrays = {}
-        for name, shape in at.ARRAYS.items():
-            kind = np.int64 if name in at.INTEGERS else np.float64
-            made = given[name] if name in given else np.zeros([sizes[size] for size in shape])
-            arrays[name] = np.ascontiguousarray(made, dtype=kind)
-        return [sizes[name] for name in at.SIZES], arrays
+        return Trajectory(numbers, {name: np.ascontiguousarray(array) for name, array in given.items()})
 
 
 def components(system: System, name: str) -> list[str]:
@@ -172,7 +170,7 @@ def order_of_sums(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]
 
 @lru_cache(maxsize=64)
 def _shared(k: int, s: int) -> dict[str, Array]:
-    """Return the tables of HBVM(k, s) by their names in `layout.Memory`."""
+    """Return the tables of HBVM(k, s) by their names in `Trajectory`."""
     table = tables(k, s)
     projection = np.zeros((s + 1, k))
     projection[:s] = table.projection.hi

@@ -1,27 +1,29 @@
 """One step: its coefficients by fixed-point iteration, and the state at its end."""
 
-from integrators.kernel.line import layout as at
+from integrators.kernel.context import BUDGET, DIVERGED, DONE, NOT_FINITE
 from integrators.kernel.line.invariants import correction, find_change, keep_invariants, measure_gap, project
-from integrators.kernel.line.views import address, call, compiled, fma, two_sum
+from integrators.kernel.line.memory import INVARIANTS, NOT_KEPT, POISSON
+from integrators.kernel.native.attributes import address
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.begin import FARTHEST, INFINITY
+from integrators.kernel.step.iterate import MAX_ITERATIONS
+from integrators.kernel.step.size import FLOOR, STAGNATION
 
-MAX_ITERATIONS = 200
 CONVERGED = 1e-16
-STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
 HOPELESS = 1e6  # a change this much larger than the smallest so far will not come back
 PATIENCE, SLOWNESS = 2, 16  # stagnation is 2 + (iterations so far)/16 without a new smallest change
-FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
-FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 KEPT = 1e-8  # an invariant that changes faster, relative to the terms of its change, is none
-INFINITY = float("inf")
 
 
 @compiled
 def evaluate_at(m, t, y, place):
     """Evaluate the field and what goes with it at one state, as stage number ``place``."""
     m.time[0] = t
-    call(m.field, address(m.time), address(y), address(m.par), address(m.stages) + 8 * place * m.row)
-    m.count[at.EVALUATIONS] += 1
+    call_field(m.field, m.time, address(y), m.par, address(m.stages) + place * m.row)
+    m.evaluations += 1
 
 
 @compiled
@@ -48,7 +50,7 @@ def evaluate(m, t, h):
 def slope(m, d):
     """Return component d of the field at the first of ``stages``."""
     stages, dim = m.stages, m.dim
-    if m.mode == at.INVARIANTS:
+    if m.mode == INVARIANTS:
         return stages[0, d]
     value = 0.0
     for b in range(dim):
@@ -111,7 +113,7 @@ def renew(m, h):
     Relative to the size of the block, and to this size or a fraction of the largest in its group.
     """
     new, rho, y, block, group = m.new, m.rho, m.y, m.block, m.group
-    size, change, largest = m.size, m.change, m.largest
+    size, change, largest = m.size, m.moved, m.largest
     for b in range(m.blocks):
         size[b], change[b], largest[b] = 0.0, 0.0, 0.0
     finite = True
@@ -144,28 +146,28 @@ def iterate(m, t, h):
     best, last, stalled = INFINITY, 0.0, 0
     for iteration in range(MAX_ITERATIONS):
         evaluate(m, t, h)
-        if m.mode == at.POISSON:
+        if m.mode == POISSON:
             keep_poisson_energy(m)
         else:
             keep_invariants(m, h)
-        m.count[at.ITERATIONS] += 1
+        m.iterations += 1
         strict, floored = renew(m, h)
-        m.real[at.CHANGE] = strict
+        m.last = strict
         if not strict < INFINITY:
             # Growing changes overflow in the end; a NaN out of the blue is the field's own.
-            return at.DIVERGED if last > 1.0 else at.NOT_FINITE
+            return DIVERGED if last > 1.0 else NOT_FINITE
         if floored > HOPELESS * best:
-            return at.DIVERGED
+            return DIVERGED
         last = strict
         if strict <= CONVERGED:
-            return at.DONE
+            return DONE
         if floored < best:
             best, stalled = floored, 0
         else:
             stalled += 1
         if stalled >= PATIENCE + iteration // SLOWNESS and best < STAGNATION:
-            return at.DONE
-    return at.DIVERGED
+            return DONE
+    return DIVERGED
 
 
 @compiled
@@ -175,14 +177,14 @@ def solve(m, t, h):
     evaluate_at(m, t, m.y, 0)
     for d in range(dim):
         if not abs(slope(m, d)) < INFINITY:
-            return at.NOT_FINITE
-    if m.mode == at.INVARIANTS:
-        call(m.values, address(m.time), address(m.y), address(m.par), address(m.right))
+            return NOT_FINITE
+    if m.mode == INVARIANTS:
+        call_field(m.values, m.time, address(m.y), m.par, address(m.right))
         measure_gap(m)
-    length = m.real[at.LENGTH]
+    length = m.length
     extrapolated = length != 0.0 and abs(h / length) <= FARTHEST
-    outcome = at.BUDGET
-    while outcome != at.DONE:
+    outcome = BUDGET
+    while outcome != DONE:
         if extrapolated:
             predict(m, h / length)
         else:
@@ -190,18 +192,18 @@ def solve(m, t, h):
                 for d in range(dim):
                     rho[j, d] = slope(m, d) if j == 0 else 0.0
         outcome = iterate(m, t, h)
-        if outcome != at.DONE:
+        if outcome != DONE:
             if not extrapolated:
                 return outcome
             extrapolated = False
-            m.count[at.RESTARTS] += 1
+            m.restarts += 1
             evaluate_at(m, t, m.y, 0)
-    if m.mode == at.INVARIANTS:
+    if m.mode == INVARIANTS:
         culprit = find_change(m, KEPT)
         if culprit >= 0:
-            m.count[at.CULPRIT] = culprit
-            return at.NOT_KEPT
-    return at.DONE
+            m.culprit = culprit
+            return NOT_KEPT
+    return DONE
 
 
 @compiled
@@ -220,7 +222,7 @@ def end(m, h):
             term = weights[i] * value
             mean, lost = two_sum(mean, term)
             low += lost + fma(weights[i], value, -term) + weights_low[i] * value
-        if m.mode == at.INVARIANTS:
+        if m.mode == INVARIANTS:
             mean, lost = two_sum(mean, -correction(m, 0, d))
             low += lost
         term = h * mean
@@ -238,8 +240,8 @@ def commit(m, h):
         e[d] = next_e[d]
         for j in range(m.s):
             previous[j, d] = rho[j, d]
-    m.real[at.LENGTH] = h
-    m.count[at.SOLVED] = 0
+    m.length = h
+    m.solved = 0
 
 
 @compiled

@@ -2,7 +2,13 @@
 
 from math import log
 
-from integrators.kernel.control import (
+from integrators.kernel.context import BUDGET, DONE, LAND, NOT_FINITE, UNDERFLOW
+from integrators.kernel.line.memory import NOT_KEPT
+from integrators.kernel.line.sample import sample
+from integrators.kernel.line.solve import commit, end, slope, solve
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
     INFINITY,
@@ -14,10 +20,6 @@ from integrators.kernel.control import (
     bounded,
     log_factor,
 )
-from integrators.kernel.line import layout as at
-from integrators.kernel.line.sample import sample
-from integrators.kernel.line.solve import commit, end, slope, solve
-from integrators.kernel.line.views import compiled, two_sum
 
 GROW = 4.0  # of the length from one step to the next, at most
 # Iterations to aim at, at most: with a contraction h w, a unit of time costs least at h w = 1/e, which
@@ -34,7 +36,7 @@ def error(m, h):
     local error, and its units.
     """
     projection, stages, rho, y, block, group = m.projection, m.stages, m.rho, m.y, m.block, m.group
-    size, change, largest, slope = m.size, m.change, m.largest, m.slope
+    size, change, largest, slope = m.size, m.moved, m.largest, m.slope
     for b in range(m.blocks):
         size[b], change[b], largest[b], slope[b] = 0.0, 0.0, 0.0, 0.0
     for d in range(m.dim):
@@ -59,8 +61,8 @@ def error(m, h):
 
 @compiled
 def first_length(m):
-    """Return a first step from the field at the first of `Memory.stages`: short, the following grow."""
-    size, change, y, block = m.size, m.change, m.y, m.block
+    """Return a first step from the field at the first of `Trajectory.stages`: short, the following grow."""
+    size, change, y, block = m.size, m.moved, m.y, m.block
     for b in range(m.blocks):
         size[b], change[b] = 0.0, 0.0
     for d in range(m.dim):
@@ -71,119 +73,118 @@ def first_length(m):
     for b in range(m.blocks):
         if size[b] > 0.0:
             rate = max(rate, change[b] / size[b])
-    length = m.real[at.TOLERANCE] ** (1.0 / (2.0 * m.s + 1.0))
+    length = m.tolerance ** (1.0 / (2.0 * m.s + 1.0))
     return length / rate if 0.0 < rate < float("inf") else length
 
 
 @compiled
 def ready(m):
-    """Solve the step ahead with a length that the tolerance allows; H is its length."""
-    real, count = m.real, m.count
-    if count[at.SOLVED]:
-        return at.DONE
-    t = real[at.T0] + real[at.LOW]
-    grow, failure = GROW, at.UNDERFLOW
+    """Solve the step ahead with a length that the tolerance allows; `Trajectory.h` is its length."""
+    if m.solved:
+        return DONE
+    t = m.t0 + m.time_low
+    grow, failure = GROW, UNDERFLOW
     power = 1.0 / (2.0 * m.s + 1.0)
     while True:
-        h = real[at.NEXT]
+        h = m.next_length
         if not abs(h) > SHORTEST * abs(t):
             return failure
-        before = count[at.ITERATIONS]
+        before = m.iterations
         outcome = solve(m, t, h)
-        if outcome == at.NOT_KEPT:
+        if outcome == NOT_KEPT:
             return outcome
-        if outcome == at.DONE and count[at.ACCEPTED]:
+        if outcome == DONE and m.accepted:
             break
-        estimate = error(m, h) if outcome == at.DONE else INFINITY
+        estimate = error(m, h) if outcome == DONE else INFINITY
         factor = bounded(
             log_factor(
-                power * log(real[at.TOLERANCE]),
+                power * log(m.tolerance),
                 power * log(max(estimate, TINY)),
-                power * log(real[at.BEHIND]) if real[at.BEHIND] > 0.0 else INFINITY,
-                log(abs(h / real[at.LENGTH])) if real[at.BEHIND] > 0.0 else 0.0,
+                power * log(m.error_behind) if m.error_behind > 0.0 else INFINITY,
+                log(abs(h / m.length)) if m.error_behind > 0.0 else 0.0,
             ),
             grow,
         )
-        if estimate <= real[at.TOLERANCE]:
-            factor = min(factor, max(BUSY / (count[at.ITERATIONS] - before), 0.5))
-            real[at.LIMIT] *= APPROACH
-            real[at.AFTER] = h * min(factor, real[at.LIMIT] / abs(h))
-            real[at.AHEAD] = estimate
-            count[at.ACCEPTED] = 1
+        if estimate <= m.tolerance:
+            factor = min(factor, max(BUSY / (m.iterations - before), 0.5))
+            m.length_limit *= APPROACH
+            m.length_after = h * min(factor, m.length_limit / abs(h))
+            m.error_ahead = estimate
+            m.accepted = 1
             break
-        if outcome != at.DONE:
-            real[at.LIMIT] = RETREAT * abs(h)
-        failure = at.NOT_FINITE if outcome == at.NOT_FINITE else at.UNDERFLOW
-        real[at.NEXT] = h * min(factor, SAFETY)
-        count[at.REJECTIONS] += 1
+        if outcome != DONE:
+            m.length_limit = RETREAT * abs(h)
+        failure = NOT_FINITE if outcome == NOT_FINITE else UNDERFLOW
+        m.next_length = h * min(factor, SAFETY)
+        m.rejections += 1
         grow = 1.0
-    real[at.H] = h
-    count[at.SOLVED] = 1
-    return at.DONE
+    m.h = h
+    m.solved = 1
+    return DONE
 
 
 @compiled
 def take(m):
     """Take the step ahead, which is solved."""
-    h = m.real[at.H]
+    h = m.h
     end(m, h)
     commit(m, h)
-    t, low = two_sum(m.real[at.T0], h)
-    m.real[at.T0], m.real[at.LOW] = two_sum(t, low + m.real[at.LOW])
-    m.real[at.NEXT] = m.real[at.AFTER]
-    m.real[at.BEHIND] = m.real[at.AHEAD]
-    m.count[at.ACCEPTED] = 0
-    m.count[at.STEPS] += 1
+    t, low = two_sum(m.t0, h)
+    m.t0, m.time_low = two_sum(t, low + m.time_low)
+    m.next_length = m.length_after
+    m.error_behind = m.error_ahead
+    m.accepted = 0
+    m.steps += 1
 
 
 @compiled
-def vary(m, between, times, made, out, budget):
+def vary(m, between, count, times, made, out, budget):
     """Take steps to the samples' times; parts as in `sample`. Returns how it ended."""
-    real, count = m.real, m.count
-    for i in range(made, times.size):
-        count[at.MADE] = i
+    for i in range(made, count):
+        m.made = i
         while True:
-            rest = (times[i] - real[at.T0]) - real[at.LOW]
+            rest = (times[i] - m.t0) - m.time_low
             if abs(rest) <= CLOSE * abs(times[i]):
                 rest = 0.0
                 break
-            outcome = at.DONE if count[at.ACCEPTED] else ready(m)
-            if outcome != at.DONE:
+            outcome = DONE if m.accepted else ready(m)
+            if outcome != DONE:
                 return outcome
-            if abs(rest) < abs(real[at.H]) - CLOSE * abs(times[i]):
+            if abs(rest) < abs(m.h) - CLOSE * abs(times[i]):
                 break
             if budget == 0:
-                return at.BUDGET
+                return BUDGET
             budget -= 1
             outcome = ready(m)  # again, if a partial step has taken its place
-            if outcome != at.DONE:
+            if outcome != DONE:
                 return outcome
             take(m)
-        t = real[at.T0] + real[at.LOW]
-        outcome = sample(m, between, t, real[at.H], rest, out[i])
-        if outcome != at.DONE:
+        t = m.t0 + m.time_low
+        outcome = sample(m, between, t, m.h, rest, out + m.dim * i)
+        if outcome != DONE:
             return outcome
-        if between == at.LAND and rest != 0.0:
-            real[at.T0], real[at.LOW] = times[i], 0.0
-            count[at.ACCEPTED] = 0
-    count[at.MADE] = times.size
-    return at.DONE
+        if between == LAND and rest != 0.0:
+            m.t0, m.time_low = times[i], 0.0
+            m.accepted = 0
+    m.made = count
+    return DONE
 
 
 @compiled
-def walk(m, times, out, end_time, budget):
-    """Take ``budget`` steps at most, none beyond ``end_time``, and note their times and states."""
+def walk(m, times, out, budget):
+    """Take ``budget`` steps at most, none beyond times[0], and note their times and states."""
+    end_time = times[0]
     for i in range(budget):
-        m.count[at.MADE] = i
+        m.made = i
         outcome = ready(m)
-        if outcome != at.DONE:
+        if outcome != DONE:
             return outcome
-        rest = (end_time - m.real[at.T0]) - m.real[at.LOW]
-        if abs(rest) < abs(m.real[at.H]) - CLOSE * abs(end_time):
-            return at.DONE
+        rest = (end_time - m.t0) - m.time_low
+        if abs(rest) < abs(m.h) - CLOSE * abs(end_time):
+            return DONE
         take(m)
-        times[i] = m.real[at.T0]
-        for d in range(m.y.size):
-            out[i, d] = m.y[d]
-    m.count[at.MADE] = budget
-    return at.BUDGET
+        times[i] = m.t0
+        for d in range(m.dim):
+            out[m.dim * i + d] = m.y[d]
+    m.made = budget
+    return BUDGET

@@ -22,7 +22,8 @@ import numpy as np
 
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM, TOLERANCE
-from integrators.kernel import native, store
+from integrators.kernel.native import binary as native
+from integrators.kernel.native import store
 from integrators.legendre import legendre, tables
 from integrators.plugins.rebound import layout
 from problems.errors import InputError

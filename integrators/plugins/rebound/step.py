@@ -14,7 +14,7 @@ added, and positions and velocities carry along what their last addition rounded
 import numpy as np
 from numba import types
 
-from integrators.kernel import native
+from integrators.kernel.native import binary as native
 from integrators.plugins.rebound import layout as at
 from integrators.plugins.rebound.memory import (
     added,

@@ -227,7 +227,7 @@ def _program(
     system: System, k: int, s: int, h: float | None, tol: float | None, defect: float | None
 ) -> "integrators.protocol.Program":
     if defect is not None:
-        from integrators.kernel.adaptive.program import AdaptiveProgram
+        from integrators.kernel.program import AdaptiveProgram
 
         assert tol is not None
         return AdaptiveProgram(system, k=k, s=s, tol=tol, defect=defect, h=h)

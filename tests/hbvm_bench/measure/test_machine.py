@@ -77,12 +77,12 @@ def test_the_timing_pass_goes_on_where_only_the_clock_differs():
 RESTRICTED = """
 from hbvm_bench.measure import machine
 import problems
-from integrators.kernel import native
-from integrators.kernel.field import assembly
+from integrators.kernel.native import binary
+from integrators.kernel.native.field import assembly
 print(machine.describe().get("ours_built_for"))
 print(machine.kind(machine.describe()))
 print(assembly(problems.load("pendulum").system, "field", 8).count("zmm"))
-print(native.platform())
+print(binary.platform())
 """
 
 

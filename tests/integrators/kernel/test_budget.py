@@ -4,7 +4,7 @@ import pytest
 
 import problems
 from integrators.kernel import budget
-from integrators.kernel.field import assembly
+from integrators.kernel.native.field import assembly
 from problems import emit
 
 

@@ -1,1 +1,0 @@
-"""Steps of varying length on the compiled kernel."""

@@ -1,0 +1,295 @@
+"""The memory of a trajectory, by name: every slot with its type, its shape and its meaning.
+
+Compiled functions take the address of a `Context` and nothing else, so their signature
+does not change with what they do, and a batch is a row of contexts. There ``ctx.h`` is a
+number and ``ctx.stages`` an address; see `integrators.kernel.native.memory`.
+
+Stage memory is a structure of arrays: `calls` blocks of `padded` rows of `lanes`
+doubles; row d of a block holds component d of the block's stages, side by side, as
+the vector field wants it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel.native.memory import Array, Integer, Memory, Real
+from integrators.kernel.tables import Constants
+from problems.problem import System
+
+Numbers = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# How a step, or an advance, ended.
+# SCATTERED: the iteration has converged, but not to the trajectory.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED = range(7)
+
+# How states between steps are made.
+SIDE, LAND, DENSE = range(3)
+
+# Which nonlinear solver is used. AUTO: fixed point, and the implicit solver where that does not contract.
+FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
+
+# What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
+UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
+
+KINKS_KEPT = 64
+
+STAGE = ("calls", "padded", "lanes")  # shape of stage memory
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What the memory of all trajectories of a program has in common.
+
+    Attributes
+    ----------
+    rows : int
+        Components of a stage.
+    second : bool
+        Second-order form: a stage holds positions, the state (q, p).
+    unit : bool
+        Whether the rows' factors are in the matrix.
+    field : int
+        Address of the vector field.
+    fused : int
+        Address of whole sweeps; 0: none.
+    parameters : int
+        Length of the parameter vector.
+    block, group : ndarray of int
+        Block of each row, group of each block.
+    constants : Constants
+        The method's.
+    """
+
+    rows: int
+    second: bool
+    unit: bool
+    field: int
+    fused: int
+    parameters: int
+    block: Integers
+    group: Integers
+    constants: Constants
+
+    @property
+    def dim(self) -> int:
+        """Length of the state."""
+        return self.rows * (2 if self.second else 1)
+
+
+class Context(Memory):
+    """A trajectory: what is integrated and how, tables, stages, the state, and how far it is.
+
+    Parameters
+    ----------
+    shape : Shape
+        Of the program.
+    tables : mapping of str to ndarray
+        Tables by their slot's name; not copied.
+    """
+
+    # --- what is integrated, and how ---
+    field = Integer()  # address of void(times, stages, par, values) on one block of stages
+    fused = Integer()  # address of whole sweeps, void(context, count, tested); 0: none, see `step.fused`
+    parameters = Integer()
+    par = Array("parameters")
+    rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
+    padded = Integer()  # `rows` rounded up to a multiple of 8
+    lanes = Integer()  # stages per call of the field: 8 or 16
+    calls = Integer()  # of the field per evaluation: blocks of stage memory
+    chunks = Integer()  # groups of 8 stages that carry weight
+    route = Integer()  # 8, 16: one matrix of so many columns; WIDE: a larger one; THROUGH: by coefficients
+    second = Integer()  # 1: second-order form
+    varying = Integer()  # 1: steps of varying length
+    unit = Integer()  # 1: the row's factor is in the matrix
+    k = Integer()  # stages, for the counters
+    s = Integer()  # degree
+
+    # --- tables ---
+    raw_matrix = Array()  # values -> stages (THROUGH: coefficients -> stages), for a step of 1
+    matrix = Array(8, "matrix_size")  # the same for the step h
+    extrapolation = Array()  # the previous step's values -> stages
+    matrix_size = Integer()  # in vectors of 8
+    projection = Array()  # values -> coefficients
+    groups = Integer()  # of 8 coefficients
+    first = Integer()  # where gamma_0 is among them
+    mode_projection = Array()  # values -> the coefficients that are extrapolated
+    mode_groups = Integer()
+    modes = Integer()
+    most_groups = Integer()  # the larger of `groups` and `mode_groups`
+    recurrence = Array()  # pairs a, b for P_{j+1} = a x P_j - b P_{j-1}
+    basis = Array(64, "chunks", "most_groups")  # room for a table made on the way
+    nodes = Array()
+    nodes_low = Array()
+    weights = Array()
+    weights_low = Array()
+    position_weights = Array()
+    position_weights_low = Array()
+    velocity = Array("padded")  # q' = velocity * p, by row
+    row_factor = Array("padded")  # h * velocity by row; 1 in first-order form
+    drift_factor = Array(2, "padded")  # the same in blocks [kh kh kh kh 0 0 0 0]
+    kick_factor = Array(2, "padded")  # and in blocks [1 1 1 1 kh kh kh kh]
+
+    # --- stage memory ---
+    stages = Array(*STAGE)
+    old_stages = Array(*STAGE)  # before the last product, where changes are measured
+    values = Array(*STAGE)  # of the field
+    base = Array(*STAGE)  # what a stage has besides the state and the forces
+    sums = Array(*STAGE)
+    coefficients = Array(8, "most_groups", "padded")
+    times = Array("calls", "lanes")
+
+    # --- the state, and what belongs to a row ---
+    state = Array(2, "padded")  # second-order form: blocks [p p p p q q q q]; first-order form: y
+    error = Array(2, "padded")  # what `state` lacks, in the same places
+    next_state = Array(2, "padded")
+    next_error = Array(2, "padded")
+    increment = Array()  # what the implicit solver has found that the step adds to q, p or to y
+    row_state = Array("padded")
+    row_error = Array("padded")
+    row_drift = Array("padded")  # h q'
+    row_drift_low = Array("padded")
+    strict = Array("padded")  # 1 / size of the row's block
+    floored = Array("padded")  # 1 / size of the row's block, small ones raised to a part of the largest
+    block_count = Integer()
+    group_count = Integer()
+    block = Array(of=int)  # of each row
+    group = Array(of=int)  # of each block
+    size = Array("block_count")
+    largest = Array("block_count")  # size in each group
+
+    # --- where it is, and the nonlinear solver ---
+    h = Real()
+    t0 = Real()
+    time_low = Real()  # what `t0` lacks, where steps vary
+    n = Integer()  # steps since `t0`
+    length = Real()  # of the step that `values` belong to; 0: none
+    solved = Integer()  # what solves the step ahead: UNSOLVED, BY_VALUES, BY_INCREMENT
+    age = Integer()  # steps until sizes are taken anew
+    free = Integer()  # iterations without a test
+    tests = Integer()
+    tried = Integer()  # iterations of this start
+    predicted = Integer()  # 1: the start was extrapolated
+    stalled = Integer()
+    best = Real()  # the smallest change
+    last = Real()  # change; see `step.iterate`
+    change = Real()  # the largest of the last fused sweep
+    tolerance = Real()
+    outcome = Integer()
+    untested = Integer()  # iterations left before the first test, in a batch
+    alive = Integer()  # 1: takes part in a batch
+    made = Integer()  # samples
+    strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
+    solver = Integer()  # address of the implicit solver, int64(context, memory, started); 0: not there yet
+    solver_memory = Integer()
+    implicit = Integer()  # 1: the implicit solver is at work
+    wanted = Integer()  # 1: it should be, and is not there
+    slow = Integer()  # steps in a row at which the fixed-point iteration was slow
+    held = Integer()  # steps for which the implicit solver stays at work when it takes over
+    left = Integer()  # steps of these that are left
+
+    # --- counters ---
+    steps = Integer()
+    iterations = Integer()
+    evaluations = Integer()
+    restarts = Integer()
+    partial = Integer()
+    implicit_steps = Integer()
+    switches = Integer()
+    rejections = Integer()
+
+    # --- steps of varying length; see `step.vary` ---
+    allowed_error = Real()  # the estimated local error of a step, relative, at most
+    allowed_defect = Real()  # the same of the quadrature; infinite: any
+    error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
+    # b_l P_j(c_l) for ten j: 0 .. 3, the two up to `error_degree`, the last two, two from the middle; then
+    # what extrapolates to the start and to the end of the step.
+    estimators = Array()
+    estimates = Array(8, "rows")  # the first eight of these coefficients of the field, row by row
+    extent = Array("block_count")  # of blocks: their size in the step that is estimated,
+    slope = Array("block_count")  # their largest coefficient,
+    missing = Array("block_count")  # that of the error,
+    unseen = Array("block_count")  # that of the defect,
+    abrupt = Array("block_count")  # and the largest that does not fall off as a smooth field's do
+    steepest = Array("block_count")  # slope in each group
+    next_length = Real()  # of the next step to be tried
+    length_after = Real()  # of the one after the step that is solved
+    length_behind = Real()  # of the last step; 0: unknown
+    error_behind = Real()  # logarithm of the last step's estimated error, divided by its order ...
+    error_ahead = Real()  # ... and of that of the step that is solved
+    defect_behind = Real()  # the same for the defect
+    defect_ahead = Real()
+    error_aim = Real()  # logarithm of the error to aim at, divided by its order
+    defect_aim = Real()
+    error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
+    defect_decay = Real()  # the same where the defect is
+    log_rate = Real()  # logarithm of the iteration's contraction, as measured
+    least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
+    rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
+    length_limit = Real()  # no step is longer, for what the iteration allows
+    longest = Real()  # no step is longer, for what the user allows
+    stop = Real()  # no step passes this time; infinite: none
+    doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
+    slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
+    negligible = Real()  # part of a block's size that the error at a kink may be
+    kinked = Integer()  # 1: in the step that was estimated the field does not look smooth
+    kinks = Integer()  # places where steps were rejected for that
+    kink_end = Real()  # where the first such step at the last place would have ended
+    doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
+    kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
+
+    def __init__(self, shape: Shape, tables: Mapping[str, Numbers]):
+        c, rows = shape.constants, shape.rows
+        groups, mode_groups = -(-(c.s + c.first) // 8), -(-c.modes // 8)
+        numbers = {
+            "field": shape.field, "fused": shape.fused, "parameters": shape.parameters,
+            "rows": rows, "padded": -(-rows // 8) * 8, "lanes": c.lanes, "calls": -(-c.k // c.lanes),
+            "chunks": -(-c.k // 8), "route": c.route, "second": shape.second, "unit": shape.unit,
+            "k": c.k, "s": c.s, "matrix_size": tables["raw_matrix"].size // 8, "groups": groups,
+            "first": c.first, "mode_groups": mode_groups, "modes": c.modes,
+            "most_groups": max(groups, mode_groups),
+            "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1,
+        }  # fmt: skip
+        super().__init__(numbers, {**tables, "block": shape.block, "group": shape.group})
+        self.shape = shape
+        self.row_factor[:] = 1.0
+        self.kick_factor.reshape(-1, 8)[:, :4] = 1.0
+
+    def read(self) -> Numbers:
+        """Return a copy of the state, as (q, p) or y; shape (dim,)."""
+        state, rows = self.state, self.shape.rows
+        if not self.shape.second:
+            return state[:rows].copy()
+        places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+        return state[np.concatenate([places + 4, places])]
+
+    def set_factors(self, h: float) -> None:
+        """Set h and what is h times the velocities."""
+        self.h = h
+        if self.shape.second:
+            rows = self.shape.rows
+            kh = h * self.velocity[:rows]
+            places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+            self.row_factor[:rows] = kh
+            self.drift_factor[places] = kh
+            self.kick_factor[places + 4] = kh
+
+
+def blocks(system: System) -> tuple[Integers, Integers]:
+    """Return the block of each component, and the group (q or p) of each block.
+
+    The change of an iteration is measured relative to the size of a block: the
+    coordinates or momenta of one body, where the system says that it has bodies, so
+    that a planetoid's tiny momentum is resolved, and else every component by itself.
+    """
+    dim, dof = system.dim, system.dof
+    bodies = getattr(system, "bodies", None)
+    width = bodies.dimension if bodies is not None else 1
+    block = np.arange(dim) // width
+    group = np.zeros(dim // width, dtype=np.int64)
+    if dof is not None:
+        group[dof // width :] = 1
+    return block, group

@@ -1,0 +1,115 @@
+"""The slots of a `Memory` as attributes in compiled code: ``ctx.h``, ``ctx.rows = n``, ``ctx.stages[i]``."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import AttributeTemplate, signature
+from numba.extending import (
+    infer_getattr,
+    lower_getattr_generic,
+    lower_setattr_generic,
+    models,
+    register_model,
+)
+from numba.np import arrayobj
+
+from integrators.kernel.native.memory import Integer, Memory, Real, Table
+from integrators.kernel.simd.emit import INTEGER
+from integrators.kernel.simd.lanes import intrinsic
+from integrators.kernel.simd.views import DOUBLES, INTEGERS
+
+
+class MemoryType(types.Type):
+    """The address of a `Memory` of one class."""
+
+    def __init__(self, declared: type[Memory]):
+        self.declared = declared
+        super().__init__(name=f"Memory({declared.__module__}.{declared.__qualname__})")
+
+
+@register_model(MemoryType)
+class _MemoryModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, INTEGER.as_pointer())
+
+
+def _kind(slot: Any) -> Any:
+    """Return the numba type of a slot."""
+    if isinstance(slot, Integer):
+        return types.int64
+    if isinstance(slot, Real):
+        return types.float64
+    if isinstance(slot, Table):
+        return types.Array(types.float64 if slot.of is float else types.int64, len(slot.shape), "C")
+    return DOUBLES if slot.of is float else INTEGERS
+
+
+@infer_getattr
+class _Attributes(AttributeTemplate):
+    key = MemoryType
+
+    def generic_resolve(self, typ: Any, attr: str) -> Any:
+        slot = typ.declared.slots.get(attr)
+        return None if slot is None else _kind(slot)
+
+
+def _word(context: Any, builder: Any, memory: Any, slot: Any, kind: Any) -> Any:
+    """Return where a slot is, as a pointer to what it holds."""
+    place = builder.gep(memory, [ir.Constant(INTEGER, slot.place)])
+    return builder.bitcast(place, context.get_value_type(kind).as_pointer())
+
+
+@lower_getattr_generic(MemoryType)
+def _get(context, builder, typ, value, attr):
+    slot = typ.declared.slots[attr]
+    kind = _kind(slot)
+    if not isinstance(slot, Table):
+        return builder.load(_word(context, builder, value, slot, kind))
+
+    def fixed(slot: Any, kind: Any) -> Any:
+        # Neither the address of a table nor its sizes change while compiled code runs: loops load them once.
+        found = builder.load(_word(context, builder, value, slot, kind))
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return found
+
+    sizes = [
+        ir.Constant(INTEGER, n) if isinstance(n, int) else fixed(typ.declared.slots[n], types.int64)
+        for n in slot.shape
+    ]
+    made = context.make_array(kind)(context, builder)
+    item = ir.Constant(INTEGER, 8)
+    strides = [builder.mul(sizes[-1], item), item] if kind.ndim == 2 else [item]
+    data = fixed(slot, types.CPointer(kind.dtype))
+    arrayobj.populate_array(made, data, sizes, strides, item, meminfo=None)
+    return made._getvalue()
+
+
+@lower_setattr_generic(MemoryType)
+def _set(context, builder, sig, args, attr):
+    slot = sig.args[0].declared.slots[attr]
+    builder.store(args[1], _word(context, builder, args[0], slot, _kind(slot)))
+
+
+def view(declared: type[Memory]) -> Any:
+    """Return what makes of an address (intp), in compiled code, a memory of that class."""
+    kind = MemoryType(declared)
+
+    @intrinsic
+    def at(typing, address):
+        def generate(context, builder, sig, args):
+            return builder.inttoptr(args[0], INTEGER.as_pointer())
+
+        return signature(kind, types.intp), generate
+
+    return at
+
+
+@intrinsic
+def address(typing, array):
+    """Return where the numbers of numba's array are, as slots of `Array` have it."""
+
+    def generate(context, builder, sig, args):
+        return context.make_array(sig.args[0])(context, builder, args[0]).data
+
+    return signature(DOUBLES if array.dtype == types.float64 else INTEGERS, array), generate

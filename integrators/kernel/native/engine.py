@@ -1,0 +1,55 @@
+"""Compiled entries in this process, called with integers and addresses."""
+
+import ctypes
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+from integrators.kernel.native import binary, store
+from integrators.kernel.native.foreign import raise_error
+
+# What the entries of `step` and, but for batches, of `line` can do; see `integrators.kernel.step.entry`.
+RESET, ADVANCE, ADVANCE_BATCH, WALK = range(4)
+ENTRY = "what ctx side between count times targets parts first out budget"
+
+
+class Engine:
+    """A compiled function: compiled, loaded, or loaded before, when it is first needed.
+
+    Parameters
+    ----------
+    function : callable
+        Returns the numba function; called, and numba imported, only where it has to be compiled.
+    arguments : str
+        Names of the integers that it takes.
+    *sources : str
+        Folders and modules of the kernel whose code is in it: an edit of any makes another one.
+    """
+
+    def __init__(self, function: Callable[[], Any], arguments: str, *sources: str):
+        self._make, self._arguments, self._sources = function, arguments.split(), sources
+
+    def code(self) -> binary.Native:
+        """Return the machine code."""
+
+        def make() -> tuple[str, bytes]:
+            from numba import types
+
+            return " ", binary.build(self._make(), [(types.int64, "i64")] * len(self._arguments), "i64")
+
+        name = store.key("engine", self._make.__module__, binary.sources(*self._sources))
+        return binary.obtain(name, make)
+
+    @cached_property
+    def _function(self) -> Any:
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * len(self._arguments))(self.code().address)
+
+    def __call__(self, *arguments: int, **named: int) -> int:
+        """Call it; missing arguments are 0. The interpreter's lock is released meanwhile.
+
+        What a field in Python raised is raised here, as a `UserError`; the memory holds what was made before.
+        """
+        rest = [named.get(name, 0) for name in self._arguments[len(arguments) :]]
+        outcome = self._function(*arguments, *rest)
+        raise_error()
+        return outcome

@@ -1,0 +1,165 @@
+"""Fields that are not traced, behind the kernel's ``void(t, stages, par, values)``.
+
+A numba function is wrapped by numba and called from machine code. Any other Python
+function is called back, under the interpreter's lock. Errors that a callback cannot
+let through are kept here until the kernel has returned.
+"""
+
+import ctypes
+import threading
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from integrators.kernel.native import binary
+from integrators.kernel.native.field import ONE_BY_ONE, compile_field
+from integrators.protocol import UserError
+from problems.systems.base import System
+from problems.systems.untraced import Foreign
+
+
+class _Raised(threading.local):
+    """What a user's function has raised; a callback runs in the thread that has called the kernel."""
+
+    error: BaseException | None = None
+
+
+_raised = _Raised()
+
+
+def field_of(system: System, what: str, lanes: int) -> binary.Native:
+    """Return one of a system's functions for stage memory; see `field.compile_field`.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For another function than the field of a system that is not traced.
+    numba.core.errors.NumbaError
+        If a numba function cannot be compiled for arrays of numbers.
+    """
+    if not isinstance(system, Foreign) or what != "field":
+        return compile_field(system, what, lanes)
+    started = perf_counter()
+    with binary.lock:  # two of them would leave one thread with the address of what the other throws away
+        known = lanes in system.native
+        if not known:
+            system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
+        address, _ = system.native[lanes]
+    return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
+
+
+def raise_error() -> None:
+    """Raise what a function of a user has raised in this thread since the last call.
+
+    Raises
+    ------
+    integrators.protocol.UserError
+        For its exceptions; Ctrl-C and the like are raised as they are.
+    """
+    error, _raised.error = _raised.error, None
+    if isinstance(error, Exception):
+        raise UserError(error) from error
+    if error is not None:
+        raise error
+
+
+def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
+    """Return the address of a numba field on stage memory, and what keeps it alive."""
+    import numba
+    from numba import types
+
+    carray: Any = numba.carray  # type: ignore[attr-defined]
+    f, dim, size = system.f, system.dim, system.n_par
+    takes_parameters, in_place = system.takes_parameters, system.in_place
+    njit: Any = numba.njit
+
+    # One of these four is compiled: numba chooses no branch by the number of arguments.
+    def plain(t, y, par, dy):
+        value = f(t, y)
+        if len(value) != dim:
+            raise ValueError("f does not return dim numbers")
+        for d in range(dim):
+            dy[d] = value[d]
+
+    def plain_in_place(t, y, par, dy):
+        f(t, y, dy)
+
+    def parametric(t, y, par, dy):
+        value = f(t, y, par)
+        if len(value) != dim:
+            raise ValueError("f does not return dim numbers")
+        for d in range(dim):
+            dy[d] = value[d]
+
+    def parametric_in_place(t, y, par, dy):
+        f(t, y, par, dy)
+
+    chosen = ((plain, plain_in_place), (parametric, parametric_in_place))
+    inner = njit(chosen[takes_parameters][in_place])
+
+    # Loops, not array expressions: those take seconds to compile.
+    def field(t, stages, par, values):
+        times = carray(t, (lanes,))
+        rows = carray(stages, (dim, lanes))
+        out = carray(values, (dim, lanes))
+        numbers = np.empty(size)
+        given = carray(par, (size,))
+        for i in range(size):
+            numbers[i] = given[i]
+        for d in range(dim):
+            for l in range(lanes):
+                out[d, l] = np.nan  # what is left if f raises
+        y = np.empty(dim)
+        dy = np.empty(dim)
+        for l in range(lanes):
+            same = l > 0 and times[l] == times[l - 1]
+            for d in range(dim):
+                same = same and rows[d, l] == rows[d, l - 1]
+            if not same:  # idle lanes repeat the last stage
+                for d in range(dim):
+                    y[d] = rows[d, l]
+                    dy[d] = np.nan
+                inner(times[l], y, numbers, dy)
+            for d in range(dim):
+                out[d, l] = dy[d]
+
+    pointer = types.CPointer(types.float64)
+    made = numba.cfunc(types.void(pointer, pointer, pointer, pointer))(field)
+    address: Any = made.address
+    return address, made
+
+
+def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
+    """Return the address of a callback to a Python field, and what keeps it alive."""
+    dim, size = system.dim, system.n_par
+    line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * lanes, size))
+
+    def view(kind: Any, address: int) -> Any:
+        return np.ctypeslib.as_array(kind.from_address(address))
+
+    def field(t: int, stages: int, par: int, values: int) -> None:
+        out = view(block, values).reshape(dim, lanes)
+        out[:] = np.nan
+        if _raised.error is not None:
+            return
+        try:
+            times = view(line, t)
+            rows = view(block, stages).reshape(dim, lanes)
+            given = view(numbers, par).copy() if size else np.empty(0)
+            for l in range(lanes):
+                if l and times[l] == times[l - 1] and (rows[:, l] == rows[:, l - 1]).all():
+                    out[:, l] = out[:, l - 1]  # idle lanes repeat the last stage
+                    continue
+                derivative = np.empty(dim)
+                system.evaluate(float(times[l]), rows[:, l].copy(), given, derivative)
+                out[:, l] = derivative
+        except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
+            _raised.error = error
+
+    kind: Callable[..., Any] = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
+    made: Any = kind(field)
+    address = ctypes.cast(made, ctypes.c_void_p).value
+    assert address is not None
+    return address, made

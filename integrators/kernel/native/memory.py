@@ -1,0 +1,180 @@
+"""Memory that Python and compiled code share, by name.
+
+A subclass of `Memory` declares its slots once, with their types and shapes. Here
+they are attributes of an object; in compiled code `integrators.kernel.simd.attributes`
+makes them attributes of its address:
+
+    class Orbit(Memory):
+        rows = Integer()
+        h = Real()
+        state = Array(2, "rows")
+
+    orbit = Orbit({"rows": 3})          orbit.h = 0.5           orbit.state[:] = 1.0
+
+    @compiled
+    def drift(orbit):                   # machine code: two loads at constant places
+        return orbit.h * orbit.state[0]
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LINE = 8  # words in 64 bytes, at a multiple of which every array begins
+
+
+def aligned(n: int) -> Numbers:
+    """Return n zeros at an address that is a multiple of 64."""
+    room = np.zeros(n + LINE)
+    start = (-room.ctypes.data % 64) // 8
+    return room[start : start + n]
+
+
+class Slot:
+    """One word of eight bytes: a number, or the address of an array."""
+
+    name: str
+    place: int
+    """Which word it is."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+
+class Integer(Slot):
+    """A whole number, or the address of a function."""
+
+    @overload
+    def __get__(self, memory: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, memory: "Memory", owner: type) -> int: ...
+    def __get__(self, memory: "Memory | None", owner: type) -> "Self | int":
+        return self if memory is None else int(memory.words[self.place])
+
+    def __set__(self, memory: "Memory", value: int) -> None:
+        memory.words[self.place] = value
+
+
+class Real(Slot):
+    """A double."""
+
+    @overload
+    def __get__(self, memory: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, memory: "Memory", owner: type) -> float: ...
+    def __get__(self, memory: "Memory | None", owner: type) -> "Self | float":
+        return self if memory is None else float(memory.reals[self.place])
+
+    def __set__(self, memory: "Memory", value: float) -> None:
+        memory.reals[self.place] = value
+
+
+class Array(Slot):
+    r"""The address of an array.
+
+    In compiled code ``x[i]`` is one number of it, whatever its shape, and ``x + n`` its part from n on.
+
+    Parameters
+    ----------
+    *shape : int or str
+        Numbers, or names of `Integer` slots; their product is the length. None: the array is
+        `Memory.point`\ ed to.
+    of : {float, int}
+        What it holds.
+    """
+
+    def __init__(self, *shape: int | str, of: type = float):
+        self.shape, self.of = shape, of
+
+    @overload
+    def __get__(self, memory: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, memory: "Memory", owner: type) -> Any: ...
+    def __get__(self, memory: "Memory | None", owner: type) -> Any:
+        return self if memory is None else memory.array(self)
+
+
+class Table(Array):
+    """An `Array` that compiled code sees as numba's own array, with its shape: ``x[i, j]``, ``x.shape``."""
+
+
+class Memory:
+    """Slots, and the arrays that belong to them, in one piece of memory.
+
+    Parameters
+    ----------
+    numbers : mapping of str to number
+        What slots begin with; the shapes of arrays follow from it. The others are 0.
+    arrays : mapping of str to ndarray
+        Arrays to point to, by their slots' names; not copied.
+
+    Attributes
+    ----------
+    words, reals : ndarray
+        The slots as integers and as doubles: the same memory.
+    address : int
+        For compiled functions.
+    """
+
+    slots: ClassVar[dict[str, Slot]] = {}
+
+    def __init_subclass__(cls) -> None:
+        cls.slots = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
+        for place, slot in enumerate(cls.slots.values()):
+            slot.place = place
+
+    def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
+        def length(slot: Array) -> int:
+            return int(np.prod([numbers[n] if isinstance(n, str) else n for n in slot.shape], dtype=int))
+
+        end = -(-len(self.slots) // LINE) * LINE
+        self._own: dict[str, tuple[int, int]] = {}  # where an array begins and ends
+        for name, slot in self.slots.items():
+            if isinstance(slot, Array) and slot.shape and name not in arrays:
+                self._own[name] = (end, end + length(slot))
+                end += -(-max(length(slot), 1) // LINE) * LINE
+        self._lies_in(aligned(end))
+        for name, (start, _) in self._own.items():
+            self.words[self.slots[name].place] = self.address + 8 * start
+        for name, value in numbers.items():
+            setattr(self, name, value)
+        self._pointed: dict[str, NDArray[Any]] = {}
+        self.point(arrays)
+
+    def _lies_in(self, memory: Numbers) -> None:
+        self._memory = memory
+        self.reals: Numbers = memory[: len(self.slots)]
+        self.words: Integers = self.reals.view(np.int64)
+        self.address: int = memory.ctypes.data
+
+    def copy(self) -> Self:
+        """Return memory of its own with the same content, which points to the same arrays."""
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        other._own, other._pointed = self._own.copy(), self._pointed.copy()
+        memory = aligned(self._memory.size)
+        memory[:] = self._memory
+        other._lies_in(memory)
+        other.words[[self.slots[name].place for name in self._own]] += other.address - self.address
+        return other
+
+    def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Let slots point to arrays, and keep these alive."""
+        for name, array in arrays.items():
+            self._own.pop(name, None)
+            self._pointed[name] = array
+            self.words[self.slots[name].place] = array.ctypes.data
+
+    def array(self, slot: Array) -> NDArray[Any]:
+        """Return the array that a slot points to now; compiled code may have exchanged it for another."""
+        if slot.name in self._pointed:
+            return self._pointed[slot.name]
+        start = (int(self.words[slot.place]) - self.address) // 8
+        end = next(end for begin, end in self._own.values() if begin == start)
+        found = self._memory[start:end]
+        return found if slot.of is float else found.view(np.int64)

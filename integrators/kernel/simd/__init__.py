@@ -1,0 +1,1 @@
+"""Arithmetic on lanes: vectors of doubles as numba values, their functions, loads and sums."""

@@ -1,0 +1,236 @@
+"""sin, cos, tan, exp and log of lanes, all lanes at once.
+
+Argument reduction with explicit fused operations (Cody and Waite), then the
+polynomials of fdlibm (Sun Microsystems, 1993), Taylor's for exp. Largest error
+over a million arguments, in units in the last place, asserted in the tests:
+sin and cos 0.77, log 0.84, exp 0.97; tan, the quotient of sine and cosine, 2.1.
+sin and tan are odd and cos is even to the last bit. Where a lane of sin, cos or
+tan lies beyond 1e5 in size, all lanes of that call go one after another through
+the C library.
+
+A sine of eight lanes takes 4 ns, where eight of the C library take 45 ns: a
+pendulum's sweep over eight stages 28 ns instead of 70, a double pendulum's 44
+instead of 226.
+"""
+
+import math
+from typing import Any
+
+from llvmlite import ir
+
+from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
+from integrators.kernel.simd.lanes import Lanes, register
+
+# Adding 1.5 * 2^52 leaves the nearest whole number in the lowest bits.
+SHIFT = 6755399441055744.0
+SHIFT_BITS = 0x4338000000000000
+LIMIT = 1e5
+
+# pi/2 in three parts; the first two have 53 bits each.
+HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+SINE = (
+    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+    2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
+)  # fmt: skip
+COSINE = (
+    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+    -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
+)  # fmt: skip
+LN2 = (0.6931471805599453, 2.3190468138462996e-17)
+LN2_SHORT = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+LOGARITHM = (
+    6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01,
+    2.222219843214978396e-01, 1.818357216161805012e-01, 1.531383769920937332e-01,
+    1.479819860511658591e-01,
+)  # fmt: skip
+
+
+class _Value:
+    """A vector under construction, with the operators that formulas need."""
+
+    def __init__(self, builder: Any, value: Any):
+        self.builder, self.value = builder, value
+        self.count = value.type.count
+
+    def _of(self, other: "_Value | float") -> Any:
+        if isinstance(other, _Value):
+            return other.value
+        return ir.Constant(vector(self.count), [float(other)] * self.count)
+
+    def of(self, number: float) -> "_Value":
+        """Return the number in every lane."""
+        return self._make(self._of(number))
+
+    def _make(self, value: Any) -> "_Value":
+        return _Value(self.builder, value)
+
+    def __add__(self, other: "_Value | float") -> "_Value":
+        return self._make(self.builder.fadd(self.value, self._of(other)))
+
+    def __sub__(self, other: "_Value | float") -> "_Value":
+        return self._make(self.builder.fsub(self.value, self._of(other)))
+
+    def __rsub__(self, other: float) -> "_Value":
+        return self._make(self.builder.fsub(self._of(other), self.value))
+
+    def __mul__(self, other: "_Value | float") -> "_Value":
+        return self._make(self.builder.fmul(self.value, self._of(other)))
+
+    def __truediv__(self, other: "_Value | float") -> "_Value":
+        return self._make(self.builder.fdiv(self.value, self._of(other)))
+
+    def __neg__(self) -> "_Value":
+        return self._make(self.builder.fneg(self.value))
+
+    def fma(self, factor: "_Value | float", term: "_Value | float") -> "_Value":
+        """Return the value times a factor plus a term, rounded once."""
+        return self._make(llvm_call(self.builder, "fma", self.value, self._of(factor), self._of(term)))
+
+    def polynomial(self, coefficients: Any) -> "_Value":
+        """Horner's scheme, lowest coefficient first."""
+        result = self._make(self._of(coefficients[-1]))
+        for coefficient in reversed(coefficients[:-1]):
+            result = result.fma(self, coefficient)
+        return result
+
+    def where(self, condition: Any, other: "_Value | float") -> "_Value":
+        """Choose the value where the condition holds, else ``other``."""
+        return self._make(self.builder.select(condition, self.value, self._of(other)))
+
+    def compare(self, symbol: str, other: "_Value | float") -> Any:
+        return self.builder.fcmp_ordered(symbol, self.value, self._of(other))
+
+    def integers(self) -> Any:
+        return self.builder.bitcast(self.value, ir.VectorType(INTEGER, self.count))
+
+    def whole(self, number: int) -> Any:
+        return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)
+
+    def doubles(self, integers: Any) -> "_Value":
+        return self._make(self.builder.bitcast(integers, vector(self.count)))
+
+    def absolute(self) -> "_Value":
+        return self._make(llvm_call(self.builder, "fabs", self.value))
+
+
+def _sine_and_cosine(x: _Value) -> tuple[_Value, _Value, Any]:
+    """Return sin and cos of x less the nearest multiple of pi/2, and that multiple as integers."""
+    shifted = x.fma(2.0 / math.pi, SHIFT)
+    n = -(shifted - SHIFT)
+    whole = n.fma(HALF_PI[0], x)  # exact: a multiple of 2^-53 below 1
+    # r + tail = whole + n * (the rest of pi/2), as an exact sum of an exact product.
+    product = n * HALF_PI[1]
+    r = whole + product
+    part = r - whole
+    tail = (whole - (r - part)) + (product - part)
+    tail = tail + n.fma(HALF_PI[2], n.fma(HALF_PI[1], -product))
+    z = r * r
+    v = z * r
+    # sin(r + tail) = r + (v S1 + (z (tail/2 - v S(z)) ... + tail)), all but r small.
+    s = z.polynomial(SINE[1:])
+    sine = r - ((z * (tail * 0.5 - v * s) - tail) - v * SINE[0])
+    c = z.polynomial(COSINE)
+    half = z * 0.5
+    w = 1.0 - half
+    cosine = w + (((1.0 - w) - half) + (z * (z * c) - r * tail))
+    return sine, cosine, shifted.integers()
+
+
+def _quarter(x: _Value, sine: _Value, cosine: _Value, quadrant: Any, first: int) -> _Value:
+    """Return sin (first = 0) or cos (first = 1) of x, from those of the reduced argument."""
+    b = x.builder
+    turned = b.add(quadrant, x.whole(first))
+    odd = b.icmp_unsigned("!=", b.and_(turned, x.whole(1)), x.whole(0))
+    size = cosine.where(odd, sine)
+    sign = b.shl(b.and_(turned, x.whole(2)), x.whole(62))
+    return x.doubles(b.xor(size.integers(), sign))
+
+
+def _sin(x: _Value) -> _Value:
+    sine, cosine, quadrant = _sine_and_cosine(x)
+    return _quarter(x, sine, cosine, quadrant, 0)
+
+
+def _cos(x: _Value) -> _Value:
+    sine, cosine, quadrant = _sine_and_cosine(x)
+    return _quarter(x, sine, cosine, quadrant, 1)
+
+
+def _tan(x: _Value) -> _Value:
+    sine, cosine, quadrant = _sine_and_cosine(x)
+    return _quarter(x, sine, cosine, quadrant, 0) / _quarter(x, sine, cosine, quadrant, 1)
+
+
+def _exp(x: _Value) -> _Value:
+    b = x.builder
+    # Beyond these the result is 0 or infinite anyhow.
+    y = x.of(-746.0).where(x.compare("<", -746.0), x)
+    y = x.of(710.0).where(x.compare(">", 710.0), y)
+    shifted = y.fma(1.0 / math.log(2.0), SHIFT)
+    n = -(shifted - SHIFT)
+    whole = n.fma(LN2[0], y)
+    r = n.fma(LN2[1], whole)
+    series = r.polynomial([1.0 / math.factorial(i) for i in range(2, 14)])
+    value = (r * r).fma(series, r) + 1.0
+    # 2^n in two factors, since n reaches from -1075 to 1024.
+    power = b.sub(shifted.integers(), x.whole(SHIFT_BITS))
+    half = b.ashr(power, x.whole(1))
+    for part in (half, b.sub(power, half)):
+        value = value * x.doubles(b.shl(b.add(part, x.whole(1023)), x.whole(52)))
+    return value.where(x.compare("==", x), x)  # a NaN stays
+
+
+def _log(x: _Value) -> _Value:
+    b = x.builder
+    tiny = x.compare("<", 2.2250738585072014e-308)
+    scaled = (x * 18014398509481984.0).where(tiny, x)  # 2^54
+    # m in [sqrt(1/2), sqrt(2)), by the bits.
+    bits = b.sub(scaled.integers(), x.whole(0x3FE6A09E667F3BCD))
+    power = b.ashr(bits, x.whole(52))
+    m = x.doubles(b.sub(scaled.integers(), b.shl(power, x.whole(52))))
+    k = x.doubles(b.add(power, x.whole(SHIFT_BITS))) - SHIFT
+    k = (k - 54.0).where(tiny, k)
+    f = m - 1.0
+    s = f / (f + 2.0)
+    z = s * s
+    half = f * f * 0.5
+    rest = z * z.polynomial(LOGARITHM)
+    low = (s * (half + rest)) + k * LN2_SHORT[1]
+    value = k * LN2_SHORT[0] - ((half - low) - f)
+    value = x.of(-math.inf).where(x.compare("==", 0.0), value)
+    value = value.where(x.compare(">=", 0.0), math.nan)
+    return x.where(x.compare("==", math.inf), value)
+
+
+def _function(name: str, formula: Any, limit: float | None) -> Any:
+    """Emit calls of a function that evaluates ``formula``, or the C library beyond ``limit``."""
+
+    def emit(builder: Any, x: Any) -> Any:
+        kind = x.type
+        full = f"lanes.{name}.{kind.count}"
+        function = builder.module.globals.get(full)
+        if function is None:
+            function = ir.Function(builder.module, ir.FunctionType(kind, [kind]), full)
+            function.linkage = "linkonce_odr"
+            inner = ir.IRBuilder(function.append_basic_block())
+            argument = _Value(inner, function.args[0])
+            if limit is not None:
+                mask = inner.fcmp_unordered(">", argument.absolute().value, argument.of(limit).value)
+                bits: Any = inner.bitcast(mask, ir.IntType(kind.count))
+                far = inner.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+                with inner.if_then(far, likely=False):
+                    inner.ret(llvm_call(inner, name, argument.value))
+            inner.ret(formula(argument).value)
+        return builder.call(function, [x])
+
+    return emit
+
+
+for _math, _name, _formula, _limit in (
+    (math.sin, "sin", _sin, LIMIT),
+    (math.cos, "cos", _cos, LIMIT),
+    (math.tan, "tan", _tan, LIMIT),
+    (math.exp, "exp", _exp, None),
+    (math.log, "log", _log, None),
+):
+    register(_math, 1, Lanes, _function(_name, _formula, _limit))

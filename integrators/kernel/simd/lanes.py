@@ -1,0 +1,156 @@
+"""A numba value of K doubles: code that looks scalar runs on all stages at once.
+
+``Lanes(K)`` is LLVM's ``<K x double>``. On a machine whose vectors are shorter
+LLVM splits it, so K = 8 and K = 16 are correct everywhere and merely fastest
+where a vector holds eight doubles. Every operator is one IEEE operation per
+lane in the order written: nothing is contracted or reordered, because the
+symmetry of a problem may hang on the last bit. The one fused operation,
+`fma`, is explicit and meant for the linear algebra, not for vector fields.
+
+A vector field reads and writes them through the views of `integrators.kernel.simd.views`.
+"""
+
+import math
+import operator
+from typing import Any, cast
+
+from numba import extending, types
+from numba.core.typing import templates
+from numba.core.typing.templates import AbstractTemplate, signature
+from numba.extending import models, register_model
+
+from integrators.kernel.simd.emit import llvm_call, splat, vector
+
+# What numba makes of a decorated function has another signature than the function.
+intrinsic = cast(Any, extending.intrinsic)
+infer_global = cast(Any, templates.infer_global)
+lower_builtin = cast(Any, extending.lower_builtin)
+
+
+class Lanes(types.Type):
+    """K doubles side by side."""
+
+    def __init__(self, count: int):
+        self.count = count
+        super().__init__(name=f"Lanes({count})")
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, vector(kind.count))
+
+
+# --- values in and out of vectors ---------------------------------------------------------------
+
+
+def _count(*kinds: Any) -> int | None:
+    """Return the number of lanes if all of ``kinds`` are lanes of one width or numbers, and one is lanes."""
+    counts = {kind.count for kind in kinds if isinstance(kind, Lanes)}
+    rest = [kind for kind in kinds if not isinstance(kind, Lanes)]
+    if len(counts) != 1 or not all(isinstance(kind, types.Number) for kind in rest):
+        return None
+    return counts.pop()
+
+
+def arguments_for(kinds: Any) -> list[Any]:
+    """Lanes stay lanes; every other number is converted to a double before it is spread."""
+    return [kind if isinstance(kind, Lanes) else types.float64 for kind in kinds]
+
+
+def spread_to(builder: Any, kinds: Any, values: Any, count: int) -> list[Any]:
+    """Return values of these kinds as lanes: numbers in all of them."""
+    return [
+        v if isinstance(kind, Lanes) else splat(builder, v, count)
+        for kind, v in zip(kinds, values, strict=True)
+    ]
+
+
+def register(function: Any, arity: int, result: Any, emit: Any) -> None:
+    """Give ``function`` a meaning on lanes: its typing, and one lowering per mixture with scalars."""
+
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            count = None if kws or len(args) != arity else _count(*args)
+            return None if count is None else signature(result(count), *arguments_for(args))
+
+    infer_global(function)(Template)
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        count = _count(*sig.args)
+        assert count is not None
+        return emit(builder, *spread_to(builder, sig.args, args, count))
+
+    mixtures = [[Lanes]] if arity == 1 else [[Lanes, Lanes], [Lanes, types.Float], [types.Float, Lanes]]
+    for kinds in mixtures:
+        lower_builtin(function, *kinds)(lower)
+
+
+def intrinsic_call(name: str) -> Any:
+    """Return what emits LLVM's intrinsic of that name, for `register`."""
+    return lambda builder, *values: llvm_call(builder, name, *values)
+
+
+def _pick(symbol: str) -> Any:
+    """Python's ``min``/``max``: the first argument unless the second is strictly smaller/larger."""
+
+    def emit(builder: Any, x: Any, y: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(symbol, y, x), y, x)
+
+    return emit
+
+
+for _operator, _in_place, _name in (
+    (operator.add, operator.iadd, "fadd"),
+    (operator.sub, operator.isub, "fsub"),
+    (operator.mul, operator.imul, "fmul"),
+    (operator.truediv, operator.itruediv, "fdiv"),
+):
+    for _function in (_operator, _in_place):
+        register(_function, 2, Lanes, lambda b, x, y, name=_name: getattr(b, name)(x, y))
+register(operator.neg, 1, Lanes, lambda b, x: b.fneg(x))
+register(operator.pos, 1, Lanes, lambda b, x: x)
+register(min, 2, Lanes, _pick("<"))
+register(max, 2, Lanes, _pick(">"))
+for _function, _name in (
+    (math.sqrt, "sqrt"),
+    (abs, "fabs"),
+    (math.fabs, "fabs"),
+    (math.copysign, "copysign"),
+):
+    register(_function, 2 if _name == "copysign" else 1, Lanes, intrinsic_call(_name))
+
+
+# --- explicit operations --------------------------------------------------------------------------
+
+
+def fma(x: Any, y: Any, z: Any) -> Any:
+    """Return ``x * y + z`` rounded once; numba code only."""
+    raise NotImplementedError("fma exists in compiled code only.")
+
+
+@infer_global(fma)
+class _Fma(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        count = _count(*args)
+        return signature(types.float64 if count is None else Lanes(count), *arguments_for(args))
+
+
+@lower_builtin(fma, types.VarArg(types.Any))
+def _fma(context, builder, sig, args):
+    count = _count(*sig.args)
+    return llvm_call(builder, "fma", *(args if count is None else spread_to(builder, sig.args, args, count)))
+
+
+@intrinsic
+def two_sum(typing, a, b):
+    """Return s, e with s = fl(a + b) and s + e = a + b, of numbers or lanes (Knuth)."""
+
+    def generate(context, builder, sig, args):
+        x, y = args
+        s = builder.fadd(x, y)
+        part = builder.fsub(s, x)
+        lost = builder.fadd(builder.fsub(x, builder.fsub(s, part)), builder.fsub(y, part))
+        return context.make_tuple(builder, sig.return_type, [s, lost])
+
+    return signature(types.UniTuple(a, 2), a, a), generate

@@ -1,0 +1,168 @@
+"""Views of memory: rows of lanes, and numbers one after another or with gaps.
+
+Views are addresses and nothing else: nothing is reference-counted, bounds-checked or
+wrapped; the one who calls is trusted.
+
+``rows[i]``, of `Rows`, is a `Lanes`: what a vector field is called with. ``x[i]``, of
+`Numbers`, is one number, and ``x + n`` the view from number n on: the arrays of a
+trajectory, the parameters, and one stage at a time where a field cannot run on lanes.
+"""
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import AbstractTemplate, signature
+from numba.extending import models, register_model
+
+from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, vector
+from integrators.kernel.simd.lanes import (
+    Lanes,
+    arguments_for,
+    infer_global,
+    intrinsic,
+    lower_builtin,
+    spread_to,
+)
+
+
+class Rows(types.Type):
+    """Memory of K doubles per row: ``rows[i]`` is a `Lanes(K)`."""
+
+    def __init__(self, count: int):
+        self.count = count
+        super().__init__(name=f"Rows({count})")
+
+
+class Numbers(types.Type):
+    """Memory with a number every ``stride`` words: ``view[i]`` is a double, or an integer."""
+
+    def __init__(self, stride: int = 1, of: Any = types.float64):
+        self.stride, self.of = stride, of
+        super().__init__(name=f"Numbers({stride}, {of})")
+
+
+DOUBLES = Numbers()
+INTEGERS = Numbers(of=types.int64)
+
+
+@register_model(Rows)
+class _RowsModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, DOUBLE.as_pointer())
+
+
+@register_model(Numbers)
+class _NumbersModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any):
+        super().__init__(manager, kind, _item(kind).as_pointer())
+
+
+def _item(view: Any) -> Any:
+    return DOUBLE if view.of == types.float64 else INTEGER
+
+
+def _aligned(stride: int) -> int:
+    return min(ALIGNMENT, 8 * stride)
+
+
+def element(builder: Any, pointer: Any, index: Any, stride: int, kind: Any) -> Any:
+    """Return the address of item ``index`` as a pointer to ``kind``."""
+    if stride != 1:
+        index = builder.mul(index, ir.Constant(index.type, stride))
+    return builder.bitcast(builder.gep(pointer, [index]), kind.as_pointer())
+
+
+@infer_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        view, index = args
+        if not isinstance(index, types.Integer):
+            return None
+        if isinstance(view, Rows):
+            return signature(Lanes(view.count), view, types.intp)
+        return signature(view.of, view, types.intp) if isinstance(view, Numbers) else None
+
+
+@infer_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        view, index, value = args
+        if not isinstance(index, types.Integer):
+            return None
+        if isinstance(view, Rows) and isinstance(value, Lanes | types.Number):
+            return signature(types.none, view, types.intp, *arguments_for([value]))
+        if isinstance(view, Numbers) and isinstance(value, types.Number):
+            return signature(types.none, view, types.intp, view.of)
+        return None
+
+
+@infer_global(operator.add)
+class _Shift(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        view, count = args
+        if isinstance(view, Numbers) and isinstance(count, types.Integer):
+            return signature(view, view, types.intp)
+        return None
+
+
+@lower_builtin(operator.getitem, Rows, types.Integer)
+def _get_row(context, builder, sig, args):
+    count = sig.args[0].count
+    return builder.load(element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+
+
+@lower_builtin(operator.setitem, Rows, types.Integer, Lanes)
+@lower_builtin(operator.setitem, Rows, types.Integer, types.Float)
+def _set_row(context, builder, sig, args):
+    count = sig.args[0].count
+    (value,) = spread_to(builder, sig.args[2:], args[2:], count)
+    builder.store(value, element(builder, args[0], args[1], count, vector(count)), align=_aligned(count))
+
+
+@lower_builtin(operator.getitem, Numbers, types.Integer)
+def _get_number(context, builder, sig, args):
+    view = sig.args[0]
+    return builder.load(element(builder, args[0], args[1], view.stride, _item(view)))
+
+
+@lower_builtin(operator.setitem, Numbers, types.Integer, types.Number)
+def _set_number(context, builder, sig, args):
+    view = sig.args[0]
+    builder.store(args[2], element(builder, args[0], args[1], view.stride, _item(view)))
+
+
+@lower_builtin(operator.add, Numbers, types.Integer)
+def _shifted(context, builder, sig, args):
+    view = sig.args[0]
+    return element(builder, args[0], args[1], view.stride, _item(view))
+
+
+@intrinsic(prefer_literal=True)
+def strided(typing, address, stride):
+    """Return the doubles at an address (intp) that are ``stride`` (a literal) words apart."""
+    if not isinstance(stride, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, sig, args):
+        return builder.inttoptr(args[0], DOUBLE.as_pointer())
+
+    return signature(Numbers(stride.literal_value), types.intp, stride), generate
+
+
+def _view(kind: Numbers) -> Any:
+    @intrinsic
+    def view(typing, address):
+        def generate(context, builder, sig, args):
+            return builder.inttoptr(args[0], _item(kind).as_pointer())
+
+        return signature(kind, types.intp), generate
+
+    return view
+
+
+doubles = _view(DOUBLES)
+"""``doubles(address)``: the doubles there."""
+integers = _view(INTEGERS)
+"""``integers(address)``: the integers there."""

@@ -1,0 +1,1 @@
+"""A step and its parts in compiled code."""

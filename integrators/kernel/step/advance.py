@@ -1,0 +1,42 @@
+"""One step of HBVM(k, s), as on paper.
+
+    gamma_j = sum_l b_l P_j(c_l) f(t + c_l h, Y_l),    Y_l = y + h sum_j gamma_j int_0^{c_l} P_j,
+    y_1     = y + h gamma_0:
+
+first stages from the polynomial of the step before; sweeps, each of which evaluates the field
+at the stages and makes new ones of its values; a test of how much they still change; the state
+at the end, with what rounding took from it.
+"""
+
+from integrators.kernel.context import DONE, RUNNING
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.step.begin import begin
+from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.handover import reconsider, solve_implicitly
+from integrators.kernel.step.iterate import close, test
+from integrators.kernel.step.sweep import sweep, sweep_measured
+
+
+@compiled
+def solve(ctx):
+    """Solve the step ahead, unless that is done; return the outcome."""
+    if ctx.solved:
+        return DONE
+    if ctx.implicit:
+        return solve_implicitly(ctx, ctx, 0)
+    begin(ctx)
+    sweep(ctx, ctx.free if ctx.predicted else 0)
+    while ctx.outcome == RUNNING:
+        test(ctx, sweep_measured(ctx))
+    return reconsider(ctx, close(ctx))
+
+
+@compiled
+def step(ctx):
+    """Take one step; the state stays where it was if the step fails."""
+    outcome = solve(ctx)
+    if outcome == DONE:
+        outcome = finish(ctx)
+    if outcome == DONE:
+        commit(ctx)
+    return outcome

@@ -1,0 +1,173 @@
+"""The start of a step: what its stages have in common, and their first values.
+
+Round-off is handled where it arises. Nodes come as hi + lo pairs whose low
+part enters before anything is rounded at the size of the state; h^2 is never
+formed; the state is a compensated pair whose error enters the stages.
+"""
+
+from integrators.kernel.context import RUNNING
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
+from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.stages import offset
+from integrators.kernel.step.sweep import multiply, product, project, through
+from integrators.kernel.tables import THROUGH
+
+FARTHEST = 2.0  # no extrapolation farther than this many previous steps
+INFINITY = float("inf")
+
+
+@compiled
+def set_factors(ctx, h):
+    """Set h and what is h times the velocities."""
+    ctx.h = h
+    if ctx.second:
+        velocity, factor, drift, kick = ctx.velocity, ctx.row_factor, ctx.drift_factor, ctx.kick_factor
+        for d in range(ctx.rows):
+            kh = h * velocity[d]
+            factor[d] = kh
+            drift[8 * (d // 4) + d % 4] = kh
+            kick[8 * (d // 4) + 4 + d % 4] = kh
+
+
+@compiled
+def set_step(ctx, h):
+    """Scale the matrix and the velocities by a step h that is taken once (`tables.scaled` is for many)."""
+    set_factors(ctx, h)
+    twice = ctx.second and ctx.unit
+    raw, matrix = ctx.raw_matrix, ctx.matrix
+    for i in range(ctx.matrix_size):
+        value = h * get(raw, 8 * i)
+        put(matrix, 8 * i, h * value if twice else value)
+
+
+@compiled
+def set_times(ctx):
+    """Set the stages' times to t0 + n h + c h, with t0 and n h as sums of two doubles."""
+    h, n = ctx.h, float(ctx.n)
+    elapsed = n * h
+    t, lost = two_sum(ctx.t0, elapsed)
+    low = splat8(lost + fma(n, h, -elapsed) + ctx.time_low)
+    times, nodes = ctx.times, ctx.nodes
+    for chunk in range(ctx.chunks):
+        put(times, 8 * chunk, t + fma(get(nodes, 8 * chunk), splat8(h), low))
+
+
+@compiled
+def prepare(ctx):
+    """Set the stages' times, and what they have without the field's values, from the state."""
+    state, error, row_state, row_error = ctx.state, ctx.error, ctx.row_state, ctx.row_error
+    rows, lanes = ctx.rows, ctx.lanes
+    set_times(ctx)
+    if ctx.second == 0:
+        for i in range((rows + 7) // 8):
+            put(row_state, 8 * i, get(state, 8 * i))
+            put(row_error, 8 * i, get(error, 8 * i))
+        for chunk in range(ctx.chunks):
+            base = ctx.base + offset(ctx, chunk)
+            for d in range(rows):
+                put(base, lanes * d, spread(row_error, d))
+        return
+    drift, drift_low, factor = ctx.row_drift, ctx.row_drift_low, ctx.drift_factor
+    for i in range((rows + 3) // 4):
+        z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
+        u = kh * z
+        put_upper(row_state, 4 * i, z)
+        put_upper(row_error, 4 * i, e)
+        put_lower(drift, 4 * i, u)
+        put_lower(drift_low, 4 * i, fma(kh, e, fma(kh, z, -u)))
+    nodes, nodes_low = ctx.nodes, ctx.nodes_low
+    for chunk in range(ctx.chunks):
+        c, c_low = get(nodes, 8 * chunk), get(nodes_low, 8 * chunk)
+        base = ctx.base + offset(ctx, chunk)
+        for d in range(rows):
+            u = spread(drift, d)
+            low = fma(c, spread(drift_low, d), fma(c_low, u, spread(row_error, d)))
+            put(base, lanes * d, fma(c, u, low))
+
+
+# --- first stages ---------------------------------------------------------------------------------
+
+
+@compiled
+def start_plain(ctx):
+    """First stages without a force (second-order form), or constant."""
+    rows, lanes, state = ctx.rows, ctx.lanes, ctx.row_state
+    for chunk in range(ctx.chunks):
+        start = offset(ctx, chunk)
+        stages, base = ctx.stages + start, ctx.base + start
+        for d in range(rows):
+            put(stages, lanes * d, spread(state, d) + get(base, lanes * d))
+    ctx.predicted = 0
+
+
+@compiled
+def start_extrapolated(ctx):
+    """First stages from the previous step's values, of the same length: one product with a table."""
+    if ctx.route == THROUGH:
+        through(ctx, ctx.mode_projection, ctx.mode_groups, ctx.extrapolation)
+    else:
+        product(ctx, ctx.extrapolation)
+    ctx.predicted = 1
+
+
+@compiled
+def start_elsewhere(ctx, source, first, ratio):
+    """First stages from the values of the context ``source``; there the nodes are ``first + ratio * c``."""
+    rows, chunks, groups = ctx.rows, ctx.chunks, ctx.mode_groups
+    nodes, basis, recurrence = ctx.nodes, ctx.basis, ctx.recurrence
+    for chunk in range(chunks):
+        x = 2.0 * (first + ratio * get(nodes, 8 * chunk)) - 1.0
+        before = splat8(0.0)
+        here = splat8(1.0)
+        for j in range(ctx.modes):
+            put(basis, 8 * (chunk * 8 * groups + j), here)
+            after = fma(recurrence[2 * j] * x, here, -recurrence[2 * j + 1] * before)
+            before = here
+            here = after
+    project(source, ctx.mode_projection, groups)
+    multiply(basis, chunks, groups, source.coefficients, 8, ctx.values, ctx.lanes, rows, ctx.padded)
+    product(ctx, ctx.matrix)
+    ctx.predicted = 1
+
+
+@compiled
+def predict(ctx, source, length, first):
+    """First stages from the values of ``source``, of a step of ``length``, if that is not too far away.
+
+    Parameters
+    ----------
+    ctx, source : Context
+        Of the step ahead, and of the step that its polynomial is taken from; may be the same.
+    length : float
+        Of that step; 0: nothing is known of any.
+    first : float
+        Where this step begins on it: at its end, 1, or at its start, 0.
+    """
+    if length != 0.0 and abs(ctx.h / length) <= FARTHEST:
+        start_elsewhere(ctx, source, first, ctx.h / length)
+    else:
+        start_plain(ctx)
+
+
+@compiled
+def rewind(ctx):
+    """Begin to count the iterations of a start."""
+    ctx.outcome = RUNNING
+    ctx.tests = ctx.tried = ctx.stalled = 0
+    ctx.best = ctx.last = INFINITY
+
+
+@compiled
+def begin(ctx):
+    """Prepare the step from the state and choose its first stages."""
+    rewind(ctx)
+    prepare(ctx)
+    if ctx.length == ctx.h and not ctx.varying:
+        start_extrapolated(ctx)
+    else:
+        predict(ctx, ctx, ctx.length, 0.0 if ctx.rejected else 1.0)
+    ctx.age -= 1
+    if ctx.age < 0 or ctx.predicted == 0:
+        take_sizes(ctx)

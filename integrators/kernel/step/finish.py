@@ -1,0 +1,120 @@
+"""The end of a step: the new state.
+
+The weights' low parts enter the products with the field before anything is
+rounded; the whole displacement is formed first and the state added last, as a
+sum whose rounding error is kept.
+"""
+
+from integrators.kernel.context import BY_INCREMENT, DONE, NOT_FINITE, UNSOLVED
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.memory import get, put, splat8, sums, swap, total
+from integrators.kernel.step.stages import offset
+
+
+@compiled
+def weighted(ctx, row, high, low):
+    """Return the values of a row times weights high + low, added to eight."""
+    values, i = ctx.values, ctx.lanes * row
+    if ctx.route == 8:
+        return fma(get(high, 0), get(values, i), get(low, 0) * get(values, i))
+    if ctx.route == 16:
+        value, more = get(values, i), get(values, i + 8)
+        small = fma(get(low, 8), more, get(low, 0) * value)
+        return fma(get(high, 8), more, fma(get(high, 0), value, small))
+    result = splat8(0.0)
+    for chunk in range(ctx.chunks):
+        result = fma(get(low, 8 * chunk), get(values, i + offset(ctx, chunk)), result)
+    for chunk in range(ctx.chunks):
+        result = fma(get(high, 8 * chunk), get(values, i + offset(ctx, chunk)), result)
+    return result
+
+
+@compiled
+def impulses(ctx, d):
+    """For the rows d .. d+3, the means of the force with the weights b, then with those of the position."""
+    b, b_low, w, w_low = ctx.weights, ctx.weights_low, ctx.position_weights, ctx.position_weights_low
+    return sums(
+        weighted(ctx, d, b, b_low), weighted(ctx, d + 1, b, b_low),
+        weighted(ctx, d + 2, b, b_low), weighted(ctx, d + 3, b, b_low),
+        weighted(ctx, d, w, w_low), weighted(ctx, d + 1, w, w_low),
+        weighted(ctx, d + 2, w, w_low), weighted(ctx, d + 3, w, w_low),
+    )  # fmt: skip
+
+
+@compiled
+def means(ctx, d):
+    """For the rows d .. d+7, the means of the field with the weights b."""
+    b, low = ctx.weights, ctx.weights_low
+    return sums(
+        weighted(ctx, d, b, low), weighted(ctx, d + 1, b, low),
+        weighted(ctx, d + 2, b, low), weighted(ctx, d + 3, b, low),
+        weighted(ctx, d + 4, b, low), weighted(ctx, d + 5, b, low),
+        weighted(ctx, d + 6, b, low), weighted(ctx, d + 7, b, low),
+    )  # fmt: skip
+
+
+@compiled
+def add(ctx, i, increment):
+    """Add an increment to component i of the state; return 0 if it is finite then."""
+    new, lost = two_sum(ctx.state[i], increment + ctx.error[i])
+    ctx.next_state[i] = new
+    ctx.next_error[i] = lost
+    return new * 0.0
+
+
+@compiled
+def finish_by_increment(ctx):
+    """As `finish`, from increments: those of q are not found from the forces without cancellation."""
+    rows, increment = ctx.rows, ctx.increment
+    damage = 0.0
+    for d in range(rows):
+        if ctx.second:
+            i = 8 * (d // 4) + d % 4
+            damage += add(ctx, i + 4, increment[d])
+            damage += add(ctx, i, increment[rows + d])
+        else:
+            damage += add(ctx, d, increment[d])
+    return DONE if damage == 0.0 else NOT_FINITE
+
+
+@compiled
+def finish(ctx):
+    """Set the next state from the state and the solved step's values; return DONE or NOT_FINITE."""
+    if ctx.solved == BY_INCREMENT:
+        return finish_by_increment(ctx)
+    rows, h = ctx.rows, ctx.h
+    state, error, next_state, next_error = ctx.state, ctx.error, ctx.next_state, ctx.next_error
+    damage = splat8(0.0)
+    if ctx.second:
+        factor, kick = ctx.drift_factor, ctx.kick_factor
+        for i in range((rows + 3) // 4):
+            z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
+            drift = kh * z
+            drift_low = fma(kh, e, fma(kh, z, -drift))
+            # z + drift exactly, then all that is smaller.
+            moved, lost = two_sum(z, swap(drift))
+            small = (get(kick, 8 * i) * (h * impulses(ctx, 4 * i)) + (swap(drift_low) + e)) + lost
+            new, lost = two_sum(moved, small)
+            put(next_state, 8 * i, new)
+            put(next_error, 8 * i, lost)
+            damage += new * 0.0
+    else:
+        for i in range((rows + 7) // 8):
+            small = h * means(ctx, 8 * i) + get(error, 8 * i)
+            new, lost = two_sum(get(state, 8 * i), small)
+            put(next_state, 8 * i, new)
+            put(next_error, 8 * i, lost)
+            damage += new * 0.0
+    return DONE if total(damage) == 0.0 else NOT_FINITE
+
+
+@compiled
+def commit(ctx):
+    """Make the next state the state: the step is taken."""
+    ctx.state, ctx.next_state = ctx.next_state, ctx.state
+    ctx.error, ctx.next_error = ctx.next_error, ctx.error
+    ctx.n += 1
+    ctx.steps += 1
+    ctx.length = ctx.h
+    ctx.solved = UNSOLVED

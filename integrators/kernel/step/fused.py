@@ -1,0 +1,163 @@
+"""Whole sweeps of the fixed-point iteration for systems with a few rows, around the traced field.
+
+In a small system a sweep waits for its own results: the stages are stored and loaded
+by the field, its values are stored and loaded by the product. Compiled together, one
+after another, sweeps keep stages and values in registers. The operations and their order are those
+of `sweep.evaluate`, `sweep.product8` and `sweep.product16`, hence the bits
+are (``tests/integrators/kernel/step/test_fused.py``).
+"""
+
+from typing import Any
+
+from llvmlite import ir
+
+from integrators.kernel.context import Context
+from integrators.kernel.native import binary, field, store
+from integrators.kernel.native.memory import Slot
+from integrators.kernel.simd.emit import (
+    ALIGNMENT,
+    DOUBLE,
+    INTEGER,
+    WIDTH,
+    Chains,
+    indices,
+    larger_of,
+    largest_of,
+    llvm_call,
+    splat,
+    vector,
+)
+from problems import emit
+from problems.systems.base import System
+
+SWEEP = ir.FunctionType(ir.VoidType(), [INTEGER] * 3)
+
+
+ROWS = 4
+"""Components of a stage up to which whole sweeps are compiled with the field."""
+
+
+def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> binary.Native:
+    """Compile ``void(context, count, tested)``, or load it: for a field on lanes, and factors in the matrix.
+
+    It does ``count`` sweeps. If ``tested`` is not 0, `Context.old_stages` then holds the stages before
+    the last one, and `Context.change` the largest change relative to the size of its block.
+
+    Parameters
+    ----------
+    system, what, lanes
+        As for `field.compile_field`; ``lanes`` are all stages.
+    rows : int
+        Components of a stage.
+    """
+    source = emit.source(system, what, "numba")
+    modules = binary.sources(*field.SOURCES, "context", "step/fused")
+    name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
+
+    def make() -> tuple[str, bytes]:
+        function, arguments = field.on_lanes(emit.numba(system, what).py_func, lanes)
+        return field.ON_LANES, binary.build(
+            function, arguments, around=lambda inner: sweeps(inner, lanes, rows)
+        )
+
+    return binary.obtain(name, make)
+
+
+def sweeps(inner: str, lanes: int, rows: int) -> str:
+    """Return LLVM's text of what `compile_sweeps` promises, around the compiled field ``inner``."""
+    module = ir.Module()
+    pointer = DOUBLE.as_pointer()
+    whole, eight = vector(lanes), vector(WIDTH)
+    status = ir.FunctionType(
+        ir.IntType(32), [pointer.as_pointer(), pointer.as_pointer(), whole, pointer, pointer, pointer]
+    )
+    field = ir.Function(module, status, inner)
+    sweep = ir.Function(module, SWEEP, binary.ENTRY)
+    context, count, tested = sweep.args
+    sweep.attributes.alignstack = ALIGNMENT
+    b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
+    words = b.inttoptr(context, INTEGER.as_pointer())
+
+    def word(slot: Slot) -> Any:
+        return b.gep(words, [ir.Constant(INTEGER, slot.place)])
+
+    def array(slot: Slot) -> Any:
+        return b.inttoptr(b.load(word(slot)), pointer)
+
+    def place(base: Any, index: int, kind: Any) -> Any:
+        return b.bitcast(b.gep(base, [ir.Constant(INTEGER, index)]), kind.as_pointer())
+
+    def get(base: Any, index: int, kind: Any) -> Any:
+        return b.load(place(base, index, kind), align=None if kind == DOUBLE else ALIGNMENT)
+
+    def put(value: Any, base: Any, index: int) -> None:
+        b.store(value, place(base, index, value.type), align=ALIGNMENT)
+
+    def lane(value: Any, j: int) -> Any:
+        """Return lane j in eight lanes."""
+        return b.shuffle_vector(value, ir.Constant(value.type, ir.Undefined), indices(*[j] * WIDTH))
+
+    def joined(halves: list[Any]) -> Any:
+        if len(halves) == 1:
+            return halves[0]
+        return b.shuffle_vector(*halves, indices(*range(lanes)))
+
+    room = ir.ArrayType(whole, rows)
+    stages, values = b.alloca(room), b.alloca(room)
+    stages.align = values.align = ALIGNMENT
+    result, exception = b.alloca(pointer), b.alloca(pointer)
+    q, other, f = array(Context.stages), array(Context.old_stages), array(Context.values)
+    par = array(Context.par)
+    times = get(array(Context.times), 0, whole)
+    state, base, scale = array(Context.row_state), array(Context.base), array(Context.strict)
+    parts = range(lanes // WIDTH)
+    starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
+    states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
+    first = [get(q, lanes * d, whole) for d in range(rows)]
+    entry, loop, end = b.block, sweep.append_basic_block("loop"), sweep.append_basic_block("end")
+    b.branch(loop)
+
+    b.position_at_end(loop)
+    left = b.phi(INTEGER)
+    old = [b.phi(whole) for _ in range(rows)]
+    at_stages, at_values = b.bitcast(stages, pointer), b.bitcast(values, pointer)
+    for d in range(rows):
+        put(old[d], at_stages, lanes * d)
+    b.call(field, [result, exception, times, at_stages, par, at_values])
+    found = [get(at_values, lanes * d, whole) for d in range(rows)]
+    # Column by column, for few of them to be in registers at a time; loaded anew by every sweep.
+    matrix = b.inttoptr(b.load_atomic(word(Context.matrix), "monotonic", 8), pointer)
+    sums = {(d, part): Chains(b, lanes, starts[d][part]) for d in range(rows) for part in parts}
+    for j in range(lanes):
+        columns = [get(matrix, lanes * WIDTH * part + WIDTH * j, eight) for part in parts]
+        for d in range(rows):
+            factor = lane(found[d], j)
+            for part in parts:
+                sums[d, part].add(columns[part], factor)
+    new = [joined([b.fadd(states[d], sums[d, part].total()) for part in parts]) for d in range(rows)]
+    fewer = b.sub(left, ir.Constant(INTEGER, 1))
+    left.add_incoming(count, entry)
+    left.add_incoming(fewer, b.block)
+    for d in range(rows):
+        old[d].add_incoming(first[d], entry)
+        old[d].add_incoming(new[d], b.block)
+    b.cbranch(b.icmp_signed(">", fewer, ir.Constant(INTEGER, 0)), loop, end)
+
+    b.position_at_end(end)
+    for d in range(rows):
+        put(new[d], q, lanes * d)
+        put(found[d], f, lanes * d)
+    with b.if_then(b.icmp_signed("!=", tested, ir.Constant(INTEGER, 0))):
+        top = ir.Constant(eight, [0.0] * WIDTH)
+        for d in range(rows):
+            put(old[d], other, lanes * d)
+            size = splat(b, get(scale, d, DOUBLE), WIDTH)
+            for part in parts:
+                chosen = indices(*range(WIDTH * part, WIDTH * (part + 1)))
+                moved = b.fsub(
+                    b.shuffle_vector(new[d], new[d], chosen), b.shuffle_vector(old[d], old[d], chosen)
+                )
+                top = larger_of(b, top, b.fmul(llvm_call(b, "fabs", moved), size))
+        b.store(largest_of(b, top), b.bitcast(word(Context.change), pointer))
+    b.ret_void()
+    return str(module)

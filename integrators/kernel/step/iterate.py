@@ -1,0 +1,117 @@
+"""The stopping rule of the fixed-point iteration, and what follows from how it ended."""
+
+from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RUNNING
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.step.begin import INFINITY, rewind, start_plain
+from integrators.kernel.step.size import change, is_rounding, take_sizes
+from integrators.kernel.step.sweep import evaluate, sweep_measured
+
+MAX_ITERATIONS = 200
+# Changes that do not decrease, to end it between ROUNDING and STAGNATION. Where the iteration's matrix is
+# far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
+# s = 2, h = 1; with five 3e-18).
+PATIENCE = 5
+# A change that is going to be no larger is not waited for, if the last two say so by falling this steeply.
+# One steep fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
+# average fall, from a first change as large as the state, must promise three times that too.
+GOAL = 3e-17
+STEEP = 0.15
+
+
+@compiled
+def falls(strict, tried):
+    """Whether falls as steep as ``tried`` equal ones from 1 to 1e-15 would bring ``strict`` to 3 GOAL."""
+    # strict * 1e-15 ** (1 / tried) <= 3 GOAL
+    part = strict / (3.0 * GOAL)
+    power = 1.0
+    for _ in range(tried):
+        power *= part
+        if power > 1e15:
+            return False
+    return True
+
+
+@compiled
+def test(ctx, strict):
+    """Apply the stopping rule to the change of the last sweep; `Context.outcome` says what came of it.
+
+    The iteration ends when the change, relative to its block, is at most
+    the tolerance, or when it has stopped decreasing where rounding accounts for it. It also
+    ends when the next change is going to be nothing: then the field is evaluated once
+    more, since its values have the error of the stages before the last change.
+    """
+    last, ctx.last = ctx.last, strict
+    ctx.tests += 1
+    if ctx.age == 0:
+        take_sizes(ctx)
+    if not strict < INFINITY:
+        # Growing changes overflow in the end; a NaN out of the blue is the field's own.
+        restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
+    elif strict <= ctx.tolerance:
+        ctx.outcome = DONE
+    elif strict < ctx.best:
+        ctx.best, ctx.stalled = strict, 0
+        # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
+        steep = last < 1.0 and strict <= STEEP * last and strict * strict <= GOAL * last
+        if steep and falls(strict, ctx.tried):
+            evaluate_at_last(ctx)
+        elif ctx.tried >= MAX_ITERATIONS:
+            restart(ctx, DIVERGED)
+    else:
+        ctx.stalled += 1
+        if is_rounding(change(ctx, ctx.floored), ctx.stalled >= PATIENCE):
+            ctx.outcome = DONE
+        elif ctx.tried >= MAX_ITERATIONS:
+            restart(ctx, DIVERGED)
+
+
+@compiled
+def evaluate_at_last(ctx):
+    """Evaluate the field at the stages as they are now, and let the step be solved."""
+    evaluate(ctx)
+    ctx.tried += 1
+    ctx.outcome = DONE
+
+
+@compiled
+def settle(ctx):
+    """Iterate with tests until the step is solved or has failed; return the outcome."""
+    while ctx.outcome == RUNNING:
+        test(ctx, sweep_measured(ctx))
+    return close(ctx)
+
+
+@compiled
+def count(ctx):
+    """Add the evaluations of a start to the counters."""
+    ctx.iterations += ctx.tried
+    ctx.evaluations += ctx.tried * ctx.k
+
+
+@compiled
+def restart(ctx, outcome):
+    """Try again without extrapolation, if there was any; else the step has failed."""
+    if ctx.predicted == 0:
+        ctx.outcome = outcome
+    else:
+        count(ctx)
+        ctx.restarts += 1
+        rewind(ctx)
+        start_plain(ctx)
+        take_sizes(ctx)
+
+
+@compiled
+def close(ctx):
+    """Keep the books of an iteration that has come to its end; return the outcome."""
+    count(ctx)
+    if ctx.outcome == DONE:
+        ctx.solved = BY_VALUES
+        if ctx.predicted:
+            # Two tests tell how the changes fall, or that they do not any more; more mean that the
+            # first came early. It came late where nothing was left to fall.
+            late = ctx.stalled > 0 or ctx.last <= ctx.tolerance
+            ctx.free = max(ctx.free + ctx.tests - (3 if late and ctx.tests <= 2 else 2), 0)
+    else:
+        ctx.length = 0.0
+    return ctx.outcome

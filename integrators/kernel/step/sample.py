@@ -1,0 +1,173 @@
+"""States between steps, and where a state is in memory."""
+
+from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSOLVED
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import get, put
+from integrators.kernel.step.advance import solve
+from integrators.kernel.step.begin import predict, prepare, rewind, set_step
+from integrators.kernel.step.finish import finish
+from integrators.kernel.step.handover import settle_part
+from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.sweep import project
+
+
+@compiled
+def dimension(ctx):
+    """Return the length of the state."""
+    return ctx.rows * (2 if ctx.second else 1)
+
+
+@compiled
+def write(ctx, state, out):
+    """Write a state in the layout of `Context.state` to memory as (q, p) or y."""
+    rows = ctx.rows
+    for d in range(rows):
+        if ctx.second:
+            i = 8 * (d // 4) + d % 4
+            out[d] = state[i + 4]
+            out[rows + d] = state[i]
+        else:
+            out[d] = state[d]
+
+
+@compiled
+def read(ctx, state, given):
+    """Read a state that is laid out as `write` does."""
+    rows = ctx.rows
+    for d in range(rows):
+        if ctx.second:
+            i = 8 * (d // 4) + d % 4
+            state[i + 4] = given[d]
+            state[i] = given[rows + d]
+        else:
+            state[d] = given[d]
+
+
+@compiled
+def copy(outof, into, vectors):
+    """Copy so many vectors of eight doubles."""
+    for i in range(vectors):
+        put(into, 8 * i, get(outof, 8 * i))
+
+
+@compiled
+def vectors_of_state(ctx):
+    """Return how many vectors the state takes."""
+    return (ctx.rows + 3) // 4 if ctx.second else (ctx.rows + 7) // 8
+
+
+@compiled
+def interpolate(ctx, c, out):
+    """Write the collocation polynomial of the solved step at t + c h.
+
+    With the coefficients gamma of the field, y + h sum_j gamma_j int_0^c P_j; in
+    second-order form the positions take the integrals of that polynomial's slope,
+    projected like it: q + c h q' + h kh sum_j gamma_j (int_0^c P) X_s, column j.
+    """
+    rows, second, h = ctx.rows, ctx.second, ctx.h
+    state, gamma = ctx.state, ctx.coefficients
+    project(ctx, ctx.projection, ctx.groups)
+    write(ctx, ctx.error, out)
+    x = 2.0 * c - 1.0
+    # Integrals of P_{j-1}, P_j, P_{j+1}, by int_0^c L_j = (L_{j+1} - L_{j-1}) / (2 (2j+1)) for j > 0.
+    lower, here = 0.0, c
+    before, legendre = 1.0, x
+    for j in range(ctx.s):
+        after = ((2.0 * j + 3.0) * x * legendre - (j + 1.0) * before) / (j + 2.0)
+        upper = (after - before) / (2.0 * (2.0 * j + 3.0) ** 0.5) if j + 1 < ctx.s else 0.0
+        slope_weight = h * here
+        weight = 0.5 * here if j == 0 else -lower / (2.0 * (4.0 * j * j - 1.0) ** 0.5)
+        weight = h * (weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
+        i = ctx.first + j
+        for d in range(rows):
+            value = gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
+            if second:
+                out[d] = out[d] + ctx.row_factor[d] * (weight * value)
+                out[rows + d] = out[rows + d] + slope_weight * value
+            else:
+                out[d] = out[d] + slope_weight * value
+        lower, here = here, upper
+        before, legendre = legendre, after
+    for d in range(rows):
+        if second:
+            i = 8 * (d // 4) + d % 4
+            drift = c * (ctx.drift_factor[i] * state[i])
+            out[d] = state[i + 4] + (drift + out[d])
+            out[rows + d] = state[i] + out[rows + d]
+        else:
+            out[d] = state[d] + out[d]
+
+
+@compiled
+def part_step(ctx, side, part):
+    """Solve in ``side`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
+
+    It starts inside the step ahead if that is solved, else after the step behind.
+    """
+    set_step(side, part)
+    copy(ctx.state, side.state, vectors_of_state(ctx))
+    copy(ctx.error, side.error, vectors_of_state(ctx))
+    side.n = 0
+    side.t0, side.time_low = ctx.t0 + ctx.n * ctx.h, ctx.time_low
+    rewind(side)
+    prepare(side)
+    if ctx.solved:
+        predict(side, ctx, ctx.h, 0.0)
+    else:
+        predict(side, ctx, ctx.length, 1.0)
+    take_sizes(side)
+    outcome = settle_part(ctx, side)
+    return finish(side) if outcome == DONE else outcome
+
+
+@compiled
+def add_counters(ctx, side):
+    """Count the work done in ``side`` as that of ``ctx``."""
+    ctx.iterations += side.iterations
+    ctx.evaluations += side.evaluations
+    ctx.restarts += side.restarts
+    side.iterations = side.evaluations = side.restarts = 0
+    ctx.partial += 1
+
+
+@compiled
+def arrive(ctx, t):
+    """Let the present time be t, and count steps from here."""
+    ctx.t0, ctx.time_low, ctx.n = t, 0.0, 0
+
+
+@compiled
+def land(ctx, side, t):
+    """Make the end of the step in ``side``, at time ``t``, the state of ``ctx``."""
+    copy(side.next_state, ctx.state, vectors_of_state(ctx))
+    copy(side.next_error, ctx.error, vectors_of_state(ctx))
+    copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
+    ctx.length = side.h
+    arrive(ctx, t)
+    ctx.solved = UNSOLVED
+
+
+@compiled
+def sample(ctx, side, between, t, part, out):
+    """Write the state ``part`` beyond the present one; return the outcome."""
+    if part == 0.0:
+        write(ctx, ctx.state, out)
+        if between == LAND:
+            arrive(ctx, t)
+        return DONE
+    if between in (DENSE, SIDE):
+        # A part starts from the step ahead. Where that fails, nothing in it is reached: near a
+        # singularity the equations of a part may have a solution, far from the trajectory.
+        outcome = solve(ctx)
+        if outcome != DONE:
+            return outcome
+    if between == DENSE:
+        interpolate(ctx, part / ctx.h, out)
+        return DONE
+    outcome = part_step(ctx, side, part)
+    add_counters(ctx, side)
+    if outcome == DONE:
+        write(side, side.next_state, out)
+        if between == LAND:
+            land(ctx, side, t)
+    return outcome

@@ -1,0 +1,166 @@
+"""One sweep of the fixed-point iteration: field, then stages from its values.
+
+Second-order form: Q = q + (base + kh * sum_j A_j F_j); first-order form the
+same with kh = 1. The state is added last, so that one rounding only happens at
+its size. Rows are independent and go through the same operations; the columns
+of A stay in registers while the rows pass by.
+"""
+
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import (
+    call_field,
+    call_sweeps,
+    columns,
+    combine,
+    combine_only,
+    get,
+    put,
+    spread,
+)
+from integrators.kernel.step.size import change
+from integrators.kernel.step.stages import offset, place
+from integrators.kernel.tables import WIDE
+
+INFINITY = float("inf")
+
+
+@compiled
+def evaluate(ctx):
+    """Set the values of the field at the stages, one call per block of them."""
+    field, par = ctx.field, ctx.par
+    times, stages, values = ctx.times, ctx.stages, ctx.values
+    lanes = ctx.lanes
+    size = lanes * ctx.padded
+    for call in range(ctx.calls):
+        call_field(field, times + lanes * call, stages + size * call, par, values + size * call)
+
+
+@compiled
+def product8(ctx, table):
+    """Stages = state + (base + kh * table values), for eight of them."""
+    matrix = columns(table, 0, 8)
+    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
+    rows = ctx.rows
+    if ctx.unit:
+        for d in range(rows):
+            put(stages, 8 * d, spread(state, d) + combine(matrix, values, 8 * d, get(base, 8 * d)))
+    else:
+        factor = ctx.row_factor
+        for d in range(rows):
+            moved = fma(spread(factor, d), combine_only(matrix, values, 8 * d), get(base, 8 * d))
+            put(stages, 8 * d, spread(state, d) + moved)
+
+
+@compiled
+def product16(ctx, table):
+    """Stages = state + (base + kh * table values), for sixteen of them, eight at a time."""
+    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
+    factor, rows, unit = ctx.row_factor, ctx.rows, ctx.unit
+    for half in range(2):
+        matrix = columns(table, 128 * half, 16)
+        shift = 8 * half
+        if unit:
+            for d in range(rows):
+                moved = combine(matrix, values, 16 * d, get(base, 16 * d + shift))
+                put(stages, 16 * d + shift, spread(state, d) + moved)
+        else:
+            for d in range(rows):
+                mean = combine_only(matrix, values, 16 * d)
+                moved = fma(spread(factor, d), mean, get(base, 16 * d + shift))
+                put(stages, 16 * d + shift, spread(state, d) + moved)
+
+
+@compiled
+def multiply(table, chunks, groups, source, source_lanes, target, target_lanes, rows, padded):
+    """Target = table source, both in the layout of stage memory, in pieces of 8 x 8."""
+    for chunk in range(chunks):
+        into = target + place(chunk, padded * target_lanes, target_lanes)
+        for group in range(groups):
+            outof = source + place(group, padded * source_lanes, source_lanes)
+            matrix = columns(table, 64 * (chunk * groups + group), 8)
+            if group == 0:
+                for d in range(rows):
+                    put(into, target_lanes * d, combine_only(matrix, outof, source_lanes * d))
+            else:
+                for d in range(rows):
+                    old = get(into, target_lanes * d)
+                    put(into, target_lanes * d, combine(matrix, outof, source_lanes * d, old))
+
+
+@compiled
+def project(ctx, table, groups):
+    """Coefficients = table values."""
+    rows, padded = ctx.rows, ctx.padded
+    multiply(table, groups, ctx.chunks, ctx.values, ctx.lanes, ctx.coefficients, 8, rows, padded)
+
+
+@compiled
+def displace(ctx):
+    """Stages = state + (base + kh * sums)."""
+    rows, lanes = ctx.rows, ctx.lanes
+    state, factor = ctx.row_state, ctx.row_factor
+    for chunk in range(ctx.chunks):
+        start = offset(ctx, chunk)
+        stages, base, sums = ctx.stages + start, ctx.base + start, ctx.sums + start
+        for d in range(rows):
+            i = lanes * d
+            put(stages, i, spread(state, d) + fma(spread(factor, d), get(sums, i), get(base, i)))
+
+
+@compiled
+def through(ctx, projection, groups, table):
+    """Stages by way of coefficients: far fewer operations where s is far below k."""
+    rows, padded = ctx.rows, ctx.padded
+    project(ctx, projection, groups)
+    multiply(table, ctx.chunks, groups, ctx.coefficients, 8, ctx.sums, ctx.lanes, rows, padded)
+    displace(ctx)
+
+
+@compiled
+def wide(ctx, table):
+    """Stages from the values for any number of them."""
+    chunks, lanes = ctx.chunks, ctx.lanes
+    multiply(table, chunks, chunks, ctx.values, lanes, ctx.sums, lanes, ctx.rows, ctx.padded)
+    displace(ctx)
+
+
+@compiled
+def product(ctx, table):
+    """Stages from the field's values, by the route that the sizes call for."""
+    route = ctx.route
+    if route == 8:
+        product8(ctx, table)
+    elif route == 16:
+        product16(ctx, table)
+    elif route == WIDE:
+        wide(ctx, table)
+    else:
+        through(ctx, ctx.projection, ctx.groups, table)
+
+
+@compiled
+def sweep(ctx, count):
+    """Iterate ``count`` times, without a test."""
+    if count > 0:
+        if ctx.fused:
+            call_sweeps(ctx.fused, ctx, count, 0)
+        else:
+            for _ in range(count):
+                evaluate(ctx)
+                product(ctx, ctx.matrix)
+        ctx.tried += count
+        ctx.last = INFINITY  # the next change does not follow the last one that was measured
+
+
+@compiled
+def sweep_measured(ctx):
+    """Iterate once; return the largest change relative to the size of its block, NaN if any stage is."""
+    ctx.tried += 1
+    if ctx.fused:
+        call_sweeps(ctx.fused, ctx, 1, 1)
+        return ctx.change
+    evaluate(ctx)
+    ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
+    product(ctx, ctx.matrix)
+    return change(ctx, ctx.strict)

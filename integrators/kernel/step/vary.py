@@ -1,0 +1,266 @@
+"""Steps of varying length: each as long as the estimated errors and the iterations allow.
+
+Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
+"""
+
+from math import log
+
+from integrators.kernel.context import (
+    BY_VALUES,
+    DIVERGED,
+    DONE,
+    FIXED_POINT,
+    RUNNING,
+    SCATTERED,
+    UNDERFLOW,
+    UNSOLVED,
+)
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, set_step
+from integrators.kernel.step.control import (
+    APPROACH,
+    CLOSE,
+    RETREAT,
+    SAFETY,
+    SHORTEST,
+    SHRINK,
+    TINY,
+    bounded,
+    log_factor,
+)
+from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
+from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.handover import solve_implicitly, want_solver
+from integrators.kernel.step.iterate import close, evaluate_at_last, settle, test
+from integrators.kernel.step.kinks import kink
+from integrators.kernel.step.size import ROUNDING
+from integrators.kernel.step.sweep import sweep, sweep_measured
+
+GROW = FARTHEST  # of the length from one step to the next, at most
+# Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
+# and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
+BUSY, BUSY_FIRST = 18.0, 36.0
+GOAL = log(1e-17)  # a change that is going to be no larger is not waited for
+FIRST_RATE, LEAST_RATE, MOST_RATE = log(0.01), log(1e-4), log(0.9)
+HOPE = log(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+# The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
+# errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
+# MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
+HELD_BACK_STEPS = 8
+HELD_BACK = 1.2
+GAIN, GAIN_PER_ROW, MOST_ROWS = 8.0, 1.5, 64
+MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
+# A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
+# find it.
+SURE = 3
+STAY = 16  # steps for which it then stays
+STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
+
+
+@compiled
+def attempt(ctx, h):
+    """Solve the step of length h from the state; return the outcome."""
+    set_step(ctx, h)
+    if ctx.implicit:
+        ctx.log_rate = FIRST_RATE  # nobody knows what it will be afterwards
+        outcome = solve_implicitly(ctx, ctx, 0)
+    else:
+        begin(ctx)
+        outcome = iterate(ctx)
+    return finish(ctx) if outcome == DONE else outcome
+
+
+@compiled
+def iterate(ctx):
+    """Iterate until the step is solved or has failed; return the outcome.
+
+    The first change and the rate of contraction, as it was at the last step, tell how
+    many iterations need no test. Nor does the one that will not change anything.
+    """
+    test(ctx, sweep_measured(ctx))
+    tried = ctx.tried
+    if ctx.outcome != RUNNING or tried != 1:
+        return settle(ctx)
+    first = log(ctx.last)
+    rate = ctx.log_rate
+    sweep(ctx, int((GOAL - first) / rate) - 1)
+    while ctx.outcome == RUNNING:
+        test(ctx, sweep_measured(ctx))
+        tries = ctx.tried - tried
+        if tries <= 0:  # started anew
+            return settle(ctx)
+        last = ctx.last
+        if last > ROUNDING:
+            rate = min(max((log(last) - first) / tries, LEAST_RATE), MOST_RATE)
+        elif last == 0.0 and tries > 1:
+            rate = max(rate + HOPE, LEAST_RATE)
+        if ctx.outcome == RUNNING and log(last) + rate < GOAL:
+            evaluate_at_last(ctx)
+    ctx.log_rate = rate
+    return close(ctx)
+
+
+@compiled
+def longer(ctx, error, defect, grow):
+    """Return the next step's length relative to this one's, from what is estimated for this one."""
+    if not error < INFINITY:
+        return SHRINK
+    h = ctx.h
+    behind = ctx.length_behind
+    change = log(abs(h / behind)) if behind != 0.0 else 0.0
+    power = 1.0 / (2.0 * ctx.error_degree + 1.0)
+    here = power * log(max(error, TINY))
+    before = ctx.error_behind if behind != 0.0 else INFINITY
+    factor = log_factor(ctx.error_aim, here, before, change)
+    ctx.error_ahead = here
+    if ctx.allowed_defect < INFINITY:
+        power = 1.0 / (2.0 * ctx.k - 1.0)
+        here = power * log(max(defect, TINY))
+        before = ctx.defect_behind if behind != 0.0 else INFINITY
+        factor = min(factor, log_factor(ctx.defect_aim, here, before, change))
+        ctx.defect_ahead = here
+    return bounded(factor, grow)
+
+
+@compiled
+def watch(ctx, factor):
+    """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
+    room = ctx.error_aim - ctx.error_ahead
+    if ctx.allowed_defect < INFINITY:
+        room = min(room, ctx.defect_aim - ctx.defect_ahead)
+    worth = log(GAIN + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
+    held_back = factor < HELD_BACK
+    if held_back and room <= worth and ctx.rows <= MOST_ROWS:
+        room = log(ctx.error_decay) - log_decay(ctx)
+    ctx.slow = ctx.slow + 1 if held_back and room > worth else 0
+
+
+@compiled
+def take_over(ctx):
+    """Put the implicit solver to work."""
+    ctx.left = STAY
+    ctx.slow = 0
+    ctx.implicit = 1
+    ctx.switches += 1
+    ctx.length_limit = INFINITY
+
+
+@compiled
+def learn(ctx):
+    """Set `Context.held`, the steps to wait for the implicit solver, when that has given way again.
+
+    If it did so as soon as it might, steps have not become longer.
+    """
+    waited = max(ctx.held, HELD_BACK_STEPS)
+    gained = ctx.left < -1
+    ctx.held = HELD_BACK_STEPS if gained else min(2 * waited, MOST_HELD_BACK_STEPS)
+
+
+@compiled
+def remaining(ctx, t):
+    """Return how far the time t is ahead; 0 where it is the present but for rounding, or behind.
+
+    Rounding is that of the times and of the step behind, which may be all there is at t = 0. A
+    breakpoint counts as reached when it is so near that no step there could be told from none.
+    """
+    t0 = ctx.t0
+    rest = (t - t0) - ctx.time_low
+    size = max(max(abs(t), abs(t0)), abs(ctx.length_behind))
+    close = SHORTEST if t == ctx.stop else CLOSE
+    return 0.0 if abs(rest) <= close * size or rest * ctx.next_length < 0.0 else rest
+
+
+@compiled
+def within(ctx, h):
+    """Return the length of a step, no longer than `Context.longest` and not beyond `Context.stop`."""
+    longest, stop = ctx.longest, ctx.stop
+    if abs(h) > longest:
+        h = longest if h > 0.0 else -longest
+    if abs(stop) < INFINITY:
+        rest = remaining(ctx, stop)
+        if abs(h) > abs(rest):
+            h = rest
+    return h
+
+
+@compiled
+def ready(ctx):
+    """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
+    if ctx.solved:
+        return DONE
+    if ctx.slow >= max(ctx.held, HELD_BACK_STEPS):
+        if ctx.solver == 0:
+            return want_solver(ctx)
+        take_over(ctx)
+    t = ctx.t0
+    allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
+    busy = BUSY if ctx.second else BUSY_FIRST
+    ctx.rejected = 0
+    grow, failure, doubts = GROW, UNDERFLOW, 0
+    while True:
+        h = within(ctx, ctx.next_length)
+        if not abs(h) > SHORTEST * abs(t):
+            return failure
+        before = ctx.iterations
+        implicit = ctx.implicit
+        outcome = attempt(ctx, h)
+        if implicit and ctx.implicit == 0:
+            learn(ctx)
+        ctx.solved = UNSOLVED
+        error, defect = INFINITY, INFINITY
+        if outcome == DONE:
+            error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
+            if implicit == 0:
+                fits = error <= allowed and defect <= allowed_defect
+                if ctx.kinked:
+                    doubts += 1
+                    ctx.doubt_end = t + h
+                if (fits or doubts >= SURE) and kink(ctx, fits):
+                    error = INFINITY
+        factor = longer(ctx, error, defect, grow)
+        if error <= allowed and defect <= allowed_defect:
+            if doubts >= SURE and ctx.kinks:
+                ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
+            limit = ctx.length_limit * APPROACH
+            ctx.length_limit = limit
+            if implicit:
+                factor = min(1.0 if 1.0 < factor < STEADY else factor, limit / abs(h))
+            else:
+                factor = min(factor, max(busy / (ctx.iterations - before), 0.5))
+                factor = min(factor, limit / abs(h))
+                if ctx.strategy != FIXED_POINT:
+                    watch(ctx, factor)
+            ctx.length_after = h * factor
+            ctx.solved = BY_VALUES
+            return DONE
+        failure = UNDERFLOW
+        if implicit:
+            ctx.implicit_steps -= 1
+        if outcome == DONE:
+            ctx.length = h
+            ctx.rejected = 1
+        else:
+            failure = outcome
+            ctx.length = 0.0
+            ctx.length_limit = RETREAT * abs(h)
+            if outcome in (DIVERGED, SCATTERED):
+                factor = RETREAT
+        ctx.next_length = h * min(factor, SAFETY)
+        ctx.rejections += 1
+        grow = 1.0
+
+
+@compiled
+def take(ctx):
+    """Take the step ahead, which is solved."""
+    t, low = two_sum(ctx.t0, ctx.h)
+    commit(ctx)
+    ctx.n = 0
+    t, low = two_sum(t, low + ctx.time_low)
+    ctx.t0 = t
+    ctx.time_low = low
+    ctx.next_length = ctx.length_after
+    ctx.length_behind = ctx.h
+    ctx.error_behind = ctx.error_ahead
+    ctx.defect_behind = ctx.defect_ahead
