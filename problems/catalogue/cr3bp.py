@@ -45,10 +45,6 @@ def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     return (p[0] ** 2 + p[1] ** 2) / 2 + (y * p[0] - x * p[1]) - ((1 - par.mu) / r1 + par.mu / r2)
 
 
-def _jacobi(q: Any, p: Any, par: Any, m: Any) -> Any:
-    return -2 * _energy(q, p, par, m)
-
-
 @entry(
     title="the restricted three-body problem",
     references=(
@@ -91,12 +87,15 @@ def cr3bp(
     """
     orbit = ORBITS[loops]
     system = Hamiltonian(
-        _energy, dof=2, parameters={"mu": MOON}, invariants={"jacobi": _jacobi}, name="cr3bp"
+        _energy,
+        dof=2,
+        parameters={"mu": orbit.mu if mu is None else mu},
+        invariants={"jacobi": lambda q, p, par, m: -2 * _energy(q, p, par, m)},
+        name="cr3bp",
     )
     return Problem(
         system,
         q0=[orbit.x, 0.0],
         p0=[0.0, orbit.speed + orbit.x],
-        parameters={"mu": orbit.mu if mu is None else mu},
         t_end=orbit.period if t_end is None else t_end,
     )

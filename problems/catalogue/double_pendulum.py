@@ -72,12 +72,6 @@ def double_pendulum(
     Problem
         State ``[q1, q2, p1, p2]``; parameters as named; invariant: energy.
     """
-    names = {"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 1.0}
-    values = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
-    return Problem(
-        Hamiltonian(_energy, dof=2, parameters=names, name="double_pendulum"),
-        q0=[q1, q2],
-        p0=[p1, p2],
-        parameters=values,
-        t_end=t_end,
-    )
+    parameters = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
+    system = Hamiltonian(_energy, dof=2, parameters=parameters, name="double_pendulum")
+    return Problem(system, q0=[q1, q2], p0=[p1, p2], t_end=t_end)

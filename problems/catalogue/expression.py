@@ -124,7 +124,7 @@ def expression(
             raise InputError(
                 f"{key}={shown(list(start))} of expression must be a list of {system.dof} finite numbers."
             )
-    return Problem(system, q0=q0, p0=p0, parameters=values, t_end=t_end, title=H)
+    return Problem(system, q0=q0, p0=p0, t_end=t_end, title=H)
 
 
 def assignments(text: str) -> dict[str, float]:

@@ -82,21 +82,12 @@ def fput(
         return kinetic + (spring(q[0]) + inner + spring(-q[n - 1]))
 
     if start == "mode":
-        q0 = [starts.nearest(lambda i=i: _mode(i, n, amplitude)) for i in range(1, n + 1)]
+        q0 = starts.nearest(lambda mp: [amplitude * mp.sin(mp.pi * i / (n + 1)) for i in range(1, n + 1)])
         p0 = [0.0] * n
     else:
         q0 = [0.0] * n
         p0 = [math.sqrt(2 * temperature) * draw for draw in starts.gaussians(seed, n)]
-    return Problem(
-        Hamiltonian(energy, dof=n, parameters={"alpha": 0.25, "beta": 0.0}, name=f"fput_{n}"),
-        q0=q0,
-        p0=p0,
-        parameters={"alpha": alpha, "beta": beta},
-        t_end={"mode": 960.0, "thermal": 240.0}[start] if t_end is None else t_end,
-    )
-
-
-def _mode(i: int, n: int, amplitude: float) -> Any:
-    import mpmath
-
-    return mpmath.mpf(amplitude) * mpmath.sin(mpmath.pi * i / (n + 1))
+    if t_end is None:
+        t_end = 960.0 if start == "mode" else 240.0
+    system = Hamiltonian(energy, dof=n, parameters={"alpha": alpha, "beta": beta}, name=f"fput_{n}")
+    return Problem(system, q0=q0, p0=p0, t_end=t_end)

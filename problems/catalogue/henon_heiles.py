@@ -75,23 +75,20 @@ def henon_heiles(
     problems.errors.InputError
         If the potential at the start exceeds the energy.
     """
-    momentum = [starts.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
+
+    def momentum(mp: Any) -> list[Any]:
+        x, y = mp.mpf(q1), mp.mpf(q2)
+        kinetic = energy - ((x * x + y * y) / 2 + x * x * y - y**3 / 3)
+        if kinetic < 0:
+            raise InputError(
+                f"energy={energy!r} of henon_heiles is less than the potential at ({q1!r}, {q2!r}); "
+                "raise it or start nearer to the origin."
+            )
+        speed = mp.sqrt(2 * kinetic)
+        return [speed * mp.cos(direction), speed * mp.sin(direction)]
+
     system = Hamiltonian(_energy, dof=2, name="henon_heiles")
-    return Problem(system, q0=[q1, q2], p0=momentum, t_end=t_end)
-
-
-def _start(energy: float, q1: float, q2: float, direction: float) -> tuple[Any, Any]:
-    import mpmath
-
-    x, y = mpmath.mpf(q1), mpmath.mpf(q2)
-    kinetic = mpmath.mpf(energy) - ((x * x + y * y) / 2 + x * x * y - y**3 / 3)
-    if kinetic < 0:
-        raise InputError(
-            f"energy={energy!r} of henon_heiles is less than the potential at ({q1!r}, {q2!r}); "
-            "raise it or start nearer to the origin."
-        )
-    speed = mpmath.sqrt(2 * kinetic)
-    return speed * mpmath.cos(direction), speed * mpmath.sin(direction)
+    return Problem(system, q0=[q1, q2], p0=starts.nearest(momentum), t_end=t_end)
 
 
 def beyond_triangle(q: ArrayLike) -> NDArray[np.float64]:

@@ -25,10 +25,6 @@ def _energy(q: Any, p: Any, par: Any) -> Any:
     return kinetic + quadrupole + par.c4 * (z2 * z2 - 3 * z2 * rho + 0.375 * (rho * rho))
 
 
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
-
-
 @entry(
     title="a Penning trap",
     references=("L. S. Brown, G. Gabrielse, Geonium theory, Reviews of Modern Physics 58 (1986) 233-311",),
@@ -77,14 +73,8 @@ def penning_trap(
     system = Hamiltonian(
         _energy,
         dof=3,
-        parameters={"omega_c": 5.0, "omega_z": 1.0, "c4": 0.01},
-        invariants={"angular_momentum": _turn},
+        parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="penning_trap",
     )
-    return Problem(
-        system,
-        q0=[1.0, 0.0, 1.0],
-        p0=[0.0, 0.1 + omega_c / 2, 0.0],
-        parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
-        t_end=t_end,
-    )
+    return Problem(system, q0=[1.0, 0.0, 1.0], p0=[0.0, 0.1 + omega_c / 2, 0.0], t_end=t_end)

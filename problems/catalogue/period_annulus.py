@@ -77,11 +77,5 @@ def period_annulus(
         equilibria `P1`, `P2` and the energy of the loop `H_STAR` belong to the
         default coefficients.
     """
-    default = {"a": (0.0, 0.0, 1.0, 0.0), "b": (0.0, 1.0, 0.0, 1.0), "c": (0.0, 1.0, 1.0, 0.0)}
-    return Problem(
-        Hamiltonian(_energy, dof=1, parameters=default, name="period_annulus"),
-        q0=[0.0],
-        p0=[start],
-        parameters={"a": a, "b": b, "c": c},
-        t_end=t_end,
-    )
+    system = Hamiltonian(_energy, dof=1, parameters={"a": a, "b": b, "c": c}, name="period_annulus")
+    return Problem(system, q0=[0.0], p0=[start], t_end=t_end)

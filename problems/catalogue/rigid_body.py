@@ -66,20 +66,9 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
         _energy,
         _structure,
         dim=3,
-        parameters={"inertia": (2.0, 1.0, 2 / 3), "quartic": 0.0},
+        parameters={"inertia": (2.0, 1.0, 2 / 3), "quartic": quartic},
         invariants={"casimir": _casimir},
         name="rigid_body",
     )
-    return Problem(
-        system,
-        y0=[starts.nearest(lambda: _start(0)), 0.0, starts.nearest(lambda: _start(1))],
-        parameters={"quartic": quartic},
-        t_end=t_end,
-    )
-
-
-def _start(component: int) -> Any:
-    import mpmath
-
-    angle = mpmath.mpf("1.1")
-    return mpmath.sin(angle) if component else mpmath.cos(angle)
+    y0 = starts.nearest(lambda mp: [mp.cos(mp.mpf("1.1")), 0, mp.sin(mp.mpf("1.1"))])
+    return Problem(system, y0=y0, t_end=t_end)

@@ -83,9 +83,8 @@ def schwarzschild(
     system = Hamiltonian(
         _energy,
         dof=2,
-        parameters={"E": 1.0},
+        parameters={"E": float(energy)},
         invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="schwarzschild",
     )
-    q0, p0 = [float(near), 0.0], [0.0, float(momentum)]
-    return Problem(system, q0=q0, p0=p0, parameters={"E": float(energy)}, t_end=t_end)
+    return Problem(system, q0=[float(near), 0.0], p0=[0.0, float(momentum)], t_end=t_end)

@@ -109,7 +109,7 @@ def sitnikov(
     system = Hamiltonian(
         _energy,
         dof=9,
-        parameters={"m": (1.0, 1.0, 1e-5)},
+        parameters={"m": (1.0, 1.0, m3)},
         invariants={"linear_momentum": _linear_momentum, "angular_momentum": _angular_momentum},
         guards={"off_axis": _off_axis},
         bodies=Bodies(masses="m", G=1.0, dimension=3),
@@ -120,6 +120,5 @@ def sitnikov(
         system,
         q0=[-d / 2, 0.0, 0.0, d / 2, 0.0, 0.0, 0.0, 0.0, z3],
         p0=[0.0, -momentum, 0.0, 0.0, momentum, 0.0, 0.0, 0.0, m3 * v3],
-        parameters={"m": (1.0, 1.0, m3)},
         t_end=t_end,
     )

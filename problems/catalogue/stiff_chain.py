@@ -66,10 +66,5 @@ def stiff_chain(
     q0, p0 = [0.0] * (2 * k), [0.0] * (2 * k)
     q0[0] = p0[0] = p0[k] = 1.0
     q0[k] = 1.0 / omega
-    return Problem(
-        Hamiltonian(energy, dof=2 * k, parameters={"omega": 50.0}, name=f"stiff_chain_{k}"),
-        q0=q0,
-        p0=p0,
-        parameters={"omega": omega},
-        t_end=t_end,
-    )
+    system = Hamiltonian(energy, dof=2 * k, parameters={"omega": omega}, name=f"stiff_chain_{k}")
+    return Problem(system, q0=q0, p0=p0, t_end=t_end)
