@@ -1,14 +1,15 @@
 """Poisson systems y' = B(y) grad H(y), with a skew-symmetric structure matrix B."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from problems.calculus.function import function_of
 from problems.calculus.gradient import gradient
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value, name_of
 from problems.trace import arguments
 from problems.trace.graph import Node
 from problems.trace.source_line import line_of_function
@@ -52,19 +53,18 @@ class Poisson(System):
 
     kind = "poisson"
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         H: Callable[..., Any],
         B: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = MappingProxyType({}),
+        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
+        guards: Named[Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
         super().__init__(
             dim=dim,
             dof=None,

@@ -1,17 +1,18 @@
 """Systems whose field is not traced: a numba function, or any Python function."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from problems.calculus.function import Function
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import Named, at_least
 from problems.errors import InputError, shown
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value, name_of
 
 Array = NDArray[np.float64]
 
@@ -62,18 +63,17 @@ class Foreign(System):
     kind = "vector_field"
     traced = False
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         f: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = MappingProxyType({}),
+        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
+        guards: Named[Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
         super().__init__(

@@ -1,13 +1,14 @@
 """First-order systems, from their right-hand side written once in ordinary Python arithmetic."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from problems.calculus.function import function_of
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value, name_of
 from problems.trace import arguments
 from problems.trace.source_line import line_of_function
 
@@ -27,18 +28,17 @@ class VectorField(System):
 
     kind = "vector_field"
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         f: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = MappingProxyType({}),
+        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
+        guards: Named[Callable[..., Any]] = MappingProxyType({}),
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
         super().__init__(
             dim=dim,
             dof=None,
