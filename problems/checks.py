@@ -13,7 +13,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import NoneType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
@@ -43,6 +43,9 @@ Named = Annotated[
     ),
 ]
 """A dictionary whose keys are names: ``Named[float]``."""
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+"""The empty one, as a default."""
 
 
 def at_least(least: int) -> Must:

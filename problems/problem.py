@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from problems import emit
 from problems.analysis import invariants
 from problems.calls import checked_arguments
-from problems.checks import Named
+from problems.checks import NOTHING, Named
 from problems.errors import InputError, shown
 from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
-_NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, init=False, repr=False, eq=False)
@@ -84,12 +83,12 @@ class Problem:
         p0: ArrayLike | None = None,
         v0: ArrayLike | None = None,
         y0: ArrayLike | None = None,
-        parameters: Named[Value] = _NOTHING,
+        parameters: Named[Value] = NOTHING,
         t0: float = 0.0,
         t_end: float,
         name: str | None = None,
         title: str | None = None,
-        arguments: Named[Any] = _NOTHING,
+        arguments: Named[Any] = NOTHING,
         times: ArrayLike | None = None,
         references: Sequence[str] = (),
         notes: str = "",

@@ -24,8 +24,8 @@ def hamiltonian(
 ) -> Hamiltonian:
     """Return the system; its parameter ``stiffness`` is 1/dx^2, and ``potential(u, par, m)`` is f."""
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def link(i: Any, j: Any) -> Any:
+    def energy(q, p, par, m):
+        def link(i, j):
             rise = q[j] - q[i]
             return rise * rise
 

@@ -6,8 +6,6 @@ In the plane, with the growing field B = r (A = r/3 (-y, x)) and the repelling
 potential phi = 1/(100 r).
 """
 
-from typing import Any
-
 from problems.catalogue import _starts as starts
 from problems.entry import Expected, entry
 from problems.errors import InputError
@@ -16,7 +14,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     x, y = q[0], q[1]
     r = m.sqrt(x * x + y * y)
     u, v = p[0] + r * y / 3, p[1] - r * x / 3
@@ -66,7 +64,7 @@ def charged_particle(
     if x == 0 and y == 0:
         raise InputError("x=0 and y=0 of charged_particle are the singular centre; start elsewhere.")
 
-    def momentum(mp: Any) -> list[Any]:
+    def momentum(mp):
         third = mp.sqrt(mp.mpf(x) ** 2 + mp.mpf(y) ** 2) / 3
         return [vx - third * y, vy + third * x]
 

@@ -9,7 +9,7 @@ of 2 loops, with another mass of the Moon, as in Shampine and Gordon's.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from problems.checks import Must
 from problems.entry import Expected, entry
@@ -38,7 +38,7 @@ ORBITS = {
 }
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     x, y = q[0], q[1]
     r1 = m.sqrt((x + par.mu) ** 2 + y**2)
     r2 = m.sqrt((x - (1 - par.mu)) ** 2 + y**2)

@@ -5,8 +5,6 @@
 Here q is the place of one atom with respect to the other, and m their reduced mass.
 """
 
-from typing import Any
-
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
@@ -14,7 +12,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     r = m.sqrt(q[0] * q[0] + q[1] * q[1])
     w = 1 - m.exp(-par.a * (r - par.r0))
     return (p[0] * p[0] + p[1] * p[1]) / (2 * par.m) + par.D * (w * w)

@@ -171,7 +171,7 @@ def _freedom(energy: Formula) -> int:
 def _traceable(formula: Formula, values: Mapping[str, float], dof: int) -> Callable[..., Any]:
     """Return the function to be traced: the formula, calculated with symbols."""
 
-    def H(t: Any, q: Any, p: Any, par: Any, m: Any) -> Any:
+    def H(t, q, p, par, m):
         def named(word: str) -> Any:
             if word == "t":
                 return t

@@ -7,7 +7,7 @@ By default as in the report: n = 32, alpha = 1/4, the lowest mode.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -73,8 +73,8 @@ def fput(
     """
     limits.check_problem("fput", 2 * n, n=n)
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def spring(r: Any) -> Any:
+    def energy(q, p, par, m):
+        def spring(r):
             return r * r / 2 + par.alpha * r**3 / 3 + par.beta * r**4 / 4
 
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(n))

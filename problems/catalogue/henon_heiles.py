@@ -7,7 +7,6 @@ orbit that starts in the triangle of the saddles never leaves it.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +22,7 @@ ESCAPE = 1 / 6
 SADDLES = ((0.0, 1.0), (-math.sqrt(3) / 2, -0.5), (math.sqrt(3) / 2, -0.5))
 
 
-def _energy(q: Any, p: Any) -> Any:
+def _energy(q, p):
     kinetic = (p[0] ** 2 + p[1] ** 2) / 2
     return kinetic + ((q[0] ** 2 + q[1] ** 2) / 2 + (q[0] ** 2 * q[1] - q[1] ** 3 / 3))
 
@@ -76,7 +75,7 @@ def henon_heiles(
         If the potential at the start exceeds the energy.
     """
 
-    def momentum(mp: Any) -> list[Any]:
+    def momentum(mp):
         x, y = mp.mpf(q1), mp.mpf(q2)
         kinetic = energy - ((x * x + y * y) / 2 + x * x * y - y**3 / 3)
         if kinetic < 0:
@@ -122,5 +121,4 @@ def inside_triangle(q: ArrayLike) -> NDArray[np.bool_]:
     -------
     ndarray of bool, shape (n,)
     """
-    points = np.atleast_2d(np.asarray(q, dtype=np.float64))
-    return (points[:, 1] >= -0.5) & (math.sqrt(3) * np.abs(points[:, 0]) + points[:, 1] <= 1.0)
+    return beyond_triangle(q) == 0.0

@@ -9,7 +9,7 @@ the energy, so that the mass is m/k_B in K ns^2/nm^2.
 
 from fractions import Fraction
 from itertools import combinations
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -92,8 +92,8 @@ def lennard_jones(
 def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
     pairs = list(combinations(range(n), 2))
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def bond(i: Any, j: Any) -> Any:
+    def energy(q, p, par, m):
+        def bond(i, j):
             x, y = q[2 * i] - q[2 * j], q[2 * i + 1] - q[2 * j + 1]
             u = (par.sigma * par.sigma) / (x * x + y * y)
             u3 = u * u * u
@@ -102,10 +102,10 @@ def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
         kinetic = m.sum(lambda i: (p[2 * i] * p[2 * i] + p[2 * i + 1] * p[2 * i + 1]) / (2 * par.m), range(n))
         return kinetic + 4 * par.eps * m.sum(bond, pairs)
 
-    def momentum(p: Any, m: Any) -> Any:
+    def momentum(p, m):
         return [m.sum(lambda i, c=c: p[2 * i + c], range(n)) for c in range(2)]
 
-    def turn(q: Any, p: Any, m: Any) -> Any:
+    def turn(q, p, m):
         return m.sum(lambda i: q[2 * i] * p[2 * i + 1] - q[2 * i + 1] * p[2 * i], range(n))
 
     return Hamiltonian(

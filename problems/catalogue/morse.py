@@ -15,7 +15,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     w = 1 - m.exp(-par.a * q[0])
     return p[0] * p[0] / (2 * par.m) + par.D * (w * w)
 

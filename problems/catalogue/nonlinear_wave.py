@@ -1,6 +1,6 @@
 """A Klein-Gordon equation with a cubic force on a periodic interval, discretised as `_waves` says."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -51,7 +51,7 @@ def nonlinear_wave(
     """
     limits.check_problem("nonlinear_wave", 2 * n, n=n)
 
-    def potential(u: Any, par: Any, m: Any) -> Any:
+    def potential(u, par, m):
         square = u * u
         return par.mass / 2 * square + par.kappa / 4 * (square * square)
 

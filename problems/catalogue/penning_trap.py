@@ -6,8 +6,6 @@ with B = omega_c and the quadrupole phi = omega_z^2/2 (z^2 - (x^2 + y^2)/2), plu
 octupole c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2).
 """
 
-from typing import Any
-
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.errors import InputError
@@ -16,7 +14,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any) -> Any:
+def _energy(q, p, par):
     x, y, z = q
     u, v = p[0] + par.omega_c * y / 2, p[1] - par.omega_c * x / 2
     rho, z2 = x * x + y * y, z * z

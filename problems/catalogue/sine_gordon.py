@@ -1,6 +1,6 @@
 """The sine-Gordon equation on a periodic interval, discretised in space as `_waves` says."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -51,7 +51,7 @@ def sine_gordon(
     """
     limits.check_problem("sine_gordon", 2 * n, n=n)
 
-    def hump(mp: Any) -> list[Any]:
+    def hump(mp):
         places = [length * (mp.mpf(i) / n - 0.5) for i in range(n)]
         return [4 / mp.mpf(gamma) * mp.sech(x / gamma) for x in places]
 

@@ -17,7 +17,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Bodies, Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     kinetic = sum((p[3 * i] ** 2 + p[3 * i + 1] ** 2 + p[3 * i + 2] ** 2) / (2 * par.m[i]) for i in range(3))
     potential = 0
     for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -27,18 +27,18 @@ def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     return kinetic + potential
 
 
-def _linear_momentum(p: Any) -> Any:
+def _linear_momentum(p):
     return [p[c] + p[3 + c] + p[6 + c] for c in range(3)]
 
 
-def _angular_momentum(q: Any, p: Any) -> Any:
+def _angular_momentum(q, p):
     def total(a: int, b: int) -> Any:
         return sum(q[3 * i + a] * p[3 * i + b] - q[3 * i + b] * p[3 * i + a] for i in range(3))
 
     return [total(1, 2), total(2, 0), total(0, 1)]
 
 
-def _off_axis(q: Any, m: Any) -> Any:
+def _off_axis(q, m):
     return m.sqrt(q[6] ** 2 + q[7] ** 2)
 
 

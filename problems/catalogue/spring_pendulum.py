@@ -7,7 +7,6 @@ which the spring oscillates twice as fast as it swings.
 """
 
 import math
-from typing import Any
 
 from problems.checks import Positive
 from problems.entry import Expected, entry
@@ -18,7 +17,7 @@ from problems.systems.hamiltonian import Hamiltonian
 PI_SQUARED = math.pi * math.pi
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     r = m.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     stretch = r - par.l0
     kinetic = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (2 * par.m)

@@ -8,7 +8,7 @@ with q = x: x_1..x_m the (scaled) positions of the stiff springs and x_{m+1}..x_
 their (scaled) lengths. In the book: m = 3, omega = 50.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.checks import Positive, at_least
@@ -57,7 +57,7 @@ def stiff_chain(
     limits.check_problem("stiff_chain", 4 * springs, springs=springs)
     k = springs
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+    def energy(q, p, par, m):
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(2 * k))
         stiff = par.omega * par.omega / 2 * m.sum(lambda i: q[k + i] * q[k + i], range(k))
         inner = m.sum(lambda i: (q[i + 1] - q[k + i + 1] - q[i] - q[k + i]) ** 4, range(k - 1))

@@ -13,7 +13,7 @@ from problems import limits
 from problems.calculus.function import Function, function_of, stacked
 from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
-from problems.checks import Named, checked, number, numbers
+from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.errors import InputError, shown, unknown
 from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
@@ -68,21 +68,22 @@ class System:
 
     def __init__(
         self,
-        *,
+        function: Callable[..., Any],
         dim: int,
         dof: int | None,
         parameters: Mapping[str, Value],
         invariants: Mapping[str, Callable[..., Any]],
         guards: Mapping[str, Callable[..., Any]],
-        name: str,
+        name: str | None,
     ) -> None:
-        size = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
-        limits.check(f"a system with {size}", "COMPONENTS", dim)
+        asked = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
+        limits.check(f"a system with {asked}", "COMPONENTS", dim)
         if self.kind != "vector_field" and "energy" in invariants:
             raise InputError("the invariant 'energy' is H itself; give the others only.")
         self.dim = dim
         self.dof = dof
-        self.name = name
+        called = getattr(function, "__name__", "")
+        self.name = name or (called if called.isidentifier() else "system")
         self.bodies: Bodies | None = None
         self.parameters: Mapping[str, Value] = MappingProxyType(
             {key: _parameter(key, value) for key, value in parameters.items()}
@@ -246,7 +247,7 @@ class System:
         """Whether an invariant is a list of numbers."""
         return invariant in self._vectors
 
-    def pack(self, values: Mapping[str, Value] = MappingProxyType({})) -> NDArray[np.float64]:
+    def pack(self, values: Mapping[str, Value] = NOTHING) -> NDArray[np.float64]:
         """Return the flat parameter vector, defaults filled in.
 
         Parameters
@@ -284,12 +285,6 @@ class System:
             key: float(par[offset]) if size is None else par[offset : offset + size].copy()
             for key, (offset, size) in self._layout.items()
         }
-
-
-def name_of(function: Callable[..., Any]) -> str:
-    """Return a function's name as an identifier."""
-    name = getattr(function, "__name__", "system")
-    return name if name.isidentifier() else "system"
 
 
 def _parameter(name: str, value: Any) -> Value:

@@ -2,15 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from types import MappingProxyType
 from typing import Annotated, Any
 
 from problems.calculus.function import Function, LoopTerm, Term, function_of, joined, stacked
 from problems.calculus.gradient import gradient
 from problems.calls import checked_arguments
-from problems.checks import Named, at_least
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError, shown, unknown
-from problems.systems.base import Bodies, System, Value, name_of
+from problems.systems.base import Bodies, System, Value
 from problems.trace.graph import PAR, Loop, Node, P
 
 
@@ -53,21 +52,14 @@ class Hamiltonian(System):
         H: Callable[..., Any],
         *,
         dof: Annotated[int, at_least(1)],
-        parameters: Named[Value] = MappingProxyType({}),
-        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
-        guards: Named[Callable[..., Any]] = MappingProxyType({}),
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         bodies: Bodies | None = None,
         domain: Callable[..., Any] | None = None,
         name: str | None = None,
     ) -> None:
-        super().__init__(
-            dim=2 * dof,
-            dof=dof,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(H),
-        )
+        super().__init__(H, 2 * dof, dof, parameters, invariants, guards, name)
         if bodies is not None:
             bodies = _checked_bodies(bodies, self.parameters, dof)
         self.bodies = bodies

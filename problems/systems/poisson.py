@@ -1,15 +1,14 @@
 """Poisson systems y' = B(y) grad H(y), with a skew-symmetric structure matrix B."""
 
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import Annotated, Any
 
 from problems.calculus.function import function_of
 from problems.calculus.gradient import gradient
 from problems.calls import checked_arguments
-from problems.checks import Named, at_least
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, name_of
+from problems.systems.base import System, Value
 from problems.trace import arguments
 from problems.trace.graph import Node
 from problems.trace.source_line import line_of_function
@@ -60,19 +59,12 @@ class Poisson(System):
         B: Callable[..., Any],
         *,
         dim: Annotated[int, at_least(1)],
-        parameters: Named[Value] = MappingProxyType({}),
-        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
-        guards: Named[Callable[..., Any]] = MappingProxyType({}),
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(H),
-        )
+        super().__init__(H, dim, None, parameters, invariants, guards, name)
         energy = self._scalar(H, "H")
         self._set_energy(energy)
         slope = self._gradient(energy, H)

@@ -2,7 +2,6 @@
 
 import inspect
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,9 +9,9 @@ from numpy.typing import NDArray
 
 from problems.calculus.function import Function
 from problems.calls import checked_arguments
-from problems.checks import Named, at_least
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError, shown
-from problems.systems.base import System, Value, name_of
+from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
 
@@ -69,21 +68,14 @@ class Foreign(System):
         f: Callable[..., Any],
         *,
         dim: Annotated[int, at_least(1)],
-        parameters: Named[Value] = MappingProxyType({}),
-        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
-        guards: Named[Callable[..., Any]] = MappingProxyType({}),
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(f),
-        )
+        super().__init__(f, dim, None, parameters, invariants, guards, name)
         self.f = f
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")

@@ -1,14 +1,13 @@
 """First-order systems, from their right-hand side written once in ordinary Python arithmetic."""
 
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import Annotated, Any
 
 from problems.calculus.function import function_of
 from problems.calls import checked_arguments
-from problems.checks import Named, at_least
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, name_of
+from problems.systems.base import System, Value
 from problems.trace import arguments
 from problems.trace.source_line import line_of_function
 
@@ -34,19 +33,12 @@ class VectorField(System):
         f: Callable[..., Any],
         *,
         dim: Annotated[int, at_least(1)],
-        parameters: Named[Value] = MappingProxyType({}),
-        invariants: Named[Callable[..., Any]] = MappingProxyType({}),
-        guards: Named[Callable[..., Any]] = MappingProxyType({}),
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(f),
-        )
+        super().__init__(f, dim, None, parameters, invariants, guards, name)
         value = self._call(f, "f")
         if not arguments.is_list(value) or len(value) != dim:
             got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"
