@@ -89,14 +89,10 @@ def solar_system(*, unit: Unit = "year", frame: Frame = "barycentric", t_end: fl
         frame=frame,
         t_end=t_end,
         gravity_per_day=Fraction(GAUSSIAN_CONSTANT) ** 2,
-        masses=_masses(),
+        masses=[Fraction(1), *(1 / Fraction(text) for text in MASS_RATIOS)],
         positions=positions,
         velocities=velocities,
     )
-
-
-def _masses() -> list[Fraction]:
-    return [Fraction(1), *(1 / Fraction(text) for text in MASS_RATIOS)]
 
 
 @cache
