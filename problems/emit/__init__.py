@@ -15,12 +15,12 @@ from problems.calculus.function import Function
 from problems.calculus.jacobian import Jacobian
 from problems.emit import cache
 from problems.emit.array_text import jax_text, numpy_text
-from problems.emit.code_digest import code_digest
 from problems.emit.heyoka_text import heyoka_text
 from problems.emit.numba_text import numba_text
 from problems.emit.plan import SMALL, make_plan
 from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
+from problems.systems.code_digest import code_digest
 from problems.systems.untraced import Foreign
 from problems.trace.graph import reachable
 
