@@ -98,7 +98,8 @@ def expression(
     Parameters
     ----------
     H : str
-        The energy; see `problems.catalogue.expression`.
+        The energy, in ``q`` and ``p`` or ``q1, p1, q2, ...``, the time ``t``, ``pi`` and parameters;
+        with + - * /, powers ``^`` and sqrt, sin, cos, tan, exp, log, abs.
     q0, p0 : sequence of float
         The start, as many numbers as there are degrees of freedom.
     parameters : str

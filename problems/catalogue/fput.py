@@ -55,7 +55,7 @@ def fput(
         ``"mode"``: q_i = amplitude sin(pi i/(n + 1)), at rest.
         ``"thermal"``: q = 0 and independent momenta of variance ``2 temperature`` (so
         that half of the kinetic energy, about ``n temperature/2``, is left after
-        equipartition), by `problems.catalogue._starts.gaussians`.
+        equipartition), the same on every machine.
     amplitude : float
         Of the lowest mode.
     temperature : float

@@ -63,8 +63,8 @@ def lennard_jones(
         atoms with its own start; with r rings there are 1 + 3 r (r + 1) atoms, in a
         hexagonal lattice of spacing 2^(1/6) sigma.
     temperature : float
-        Of the larger crystals, in kelvin: momenta are `problems.catalogue._starts.gaussians` of the
-        variance ``2 m temperature``, less their mean; half of it goes into the bonds.
+        Of the larger crystals, in kelvin: momenta are random numbers of the variance
+        ``2 m temperature``, less their mean; half of it goes into the bonds.
     seed : int
         Of the larger crystals' momenta.
     t_end : float

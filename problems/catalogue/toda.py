@@ -79,7 +79,7 @@ def toda(
     n : int
         Number of masses, at least 3.
     spread : float
-        Standard deviation of the momenta at the start, which are `problems.catalogue._starts.gaussians`.
+        Standard deviation of the random momenta at the start.
     seed : int
         Of the momenta.
     t_end : float
