@@ -1,4 +1,4 @@
-"""Arguments that a function does not take, told in one sentence."""
+"""Arguments that a function does not take, or not with these values, told in one sentence."""
 
 import dataclasses
 import functools
@@ -56,16 +56,16 @@ def check(
         raise InputError(f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...).")
 
 
-def checked(init: Callable[P, R]) -> Callable[P, R]:
-    """Make a written ``__init__`` refuse arguments that it does not take by `check`."""
+def checked_arguments(init: Callable[P, R]) -> Callable[P, R]:
+    """Make a written ``__init__`` check its arguments by its signature; see `bound`."""
     signature = inspect.signature(init)
     parameters = list(signature.parameters.values())
     own = signature.replace(parameters=parameters[1:])
 
     @functools.wraps(init)
     def wrapper(*values: P.args, **options: P.kwargs) -> R:
-        check(type(values[0]).__name__, own, values[1:], options, "argument")
-        return init(*values, **options)
+        call = bound(type(values[0]).__name__, own, values[1:], options)
+        return init(values[0], *call.args, **call.kwargs)  # type: ignore[call-arg]
 
     return wrapper
 

@@ -11,14 +11,16 @@ What must hold of a value stands where its type does::
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from types import MappingProxyType, NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
 from problems.errors import InputError, shown, unknown
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,19 @@ class Must:
 
 Positive = Annotated[float, Must("a positive number", lambda x: x > 0)]
 """A finite number above 0."""
+
+
+Named = Annotated[
+    Mapping[str, T],
+    Must(
+        "a dictionary by name, as in {'name': ...}",
+        lambda given: isinstance(given, Mapping) and all(isinstance(key, str) and key for key in given),
+    ),
+]
+"""A dictionary whose keys are names: ``Named[float]``."""
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+"""The empty one, as a default."""
 
 
 def at_least(least: int) -> Must:
@@ -49,7 +64,7 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
         What was given.
     annotation : any
         What it must be. ``float`` is a finite number, ``int`` a whole one, one of NumPy's
-        too; ``bool``, ``str``, ``Sequence[float]`` (a list of finite numbers, returned as
+        too; ``bool``, ``str``, ``Sequence[float]`` or ``Sequence[str]`` (a list, returned as
         a tuple), ``Literal[...]`` one of some words or numbers; each may be ``| None``, and
         ``Annotated`` with `Must`, or with an object whose method ``checked(owner, name,
         value)`` takes the place of the type. Any other annotation allows everything.
@@ -96,9 +111,9 @@ def number(value: Any) -> float | None:
 
 
 def numbers(value: Any) -> tuple[float, ...] | None:
-    """Return a list or array of finite numbers as a tuple; ``None`` for anything else."""
-    listed = value.tolist() if isinstance(value, np.ndarray) else value
-    found = [number(each) for each in listed] if isinstance(listed, list | tuple) else [None]
+    """Return a list, an array or a series of finite numbers as a tuple; ``None`` for anything else."""
+    listed = value.tolist() if hasattr(value, "tolist") else value
+    found = [number(each) for each in listed] if isinstance(listed, list | tuple | range) else [None]
     return None if None in found else tuple(found)  # type: ignore[return-value]
 
 
@@ -118,12 +133,18 @@ def _text(value: Any) -> str | None:
     return value if isinstance(value, str) else None
 
 
+def _texts(value: Any) -> tuple[str, ...] | None:
+    listed = isinstance(value, list | tuple) and all(isinstance(each, str) for each in value)
+    return tuple(value) if listed else None
+
+
 _KINDS: dict[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a finite number", number),
     int: ("a whole number", whole),
     bool: ("True or False", _flag),
     str: ("text", _text),
     Sequence[float]: ("a list of finite numbers", numbers),
+    Sequence[str]: ("a list of texts", _texts),
 }
 
 

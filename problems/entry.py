@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any, ParamSpec
 
 from problems import calls
+from problems.checks import checked
+from problems.errors import InputError, shown, unknown
 from problems.picture import Picture
 from problems.problem import Problem
 
@@ -100,25 +102,34 @@ def entry(
     problems.errors.InputError: p=-1.0 of rotor must be a positive number.
     """
     words = Entry(
-        title=title,
-        references=references,
-        notes=notes,
-        shows=shows,
+        title=checked("entry", "title", title, str | None),
+        references=checked("entry", "references", references, Sequence[str]),
+        notes=checked("entry", "notes", notes, str),
+        shows=checked("entry", "shows", shows, Sequence[str]),
         picture=picture,
         expected=expected,
     )
 
     def decorate(make: Callable[P, Problem]) -> Callable[P, Problem]:
+        name = make.__name__
         signature = inspect.signature(make, eval_str=True)
+        for key, parameter in signature.parameters.items():
+            if parameter.kind is not parameter.KEYWORD_ONLY:
+                raise InputError(f"{key} of {name} must be taken by name; write def {name}(*, ...).")
+        for key in words.shows:
+            if key not in signature.parameters:
+                raise unknown(f"argument of {name} in shows", key, signature.parameters)
 
         @functools.wraps(make)
         def made(*values: P.args, **options: P.kwargs) -> Problem:
-            call = calls.bound(make.__name__, signature, values, options)
+            call = calls.bound(name, signature, values, options)
             problem = make(*call.args, **call.kwargs)
+            if not isinstance(problem, Problem):
+                raise InputError(f"{name} must return a problems.Problem, not {shown(problem)}.")
             arguments = call.arguments
             changed = [key for key in arguments if arguments[key] != signature.parameters[key].default]
             return problem.entitled(
-                name=make.__name__,
+                name=name,
                 title=words.title or problem.title,
                 arguments={key: arguments[key] for key in (*words.shows, *changed)},
                 references=words.references,

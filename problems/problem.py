@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems import emit
 from problems.analysis import invariants
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named
 from problems.errors import InputError, shown
-from problems.systems.base import System, Value, check_names
+from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
-_NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, init=False, repr=False, eq=False)
@@ -74,7 +74,7 @@ class Problem:
     notes: str
     _made_with: str
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         system: System,
@@ -83,12 +83,12 @@ class Problem:
         p0: ArrayLike | None = None,
         v0: ArrayLike | None = None,
         y0: ArrayLike | None = None,
-        parameters: Mapping[str, Value] = _NOTHING,
+        parameters: Named[Value] = NOTHING,
         t0: float = 0.0,
         t_end: float,
         name: str | None = None,
         title: str | None = None,
-        arguments: Mapping[str, Any] = _NOTHING,
+        arguments: Named[Any] = NOTHING,
         times: ArrayLike | None = None,
         references: Sequence[str] = (),
         notes: str = "",
@@ -96,26 +96,26 @@ class Problem:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
-        words = _words(name, title, arguments, references, notes)
         state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
-        span = _numbers("t0 and t_end", [t0, t_end], 2)
-        if span[0] == span[1]:
+        if t0 == t_end:
             raise InputError(f"t_end={shown(t_end)} must differ from t0={shown(t0)}.")
         grid = None if times is None else _numbers("times", times, None)
         given = {"q0": q0, "p0": p0, "v0": v0, "y0": y0}
         printed = [f"{key}={_shown(value)}" for key, value in given.items() if value is not None]
         if parameters:
             printed.append(f"parameters={ {key: parameters[key] for key in parameters}!r}")
-        t0, t_end = (x.item() if isinstance(x, np.generic) else x for x in (t0, t_end))
         printed += [f"t0={t0!r}"] if t0 != 0.0 else []
         values = {
             "system": system,
             "y0": _frozen(state),
             "par": _frozen(par),
-            "t0": float(span[0]),
-            "t_end": float(span[1]),
-            **words,
+            "t0": float(t0),
+            "t_end": float(t_end),
+            "name": name,
             "title": title or name or system.name,
+            "arguments": MappingProxyType(dict(arguments)),
+            "references": tuple(references),
+            "notes": notes,
             "times": None if grid is None else _frozen(grid),
             "_made_with": ", ".join([repr(system), *printed, f"t_end={t_end!r}"]),
         }
@@ -125,15 +125,16 @@ class Problem:
     def entitled(
         self, *, name: str, title: str, arguments: Mapping[str, Any], references: Sequence[str], notes: str
     ) -> Self:
-        """Return the same problem under a name: what it prints as, and what reports say of it.
-
-        Raises
-        ------
-        problems.errors.InputError
-            For words that are no text.
-        """
+        """Return the same problem under a name: what it prints as, and what reports say of it."""
         named = copy.copy(self)
-        for key, value in _words(name, title, arguments, references, notes).items():
+        words = {
+            "name": name,
+            "title": title,
+            "arguments": MappingProxyType(dict(arguments)),
+            "references": tuple(references),
+            "notes": notes,
+        }
+        for key, value in words.items():
             object.__setattr__(named, key, value)
         return named
 
@@ -202,23 +203,6 @@ class Problem:
     def velocity(self, y: ArrayLike) -> Array | None:
         """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
         return invariants.velocity(self.system, self.par, y)
-
-
-def _words(name: Any, title: Any, arguments: Any, references: Any, notes: Any) -> dict[str, Any]:
-    """Return what a problem says of itself, or refuse it."""
-    for key, text in {"name": name, "title": title, "notes": notes}.items():
-        if text is not None and not isinstance(text, str):
-            raise InputError(f"{key}={shown(text)} of a Problem must be a text.")
-    if not isinstance(references, list | tuple):
-        raise InputError(f"references={shown(references)} of a Problem must be a list of texts.")
-    check_names("arguments", arguments)
-    return {
-        "name": name,
-        "title": title,
-        "arguments": MappingProxyType(dict(arguments)),
-        "references": tuple(references),
-        "notes": notes,
-    }
 
 
 def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 
 from problems import calls, catalogue
 from problems.entry import Entry
-from problems.errors import InputError, unknown
+from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 
 GROUP = "hbvm_bench.problems"
@@ -53,7 +53,8 @@ def factory(name: str) -> Callable[..., Problem]:
     problems.errors.UnknownNameError
         For a name that is not installed, with the nearest ones.
     problems.errors.InputError
-        For a name under which two distributions offer different problems.
+        For a name under which two distributions offer different problems, or one that
+        cannot be imported.
     """
     offered = _entries().get(name) if isinstance(name, str) else None
     if offered is None:
@@ -61,7 +62,19 @@ def factory(name: str) -> Callable[..., Problem]:
     if len(offered) > 1:
         who = " and ".join(f"{at.dist.name if at.dist else 'hbvm-bench'} ({at.value})" for at in offered)
         raise InputError(f"the problem {name!r} is offered by {who}; uninstall one of them, or rename one.")
-    return offered[0].load()
+    [point] = offered
+    try:
+        make: Callable[..., Problem] = point.load()
+    except InputError:
+        raise
+    except Exception as error:  # whatever a package does when it is imported
+        raise InputError(
+            f"the problem {name!r} cannot be imported from {point.value}, {type(error).__name__}: {error}; "
+            "mend or uninstall the package that offers it."
+        ) from error
+    if not callable(make):
+        raise InputError(f"the problem {name!r} is {shown(make)} at {point.value}, not a function.")
+    return make
 
 
 def entry(name: str) -> Entry | None:

@@ -92,8 +92,8 @@ def _energy(q, p, par):
     picture=Phase(span=12.0),
 )
 def quartic(*, k: Positive = 1.0, q: float = 1.0, t_end: float = 100.0) -> Problem:
-    system = Hamiltonian(_energy, dof=1, parameters={"k": 1.0}, name="quartic")
-    return Problem(system, q0=[q], p0=[0.0], parameters={"k": k}, t_end=t_end)
+    system = Hamiltonian(_energy, dof=1, parameters={"k": k}, name="quartic")
+    return Problem(system, q0=[q], p0=[0.0], t_end=t_end)
 ```
 
 A package names it under the entry point group `hbvm_bench.problems`, as `examples/integrator` does

@@ -102,26 +102,8 @@ def has_kinks(system: System) -> bool:
     return any(node.op in ("abs", "sign") and node.flags & (STATE | T) for node in nodes)
 
 
-def absent(system: System) -> list[int]:
-    """Return the places of the state that do not occur in the energy, in order.
-
-    A position that is absent (a cyclic coordinate) keeps its momentum constant.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the system has no energy.
-    """
-    seen: set[int] = set()
-    for node in reachable([_energy(system)]):
-        if node.op == "symbol" and node.data[0] == "y":
-            place = node.data[1]
-            seen.update([place] if isinstance(place, int) else place.values(node.loop).tolist())
-    return [place for place in range(system.dim) if place not in seen]
-
-
 def cyclic(system: System) -> list[int]:
-    """Return the indices of the positions that do not occur in H: their momenta are constant.
+    """Return the indices of the positions that do not occur in H, in order: their momenta are constant.
 
     Raises
     ------
@@ -132,7 +114,12 @@ def cyclic(system: System) -> list[int]:
         raise InputError(
             f"{system.name} has no positions and momenta; cyclic coordinates need a Hamiltonian."
         )
-    return [place for place in absent(system) if place < system.dof]
+    seen: set[int] = set()
+    for node in reachable([_energy(system)]):
+        if node.op == "symbol" and node.data[0] == "y":
+            place = node.data[1]
+            seen.update([place] if isinstance(place, int) else place.values(node.loop).tolist())
+    return [place for place in range(system.dof) if place not in seen]
 
 
 def _has_energy(system: System) -> bool:

@@ -56,11 +56,11 @@ def hamiltonian(
     pairs = list(combinations(range(n), 2))
     axes = range(dimension)
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def kinetic(i: Any) -> Any:
+    def energy(q, p, par, m):
+        def kinetic(i):
             return _squares([p[dimension * i + c] for c in axes]) / (2 * par.m[i])
 
-        def attraction(i: Any, j: Any) -> Any:
+        def attraction(i, j):
             squared = _squares([q[dimension * i + c] - q[dimension * j + c] for c in axes])
             if softening is not None:
                 squared = squared + par.eps * par.eps
@@ -69,10 +69,10 @@ def hamiltonian(
         potential = m.sum(attraction, pairs)
         return m.sum(kinetic, range(n)) - (potential if G is None else par.G * potential)
 
-    def momentum(p: Any, m: Any) -> Any:
+    def momentum(p, m):
         return [m.sum(lambda i, c=c: p[dimension * i + c], range(n)) for c in axes]
 
-    def angular_momentum(q: Any, p: Any, m: Any) -> Any:
+    def angular_momentum(q, p, m):
         def total(a: int, b: int) -> Any:
             return m.sum(
                 lambda i: (

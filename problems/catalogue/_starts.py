@@ -1,12 +1,12 @@
 """Start values that are the same on every machine."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from random import Random
 from typing import Any
 
 
-def nearest(expression: Callable[[], Any]) -> float:
-    """Return the double nearest to a number computed in mpmath at 50 digits.
+def nearest(expression: Callable[[Any], Sequence[Any]]) -> list[float]:
+    """Return the doubles nearest to numbers computed in mpmath at 50 digits.
 
     A start computed so is the same on every machine; the sines and logarithms
     of C libraries differ in the last bit.
@@ -14,12 +14,12 @@ def nearest(expression: Callable[[], Any]) -> float:
     Parameters
     ----------
     expression : callable
-        Returns an mpmath number; doubles enter it exactly.
+        Called with the module mpmath, returns a list of its numbers; doubles enter them exactly.
     """
     import mpmath  # a tenth of a second that most problems do not need
 
     with mpmath.workdps(50):
-        return float(expression())
+        return [float(number) for number in expression(mpmath)]
 
 
 def gaussians(seed: int, count: int) -> list[float]:

@@ -22,10 +22,10 @@ REFERENCES = (
 def hamiltonian(
     n: int, potential: Callable[[Any, Any, Any], Any], name: str, **parameters: float
 ) -> Hamiltonian:
-    """Return the system; ``stiffness`` is 1/dx^2, and ``potential(u, par, m)`` is f."""
+    """Return the system; its parameter ``stiffness`` is 1/dx^2, and ``potential(u, par, m)`` is f."""
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def link(i: Any, j: Any) -> Any:
+    def energy(q, p, par, m):
+        def link(i, j):
             rise = q[j] - q[i]
             return rise * rise
 
@@ -34,4 +34,4 @@ def hamiltonian(
         bent = par.stiffness / 2 * m.sum(link, neighbours)
         return kinetic + (bent + m.sum(lambda i: potential(q[i], par, m), range(n)))
 
-    return Hamiltonian(energy, dof=n, parameters={"stiffness": 1.0, **parameters}, name=f"{name}_{n}")
+    return Hamiltonian(energy, dof=n, parameters=parameters, name=f"{name}_{n}")

@@ -6,8 +6,6 @@ In the plane, with the growing field B = r (A = r/3 (-y, x)) and the repelling
 potential phi = 1/(100 r).
 """
 
-from typing import Any
-
 from problems.catalogue import _starts as starts
 from problems.entry import Expected, entry
 from problems.errors import InputError
@@ -16,15 +14,11 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     x, y = q[0], q[1]
     r = m.sqrt(x * x + y * y)
     u, v = p[0] + r * y / 3, p[1] - r * x / 3
     return (u * u + v * v) / 2 + par.charge / r
-
-
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
 
 
 @entry(
@@ -69,20 +63,16 @@ def charged_particle(
     """
     if x == 0 and y == 0:
         raise InputError("x=0 and y=0 of charged_particle are the singular centre; start elsewhere.")
-    momentum = [starts.nearest(lambda c=c: _canonical(x, y, vx, vy)[c]) for c in range(2)]
+
+    def momentum(mp):
+        third = mp.sqrt(mp.mpf(x) ** 2 + mp.mpf(y) ** 2) / 3
+        return [vx - third * y, vy + third * x]
+
     system = Hamiltonian(
         _energy,
         dof=2,
-        parameters={"charge": 0.01},
-        invariants={"angular_momentum": _turn},
+        parameters={"charge": charge},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="charged_particle",
     )
-    return Problem(system, q0=[x, y], p0=momentum, parameters={"charge": charge}, t_end=t_end)
-
-
-def _canonical(x: float, y: float, vx: float, vy: float) -> tuple[Any, Any]:
-    import mpmath
-
-    a, b = mpmath.mpf(x), mpmath.mpf(y)
-    third = mpmath.sqrt(a * a + b * b) / 3
-    return vx - third * b, vy + third * a
+    return Problem(system, q0=[x, y], p0=starts.nearest(momentum), t_end=t_end)

@@ -58,10 +58,9 @@ def cluster(
     q = _centred([_in_ball(random) for _ in range(n)])
     v = _centred([_in_ball(random) for _ in range(n)])
     return Problem(
-        gravity.hamiltonian([1.0 / n] * n, name=f"cluster_{n}", softening=0.1, linear_momentum=False),
+        gravity.hamiltonian([1.0 / n] * n, name=f"cluster_{n}", softening=softening, linear_momentum=False),
         q0=[x for row in q for x in row],
         p0=[x * (0.5 / n) for row in v for x in row],
-        parameters={"m": [1.0 / n] * n, "eps": softening},
         t_end=t_end,
     )
 

@@ -9,7 +9,7 @@ of 2 loops, with another mass of the Moon, as in Shampine and Gordon's.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from problems.checks import Must
 from problems.entry import Expected, entry
@@ -38,15 +38,11 @@ ORBITS = {
 }
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     x, y = q[0], q[1]
     r1 = m.sqrt((x + par.mu) ** 2 + y**2)
     r2 = m.sqrt((x - (1 - par.mu)) ** 2 + y**2)
     return (p[0] ** 2 + p[1] ** 2) / 2 + (y * p[0] - x * p[1]) - ((1 - par.mu) / r1 + par.mu / r2)
-
-
-def _jacobi(q: Any, p: Any, par: Any, m: Any) -> Any:
-    return -2 * _energy(q, p, par, m)
 
 
 @entry(
@@ -91,12 +87,15 @@ def cr3bp(
     """
     orbit = ORBITS[loops]
     system = Hamiltonian(
-        _energy, dof=2, parameters={"mu": MOON}, invariants={"jacobi": _jacobi}, name="cr3bp"
+        _energy,
+        dof=2,
+        parameters={"mu": orbit.mu if mu is None else mu},
+        invariants={"jacobi": lambda q, p, par, m: -2 * _energy(q, p, par, m)},
+        name="cr3bp",
     )
     return Problem(
         system,
         q0=[orbit.x, 0.0],
         p0=[0.0, orbit.speed + orbit.x],
-        parameters={"mu": orbit.mu if mu is None else mu},
         t_end=orbit.period if t_end is None else t_end,
     )

@@ -5,8 +5,6 @@
 Here q is the place of one atom with respect to the other, and m their reduced mass.
 """
 
-from typing import Any
-
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
@@ -14,14 +12,10 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     r = m.sqrt(q[0] * q[0] + q[1] * q[1])
     w = 1 - m.exp(-par.a * (r - par.r0))
     return (p[0] * p[0] + p[1] * p[1]) / (2 * par.m) + par.D * (w * w)
-
-
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
 
 
 @entry(
@@ -58,7 +52,7 @@ def diatomic(*, r: Positive = 1.0, vr: float = 0.5, vt: float = 0.5, t_end: floa
         _energy,
         dof=2,
         parameters={"D": 4.0, "a": 2.0, "r0": 1.0, "m": 1.0},
-        invariants={"angular_momentum": _turn},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="diatomic",
     )
     return Problem(system, q0=[r, 0.0], p0=[vr, vt], t_end=t_end)

@@ -10,8 +10,6 @@ K = [[M l1^2, m2 l1 l2 cos d], [m2 l1 l2 cos d, m2 l2^2]]; Landau and Lifshitz h
 Lagrangian.
 """
 
-from typing import Any
-
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Plane
@@ -19,7 +17,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     m1, m2, l1, l2, g = par.m1, par.m2, par.l1, par.l2, par.g
     c, s = m.cos(q[0] - q[1]), m.sin(q[0] - q[1])
     both = m1 + m2
@@ -72,12 +70,6 @@ def double_pendulum(
     Problem
         State ``[q1, q2, p1, p2]``; parameters as named; invariant: energy.
     """
-    names = {"m1": 1.0, "m2": 1.0, "l1": 1.0, "l2": 1.0, "g": 1.0}
-    values = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
-    return Problem(
-        Hamiltonian(_energy, dof=2, parameters=names, name="double_pendulum"),
-        q0=[q1, q2],
-        p0=[p1, p2],
-        parameters=values,
-        t_end=t_end,
-    )
+    parameters = {"m1": m1, "m2": m2, "l1": l1, "l2": l2, "g": g}
+    system = Hamiltonian(_energy, dof=2, parameters=parameters, name="double_pendulum")
+    return Problem(system, q0=[q1, q2], p0=[p1, p2], t_end=t_end)

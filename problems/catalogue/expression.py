@@ -98,7 +98,8 @@ def expression(
     Parameters
     ----------
     H : str
-        The energy; see `problems.catalogue.expression`.
+        The energy, in ``q`` and ``p`` or ``q1, p1, q2, ...``, the time ``t``, ``pi`` and parameters;
+        with + - * /, powers ``^`` and sqrt, sin, cos, tan, exp, log, abs.
     q0, p0 : sequence of float
         The start, as many numbers as there are degrees of freedom.
     parameters : str
@@ -124,7 +125,7 @@ def expression(
             raise InputError(
                 f"{key}={shown(list(start))} of expression must be a list of {system.dof} finite numbers."
             )
-    return Problem(system, q0=q0, p0=p0, parameters=values, t_end=t_end, title=H)
+    return Problem(system, q0=q0, p0=p0, t_end=t_end, title=H)
 
 
 def assignments(text: str) -> dict[str, float]:
@@ -171,7 +172,7 @@ def _freedom(energy: Formula) -> int:
 def _traceable(formula: Formula, values: Mapping[str, float], dof: int) -> Callable[..., Any]:
     """Return the function to be traced: the formula, calculated with symbols."""
 
-    def H(t: Any, q: Any, p: Any, par: Any, m: Any) -> Any:
+    def H(t, q, p, par, m):
         def named(word: str) -> Any:
             if word == "t":
                 return t

@@ -22,7 +22,7 @@ PERIOD = 6.3259140097821386327
     picture=Orbits(span=PERIOD, points=600),
     expected=Expected(h=0.05, energy=5e-16, default=2e-15),
 )
-def figure_eight(*, t_end: float | None = None) -> Problem:
+def figure_eight(*, t_end: float = 100 * PERIOD) -> Problem:
     """Return three equal masses that chase each other along a figure eight; G = 1.
 
     Tests a stable periodic orbit without a dominant mass: after a period every
@@ -30,7 +30,7 @@ def figure_eight(*, t_end: float | None = None) -> Problem:
 
     Parameters
     ----------
-    t_end : float, optional
+    t_end : float
         End of the integration; 100 periods by default.
 
     Returns
@@ -44,5 +44,5 @@ def figure_eight(*, t_end: float | None = None) -> Problem:
         gravity.hamiltonian((1.0, 1.0, 1.0), name="figure_eight", dimension=2),
         q0=[x, y, -x, -y, 0.0, 0.0],
         p0=[-u / 2, -v / 2, -u / 2, -v / 2, u, v],
-        t_end=100 * PERIOD if t_end is None else t_end,
+        t_end=t_end,
     )

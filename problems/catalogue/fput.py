@@ -7,7 +7,7 @@ By default as in the report: n = 32, alpha = 1/4, the lowest mode.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -55,7 +55,7 @@ def fput(
         ``"mode"``: q_i = amplitude sin(pi i/(n + 1)), at rest.
         ``"thermal"``: q = 0 and independent momenta of variance ``2 temperature`` (so
         that half of the kinetic energy, about ``n temperature/2``, is left after
-        equipartition), by `problems.catalogue._starts.gaussians`.
+        equipartition), the same on every machine.
     amplitude : float
         Of the lowest mode.
     temperature : float
@@ -73,8 +73,8 @@ def fput(
     """
     limits.check_problem("fput", 2 * n, n=n)
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def spring(r: Any) -> Any:
+    def energy(q, p, par, m):
+        def spring(r):
             return r * r / 2 + par.alpha * r**3 / 3 + par.beta * r**4 / 4
 
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(n))
@@ -82,21 +82,12 @@ def fput(
         return kinetic + (spring(q[0]) + inner + spring(-q[n - 1]))
 
     if start == "mode":
-        q0 = [starts.nearest(lambda i=i: _mode(i, n, amplitude)) for i in range(1, n + 1)]
+        q0 = starts.nearest(lambda mp: [amplitude * mp.sin(mp.pi * i / (n + 1)) for i in range(1, n + 1)])
         p0 = [0.0] * n
     else:
         q0 = [0.0] * n
         p0 = [math.sqrt(2 * temperature) * draw for draw in starts.gaussians(seed, n)]
-    return Problem(
-        Hamiltonian(energy, dof=n, parameters={"alpha": 0.25, "beta": 0.0}, name=f"fput_{n}"),
-        q0=q0,
-        p0=p0,
-        parameters={"alpha": alpha, "beta": beta},
-        t_end={"mode": 960.0, "thermal": 240.0}[start] if t_end is None else t_end,
-    )
-
-
-def _mode(i: int, n: int, amplitude: float) -> Any:
-    import mpmath
-
-    return mpmath.mpf(amplitude) * mpmath.sin(mpmath.pi * i / (n + 1))
+    if t_end is None:
+        t_end = 960.0 if start == "mode" else 240.0
+    system = Hamiltonian(energy, dof=n, parameters={"alpha": alpha, "beta": beta}, name=f"fput_{n}")
+    return Problem(system, q0=q0, p0=p0, t_end=t_end)

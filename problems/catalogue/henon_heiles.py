@@ -7,7 +7,6 @@ orbit that starts in the triangle of the saddles never leaves it.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +22,7 @@ ESCAPE = 1 / 6
 SADDLES = ((0.0, 1.0), (-math.sqrt(3) / 2, -0.5), (math.sqrt(3) / 2, -0.5))
 
 
-def _energy(q: Any, p: Any) -> Any:
+def _energy(q, p):
     kinetic = (p[0] ** 2 + p[1] ** 2) / 2
     return kinetic + ((q[0] ** 2 + q[1] ** 2) / 2 + (q[0] ** 2 * q[1] - q[1] ** 3 / 3))
 
@@ -75,23 +74,20 @@ def henon_heiles(
     problems.errors.InputError
         If the potential at the start exceeds the energy.
     """
-    momentum = [starts.nearest(lambda c=c: _start(energy, q1, q2, direction)[c]) for c in range(2)]
+
+    def momentum(mp):
+        x, y = mp.mpf(q1), mp.mpf(q2)
+        kinetic = energy - ((x * x + y * y) / 2 + x * x * y - y**3 / 3)
+        if kinetic < 0:
+            raise InputError(
+                f"energy={energy!r} of henon_heiles is less than the potential at ({q1!r}, {q2!r}); "
+                "raise it or start nearer to the origin."
+            )
+        speed = mp.sqrt(2 * kinetic)
+        return [speed * mp.cos(direction), speed * mp.sin(direction)]
+
     system = Hamiltonian(_energy, dof=2, name="henon_heiles")
-    return Problem(system, q0=[q1, q2], p0=momentum, t_end=t_end)
-
-
-def _start(energy: float, q1: float, q2: float, direction: float) -> tuple[Any, Any]:
-    import mpmath
-
-    x, y = mpmath.mpf(q1), mpmath.mpf(q2)
-    kinetic = mpmath.mpf(energy) - ((x * x + y * y) / 2 + x * x * y - y**3 / 3)
-    if kinetic < 0:
-        raise InputError(
-            f"energy={energy!r} of henon_heiles is less than the potential at ({q1!r}, {q2!r}); "
-            "raise it or start nearer to the origin."
-        )
-    speed = mpmath.sqrt(2 * kinetic)
-    return speed * mpmath.cos(direction), speed * mpmath.sin(direction)
+    return Problem(system, q0=[q1, q2], p0=starts.nearest(momentum), t_end=t_end)
 
 
 def beyond_triangle(q: ArrayLike) -> NDArray[np.float64]:
@@ -125,5 +121,4 @@ def inside_triangle(q: ArrayLike) -> NDArray[np.bool_]:
     -------
     ndarray of bool, shape (n,)
     """
-    points = np.atleast_2d(np.asarray(q, dtype=np.float64))
-    return (points[:, 1] >= -0.5) & (math.sqrt(3) * np.abs(points[:, 0]) + points[:, 1] <= 1.0)
+    return beyond_triangle(q) == 0.0

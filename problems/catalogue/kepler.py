@@ -22,15 +22,11 @@ from problems.systems.hamiltonian import Hamiltonian
 HUNDRED_REVOLUTIONS = 628.3185307179587  # 200 pi
 
 
-def _energy(q: Any, p: Any, m: Any) -> Any:
+def _energy(q, p, m):
     return (p[0] ** 2 + p[1] ** 2) / 2 - 1 / m.sqrt(q[0] ** 2 + q[1] ** 2)
 
 
-def _angular_momentum(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
-
-
-def _lenz(q: Any, p: Any, m: Any) -> Any:
+def _lenz(q, p, m):
     turn = q[0] * p[1] - q[1] * p[0]
     r = m.sqrt(q[0] ** 2 + q[1] ** 2)
     return [p[1] * turn - q[0] / r, -p[0] * turn - q[1] / r]
@@ -76,7 +72,7 @@ def kepler(
     system = Hamiltonian(
         _energy,
         dof=2,
-        invariants={"angular_momentum": _angular_momentum, "lenz": _lenz},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0], "lenz": _lenz},
         name="kepler",
     )
     return Problem(system, q0=[near, 0.0], p0=[0.0, fast], t_end=t_end)

@@ -9,7 +9,7 @@ the energy, so that the mass is m/k_B in K ns^2/nm^2.
 
 from fractions import Fraction
 from itertools import combinations
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -50,7 +50,7 @@ def lennard_jones(
     rings: Annotated[int, at_least(1)] = 1,
     temperature: Positive = 20.0,
     seed: Annotated[int, at_least(0)] = 1,
-    t_end: float | None = None,
+    t_end: float = 0.2,
 ) -> Problem:
     """Return the frozen argon crystal, or a larger hexagonal one.
 
@@ -63,12 +63,12 @@ def lennard_jones(
         atoms with its own start; with r rings there are 1 + 3 r (r + 1) atoms, in a
         hexagonal lattice of spacing 2^(1/6) sigma.
     temperature : float
-        Of the larger crystals, in kelvin: momenta are `problems.catalogue._starts.gaussians` of the
-        variance ``2 m temperature``, less their mean; half of it goes into the bonds.
+        Of the larger crystals, in kelvin: momenta are random numbers of the variance
+        ``2 m temperature``, less their mean; half of it goes into the bonds.
     seed : int
         Of the larger crystals' momenta.
-    t_end : float, optional
-        End of the integration in nanoseconds; 0.2 by default, as in the book.
+    t_end : float
+        End of the integration in nanoseconds; by default as in the book.
         The fastest oscillations take about 0.001.
 
     Returns
@@ -85,16 +85,15 @@ def lennard_jones(
         p = [MASS * x for row in VELOCITIES for x in row]
     else:
         q = [x for row in _lattice(rings) for x in row]
-        p = _thermal(len(q) // 2, temperature, seed)
-    n = len(q) // 2
-    return Problem(_crystal(n, linear_momentum=rings == 1), q0=q, p0=p, t_end=0.2 if t_end is None else t_end)
+        p = _thermal(atoms, temperature, seed)
+    return Problem(_crystal(atoms, linear_momentum=rings == 1), q0=q, p0=p, t_end=t_end)
 
 
 def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
     pairs = list(combinations(range(n), 2))
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
-        def bond(i: Any, j: Any) -> Any:
+    def energy(q, p, par, m):
+        def bond(i, j):
             x, y = q[2 * i] - q[2 * j], q[2 * i + 1] - q[2 * j + 1]
             u = (par.sigma * par.sigma) / (x * x + y * y)
             u3 = u * u * u
@@ -103,10 +102,10 @@ def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
         kinetic = m.sum(lambda i: (p[2 * i] * p[2 * i] + p[2 * i + 1] * p[2 * i + 1]) / (2 * par.m), range(n))
         return kinetic + 4 * par.eps * m.sum(bond, pairs)
 
-    def momentum(p: Any, m: Any) -> Any:
+    def momentum(p, m):
         return [m.sum(lambda i, c=c: p[2 * i + c], range(n)) for c in range(2)]
 
-    def turn(q: Any, p: Any, m: Any) -> Any:
+    def turn(q, p, m):
         return m.sum(lambda i: q[2 * i] * p[2 * i + 1] - q[2 * i + 1] * p[2 * i], range(n))
 
     return Hamiltonian(
@@ -119,17 +118,9 @@ def _crystal(n: int, *, linear_momentum: bool) -> Hamiltonian:
 
 
 def _lattice(rings: int) -> list[tuple[float, float]]:
-    spacing = starts.nearest(lambda: _spacing(1))
-    height = starts.nearest(lambda: _spacing(2))
+    spacing, height = starts.nearest(lambda mp: [SIGMA * mp.root(2, 6) * x for x in (1, mp.sqrt(3) / 2)])
     cells = range(-rings, rings + 1)
     return [(spacing * (i + j / 2), height * j) for j in cells for i in cells if abs(i + j) <= rings]
-
-
-def _spacing(part: int) -> Any:
-    import mpmath
-
-    length = mpmath.mpf(SIGMA) * mpmath.root(2, 6)
-    return length if part == 1 else length * mpmath.sqrt(3) / 2
 
 
 def _thermal(n: int, temperature: float, seed: int) -> list[float]:

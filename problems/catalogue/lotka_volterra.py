@@ -1,26 +1,24 @@
 """Three species of Lotka and Volterra, a Poisson system."""
 
-from typing import Any
-
 from problems.entry import Expected, entry
 from problems.picture import Curves
 from problems.problem import Problem
 from problems.systems.poisson import Poisson
 
 
-def _energy(y: Any, par: Any, m: Any) -> Any:
+def _energy(y, par, m):
     a, b = par.a, par.b
     return a * b * y[0] + y[1] - a * y[2] + par.nu * m.log(y[1]) - par.mu * m.log(y[2])
 
 
-def _structure(y: Any, par: Any) -> Any:
+def _structure(y, par):
     xy = par.c * y[0] * y[1]
     xz = par.b * par.c * y[0] * y[2]
     yz = y[1] * y[2]
     return [[0, xy, xz], [-xy, 0, -yz], [-xz, yz, 0]]
 
 
-def _casimir(y: Any, par: Any, m: Any) -> Any:
+def _casimir(y, par, m):
     return par.a * par.b * m.log(y[0]) - par.b * m.log(y[1]) + m.log(y[2])
 
 

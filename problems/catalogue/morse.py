@@ -14,10 +14,8 @@ from problems.picture import Phase
 from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
-_DEFAULT = {"D": 1.0, "a": 1.0, "m": 1.0}
 
-
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     w = 1 - m.exp(-par.a * q[0])
     return p[0] * p[0] / (2 * par.m) + par.D * (w * w)
 
@@ -61,14 +59,8 @@ def morse(
     Problem
         State ``[q, p]``; parameters ``D``, ``a``, ``m``; invariant: energy.
     """
-    values = {"D": D, "a": a, "m": m}
-    return Problem(
-        Hamiltonian(_energy, dof=1, parameters=_DEFAULT, name="morse"),
-        q0=[q],
-        p0=[p],
-        parameters=values,
-        t_end=t_end,
-    )
+    system = Hamiltonian(_energy, dof=1, parameters={"D": D, "a": a, "m": m}, name="morse")
+    return Problem(system, q0=[q], p0=[p], t_end=t_end)
 
 
 def exact_state(problem: Problem, t: Any) -> list[Any]:

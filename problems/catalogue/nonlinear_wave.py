@@ -1,6 +1,6 @@
 """A Klein-Gordon equation with a cubic force on a periodic interval, discretised as `_waves` says."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -51,30 +51,11 @@ def nonlinear_wave(
     """
     limits.check_problem("nonlinear_wave", 2 * n, n=n)
 
-    def potential(u: Any, par: Any, m: Any) -> Any:
+    def potential(u, par, m):
         square = u * u
         return par.mass / 2 * square + par.kappa / 4 * (square * square)
 
-    return Problem(
-        waves.hamiltonian(n, potential, "nonlinear_wave", mass=1.0, kappa=1.0),
-        q0=[starts.nearest(lambda i=i: _sine(i, n, amplitude)) for i in range(n)],
-        p0=[0.0] * n,
-        parameters={
-            "stiffness": starts.nearest(lambda: _inverse_square_step(n)),
-            "mass": mass,
-            "kappa": kappa,
-        },
-        t_end=t_end,
-    )
-
-
-def _sine(i: int, n: int, amplitude: float) -> Any:
-    import mpmath
-
-    return mpmath.mpf(amplitude) * mpmath.sinpi(mpmath.mpf(2 * i) / n)
-
-
-def _inverse_square_step(n: int) -> Any:
-    import mpmath
-
-    return (n / (2 * mpmath.pi)) ** 2
+    [stiffness] = starts.nearest(lambda mp: [(n / (2 * mp.pi)) ** 2])
+    system = waves.hamiltonian(n, potential, "nonlinear_wave", stiffness=stiffness, mass=mass, kappa=kappa)
+    sine = starts.nearest(lambda mp: [amplitude * mp.sinpi(mp.mpf(2 * i) / n) for i in range(n)])
+    return Problem(system, q0=sine, p0=[0.0] * n, t_end=t_end)

@@ -13,7 +13,7 @@ from problems.picture import Orbits
 from problems.problem import Problem
 
 G_PER_DAY = "2.95912208286e-4"  # au^3/(solar mass day^2)
-NAMES = ("Sun", "Jupiter", "Saturn", "Uranus", "Neptune", "Pluto")
+# The bodies in the order of the first line.
 MASSES = (
     "1.00000597682",
     "0.000954786104043",

@@ -12,7 +12,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, m: Any) -> Any:
+def _energy(q, p, m):
     return p[0] ** 2 / 2 - m.cos(q[0])
 
 

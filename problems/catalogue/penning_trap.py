@@ -6,8 +6,6 @@ with B = omega_c and the quadrupole phi = omega_z^2/2 (z^2 - (x^2 + y^2)/2), plu
 octupole c4 (z^4 - 3 z^2 (x^2 + y^2) + 3/8 (x^2 + y^2)^2).
 """
 
-from typing import Any
-
 from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.errors import InputError
@@ -16,17 +14,13 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any) -> Any:
+def _energy(q, p, par):
     x, y, z = q
     u, v = p[0] + par.omega_c * y / 2, p[1] - par.omega_c * x / 2
     rho, z2 = x * x + y * y, z * z
     kinetic = (u * u + v * v + p[2] * p[2]) / 2
     quadrupole = par.omega_z**2 / 2 * (z2 - rho / 2)
     return kinetic + quadrupole + par.c4 * (z2 * z2 - 3 * z2 * rho + 0.375 * (rho * rho))
-
-
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
 
 
 @entry(
@@ -77,14 +71,8 @@ def penning_trap(
     system = Hamiltonian(
         _energy,
         dof=3,
-        parameters={"omega_c": 5.0, "omega_z": 1.0, "c4": 0.01},
-        invariants={"angular_momentum": _turn},
+        parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="penning_trap",
     )
-    return Problem(
-        system,
-        q0=[1.0, 0.0, 1.0],
-        p0=[0.0, 0.1 + omega_c / 2, 0.0],
-        parameters={"omega_c": omega_c, "omega_z": omega_z, "c4": c4},
-        t_end=t_end,
-    )
+    return Problem(system, q0=[1.0, 0.0, 1.0], p0=[0.0, 0.1 + omega_c / 2, 0.0], t_end=t_end)

@@ -9,7 +9,7 @@ coefficients are 0: the periodic orbits around the origin end at a loop through 
 """
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems.checks import Must
 from problems.entry import Expected, entry
@@ -26,7 +26,7 @@ C_STAR = 0.37570559292634522367  # where the loop crosses the positive p axis
 Four = Annotated[Sequence[float], Must("a list of 4 finite numbers", lambda values: len(values) == 4)]
 
 
-def _energy(q: Any, p: Any, par: Any) -> Any:
+def _energy(q, p, par):
     x, y = q[0], p[0]
     a, b, c = par.a, par.b, par.c
     constant = y**2 * (0.5 + c[3] * y + b[3] * y**2 + a[3] * y**3)
@@ -77,11 +77,5 @@ def period_annulus(
         equilibria `P1`, `P2` and the energy of the loop `H_STAR` belong to the
         default coefficients.
     """
-    default = {"a": (0.0, 0.0, 1.0, 0.0), "b": (0.0, 1.0, 0.0, 1.0), "c": (0.0, 1.0, 1.0, 0.0)}
-    return Problem(
-        Hamiltonian(_energy, dof=1, parameters=default, name="period_annulus"),
-        q0=[0.0],
-        p0=[start],
-        parameters={"a": a, "b": b, "c": c},
-        t_end=t_end,
-    )
+    system = Hamiltonian(_energy, dof=1, parameters={"a": a, "b": b, "c": c}, name="period_annulus")
+    return Problem(system, q0=[0.0], p0=[start], t_end=t_end)

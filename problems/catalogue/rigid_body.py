@@ -1,7 +1,5 @@
 """The free rigid body in body axes, a Poisson system."""
 
-from typing import Any
-
 import numpy as np
 
 from problems.catalogue import _starts as starts
@@ -14,17 +12,17 @@ AROUND = np.linspace(0.0, 2.0 * np.pi, 200)
 CIRCLE = np.column_stack([np.cos(AROUND), np.sin(AROUND)])  # both invariants' sphere, seen from y2
 
 
-def _energy(y: Any, par: Any) -> Any:
+def _energy(y, par):
     squares = [y[i] * y[i] for i in range(3)]
     turning = sum(squares[i] / (2 * par.inertia[i]) for i in range(3))
     return turning + par.quartic / 4 * sum(square * square for square in squares)
 
 
-def _structure(y: Any) -> Any:
+def _structure(y):
     return [[0, -y[2], y[1]], [y[2], 0, -y[0]], [-y[1], y[0], 0]]
 
 
-def _casimir(y: Any) -> Any:
+def _casimir(y):
     return (y[0] * y[0] + y[1] * y[1] + y[2] * y[2]) / 2
 
 
@@ -66,20 +64,9 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
         _energy,
         _structure,
         dim=3,
-        parameters={"inertia": (2.0, 1.0, 2 / 3), "quartic": 0.0},
+        parameters={"inertia": (2.0, 1.0, 2 / 3), "quartic": quartic},
         invariants={"casimir": _casimir},
         name="rigid_body",
     )
-    return Problem(
-        system,
-        y0=[starts.nearest(lambda: _start(0)), 0.0, starts.nearest(lambda: _start(1))],
-        parameters={"quartic": quartic},
-        t_end=t_end,
-    )
-
-
-def _start(component: int) -> Any:
-    import mpmath
-
-    angle = mpmath.mpf("1.1")
-    return mpmath.sin(angle) if component else mpmath.cos(angle)
+    y0 = starts.nearest(lambda mp: [mp.cos(mp.mpf("1.1")), 0, mp.sin(mp.mpf("1.1"))])
+    return Problem(system, y0=y0, t_end=t_end)

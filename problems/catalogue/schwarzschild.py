@@ -10,7 +10,7 @@ give E and L as in the second source.
 """
 
 from decimal import Decimal, localcontext
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems.checks import Must
 from problems.entry import Expected, entry
@@ -20,7 +20,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     r = m.sqrt(q[0] * q[0] + q[1] * q[1])
     inwards = (q[0] * p[0] + q[1] * p[1]) / r
     flat = p[0] * p[0] + p[1] * p[1]
@@ -83,9 +83,8 @@ def schwarzschild(
     system = Hamiltonian(
         _energy,
         dof=2,
-        parameters={"E": 1.0},
+        parameters={"E": float(energy)},
         invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="schwarzschild",
     )
-    q0, p0 = [float(near), 0.0], [0.0, float(momentum)]
-    return Problem(system, q0=q0, p0=p0, parameters={"E": float(energy)}, t_end=t_end)
+    return Problem(system, q0=[float(near), 0.0], p0=[0.0, float(momentum)], t_end=t_end)

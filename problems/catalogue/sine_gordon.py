@@ -1,6 +1,6 @@
 """The sine-Gordon equation on a periodic interval, discretised in space as `_waves` says."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.catalogue import _starts as starts
@@ -50,17 +50,12 @@ def sine_gordon(
         invariant: energy (that of the equation divided by dx).
     """
     limits.check_problem("sine_gordon", 2 * n, n=n)
-    return Problem(
-        waves.hamiltonian(n, lambda u, par, m: 1 - m.cos(u), "sine_gordon"),
-        q0=[0.0] * n,
-        p0=[starts.nearest(lambda i=i: _hump(i, n, gamma, length)) for i in range(n)],
-        parameters={"stiffness": (n / length) ** 2},
-        t_end=t_end,
+
+    def hump(mp):
+        places = [length * (mp.mpf(i) / n - 0.5) for i in range(n)]
+        return [4 / mp.mpf(gamma) * mp.sech(x / gamma) for x in places]
+
+    system = waves.hamiltonian(
+        n, lambda u, par, m: 1 - m.cos(u), "sine_gordon", stiffness=(n / length) * (n / length)
     )
-
-
-def _hump(i: int, n: int, gamma: float, length: float) -> Any:
-    import mpmath
-
-    x = mpmath.mpf(length) * (mpmath.mpf(i) / n - mpmath.mpf(1) / 2)
-    return 4 / mpmath.mpf(gamma) * mpmath.sech(x / mpmath.mpf(gamma))
+    return Problem(system, q0=[0.0] * n, p0=starts.nearest(hump), t_end=t_end)

@@ -17,7 +17,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Bodies, Hamiltonian
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     kinetic = sum((p[3 * i] ** 2 + p[3 * i + 1] ** 2 + p[3 * i + 2] ** 2) / (2 * par.m[i]) for i in range(3))
     potential = 0
     for i, j in ((0, 1), (0, 2), (1, 2)):
@@ -27,30 +27,24 @@ def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
     return kinetic + potential
 
 
-def _linear_momentum(p: Any) -> Any:
+def _linear_momentum(p):
     return [p[c] + p[3 + c] + p[6 + c] for c in range(3)]
 
 
-def _angular_momentum(q: Any, p: Any) -> Any:
+def _angular_momentum(q, p):
     def total(a: int, b: int) -> Any:
         return sum(q[3 * i + a] * p[3 * i + b] - q[3 * i + b] * p[3 * i + a] for i in range(3))
 
     return [total(1, 2), total(2, 0), total(0, 1)]
 
 
-def _off_axis(q: Any, m: Any) -> Any:
+def _off_axis(q, m):
     return m.sqrt(q[6] ** 2 + q[7] ** 2)
 
 
 def _apart(y: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of the primaries in some states."""
     return np.hypot(y[:, 0] - y[:, 3], y[:, 1] - y[:, 4])
-
-
-def _apocentre_momentum(e: float, d: float) -> float:
-    """Return sqrt(2 (1 - e)/d)/2, correctly rounded: for e = 3/4, d = 5 it is sqrt(10)/20."""
-    with localcontext(prec=60):
-        return float((2 * (1 - Decimal(e)) / Decimal(d)).sqrt() / 2)
 
 
 @entry(
@@ -109,17 +103,17 @@ def sitnikov(
     system = Hamiltonian(
         _energy,
         dof=9,
-        parameters={"m": (1.0, 1.0, 1e-5)},
+        parameters={"m": (1.0, 1.0, m3)},
         invariants={"linear_momentum": _linear_momentum, "angular_momentum": _angular_momentum},
         guards={"off_axis": _off_axis},
         bodies=Bodies(masses="m", G=1.0, dimension=3),
         name="sitnikov",
     )
-    momentum = _apocentre_momentum(e, d)
+    with localcontext(prec=60):  # rounded once: for e = 3/4, d = 5 it is sqrt(10)/20
+        momentum = float((2 * (1 - Decimal(e)) / Decimal(d)).sqrt() / 2)
     return Problem(
         system,
         q0=[-d / 2, 0.0, 0.0, d / 2, 0.0, 0.0, 0.0, 0.0, z3],
         p0=[0.0, -momentum, 0.0, 0.0, momentum, 0.0, 0.0, 0.0, m3 * v3],
-        parameters={"m": (1.0, 1.0, m3)},
         t_end=t_end,
     )

@@ -16,8 +16,7 @@ from problems.picture import Orbits
 from problems.problem import Problem
 
 GAUSSIAN_CONSTANT = "0.01720209895"  # au^(3/2)/(solar mass^(1/2) day)
-NAMES = ("Sun", "Mercury", "Venus", "Earth and Moon", "Mars", "Jupiter", "Saturn", "Uranus", "Neptune")
-# Sun's mass over planet's mass.
+# Sun's mass over planet's mass: Mercury, Venus, Earth and Moon, Mars, Jupiter, Saturn, Uranus, Neptune.
 MASS_RATIOS = (
     "6023600",
     "408523.71",
@@ -90,14 +89,10 @@ def solar_system(*, unit: Unit = "year", frame: Frame = "barycentric", t_end: fl
         frame=frame,
         t_end=t_end,
         gravity_per_day=Fraction(GAUSSIAN_CONSTANT) ** 2,
-        masses=_masses(),
+        masses=[Fraction(1), *(1 / Fraction(text) for text in MASS_RATIOS)],
         positions=positions,
         velocities=velocities,
     )
-
-
-def _masses() -> list[Fraction]:
-    return [Fraction(1), *(1 / Fraction(text) for text in MASS_RATIOS)]
 
 
 @cache

@@ -7,7 +7,6 @@ which the spring oscillates twice as fast as it swings.
 """
 
 import math
-from typing import Any
 
 from problems.checks import Positive
 from problems.entry import Expected, entry
@@ -18,15 +17,11 @@ from problems.systems.hamiltonian import Hamiltonian
 PI_SQUARED = math.pi * math.pi
 
 
-def _energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+def _energy(q, p, par, m):
     r = m.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     stretch = r - par.l0
     kinetic = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (2 * par.m)
     return kinetic + (par.k * (stretch * stretch) / 2 + par.m * par.g * q[2])
-
-
-def _turn(q: Any, p: Any) -> Any:
-    return q[0] * p[1] - q[1] * p[0]
 
 
 @entry(
@@ -76,14 +71,8 @@ def spring_pendulum(
     system = Hamiltonian(
         _energy,
         dof=3,
-        parameters={"m": 1.0, "k": 4 * PI_SQUARED, "l0": 0.75, "g": PI_SQUARED},
-        invariants={"angular_momentum": _turn},
+        parameters={"m": m, "k": k, "l0": l0, "g": g},
+        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
         name="spring_pendulum",
     )
-    return Problem(
-        system,
-        q0=[x, 0.0, z - (l0 + m * g / k)],
-        p0=[0.0, m * vy, 0.0],
-        parameters={"m": m, "k": k, "l0": l0, "g": g},
-        t_end=t_end,
-    )
+    return Problem(system, q0=[x, 0.0, z - (l0 + m * g / k)], p0=[0.0, m * vy, 0.0], t_end=t_end)

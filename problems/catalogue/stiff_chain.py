@@ -8,7 +8,7 @@ with q = x: x_1..x_m the (scaled) positions of the stiff springs and x_{m+1}..x_
 their (scaled) lengths. In the book: m = 3, omega = 50.
 """
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from problems import limits
 from problems.checks import Positive, at_least
@@ -57,7 +57,7 @@ def stiff_chain(
     limits.check_problem("stiff_chain", 4 * springs, springs=springs)
     k = springs
 
-    def energy(q: Any, p: Any, par: Any, m: Any) -> Any:
+    def energy(q, p, par, m):
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(2 * k))
         stiff = par.omega * par.omega / 2 * m.sum(lambda i: q[k + i] * q[k + i], range(k))
         inner = m.sum(lambda i: (q[i + 1] - q[k + i + 1] - q[i] - q[k + i]) ** 4, range(k - 1))
@@ -66,10 +66,5 @@ def stiff_chain(
     q0, p0 = [0.0] * (2 * k), [0.0] * (2 * k)
     q0[0] = p0[0] = p0[k] = 1.0
     q0[k] = 1.0 / omega
-    return Problem(
-        Hamiltonian(energy, dof=2 * k, parameters={"omega": 50.0}, name=f"stiff_chain_{k}"),
-        q0=q0,
-        p0=p0,
-        parameters={"omega": omega},
-        t_end=t_end,
-    )
+    system = Hamiltonian(energy, dof=2 * k, parameters={"omega": omega}, name=f"stiff_chain_{k}")
+    return Problem(system, q0=q0, p0=p0, t_end=t_end)

@@ -38,7 +38,7 @@ def _continuant(diagonal: list[Any], squares: list[Any]) -> list[Any]:
 
 
 def _integrals(n: int) -> Any:
-    def integrals(q: Any, p: Any, m: Any) -> Any:
+    def integrals(q, p, m):
         diagonal = list(p)
         squares = [m.exp(q[i] - q[(i + 1) % n]) for i in range(n)]
         whole = _continuant(diagonal, squares)
@@ -79,7 +79,7 @@ def toda(
     n : int
         Number of masses, at least 3.
     spread : float
-        Standard deviation of the momenta at the start, which are `problems.catalogue._starts.gaussians`.
+        Standard deviation of the random momenta at the start.
     seed : int
         Of the momenta.
     t_end : float
@@ -96,7 +96,7 @@ def toda(
     """
     limits.check_problem("toda", 2 * n, n=n)
 
-    def energy(q: Any, p: Any, m: Any) -> Any:
+    def energy(q, p, m):
         kinetic = m.sum(lambda i: p[i] * p[i] / 2, range(n))
         neighbours = [(i, (i + 1) % n) for i in range(n)]
         return kinetic + m.sum(lambda i, j: m.exp(q[i] - q[j]), neighbours)

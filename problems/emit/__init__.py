@@ -15,12 +15,12 @@ from problems.calculus.function import Function
 from problems.calculus.jacobian import Jacobian
 from problems.emit import cache
 from problems.emit.array_text import jax_text, numpy_text
-from problems.emit.code_digest import code_digest
 from problems.emit.heyoka_text import heyoka_text
 from problems.emit.numba_text import numba_text
 from problems.emit.plan import SMALL, make_plan
-from problems.errors import MissingLibraryError, unknown
+from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
+from problems.systems.code_digest import code_digest
 from problems.systems.untraced import Foreign
 from problems.trace.graph import reachable
 
@@ -91,16 +91,18 @@ def source(system: System, what: str | Jacobian, backend: str, *, limit: int | N
         raise unknown("backend", backend, BACKENDS)
     if backend == "heyoka":
         limit = None
+    function = _function(system, what)
     texts = _texts.setdefault(system, {})
     key = (what, backend, limit)
     if key not in texts:
-        function = _function(system, what)
         name = re.sub(r"\W+", "_", f"{system.name}_{_name(what)}")
         texts[key] = _written(function, name if name.isidentifier() else f"_{name}", backend, limit)
     return texts[key]
 
 
 def _function(system: System, what: str | Jacobian) -> Function:
+    if not isinstance(system, System):
+        raise InputError(f"a system is needed, such as problem.system, not {shown(system)}.")
     return what.function if isinstance(what, Jacobian) else system.function(what)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from problems.calculus.function import LoopTerm
 from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Plan, Scatter
 from problems.emit.printer import Printer
@@ -72,22 +71,8 @@ class _NumbaPrinter(Printer):
         self.indent = outside + "    " * bool(opening)
         for node in body:
             self._inside(node, header)
-        if isinstance(target, Node):
-            self._add_to_sum(target)
-        else:
-            later = {second: first for first, second in carried.items()}
-            # What uses a carried value comes before what renews it.
-            for i in sorted(range(len(target.entries)), key=lambda i: i not in carried):
-                entry = target.entries[i]
-                place = f"out[{header.index(entry.index)}]"
-                if i in carried:
-                    self._add(place, f"a{i}", entry)
-                elif i in later:
-                    self._add(f"a{later[i]}", place, entry)
-                elif target.unique[i]:
-                    self.line(f"{place} = {self.text(entry.node)}")
-                else:
-                    self._add(place, place, entry)
+        before = {first: f"a{first}" for first in carried}
+        self._add_to(target, header, before, {second: f"a{first}" for first, second in carried.items()})
         self.indent = outside
         if isinstance(header, Range) and isinstance(target, Scatter):
             for first, second in carried.items():
@@ -115,32 +100,40 @@ class _NumbaPrinter(Printer):
         for node in body:
             if node.id not in outer:
                 self._inside(node, header)
-        if isinstance(target, Node):
-            self._add_to_sum(target)
-        else:
-            for i, entry in enumerate(entries):
-                place = f"out[{header.index(entry.index)}]"
-                if i in held:
-                    self._add(f"a{i}", f"a{i}", entry)
-                elif target.unique[i]:
-                    self.line(f"{place} = {self.text(entry.node)}")
-                else:
-                    self._add(place, place, entry)
+        variables = {i: f"a{i}" for i in held}
+        self._add_to(target, header, variables, variables)
         self.indent = outside + "    "
         for i in held:
             self.line(f"out[{header.index(entries[i].index)}] = a{i}")
         self.indent = outside
 
-    def _add_to_sum(self, node: Node) -> None:
-        total = self.names[node.id]
-        self.line(f"{total} = {total} + {self.text(node.args[0], 2)}")
+    def _add_to(
+        self,
+        target: Scatter | Node,
+        header: Range | Nest | Table,
+        before: dict[int, str],
+        after: dict[int, str],
+    ) -> None:
+        """Print the additions of one term of a loop.
 
-    def _add(self, to: str, before: str, entry: LoopTerm) -> None:
-        node = entry.node
-        if node.op == "neg" and self.waiting(node):
-            self.line(f"{to} = {before} - {self.text(node).removeprefix('-')}")
-        else:
-            self.line(f"{to} = {before} + {self.text(node, 2)}")
+        ``before`` and ``after`` name the variables that hold the outputs of some entries, by
+        number, before and after the addition; the others are in memory.
+        """
+        if isinstance(target, Node):
+            total = self.names[target.id]
+            self.line(f"{total} = {total} + {self.text(target.args[0], 2)}")
+            return
+        # What uses a variable that goes from one term to the next comes before what renews it.
+        for i in sorted(range(len(target.entries)), key=lambda i: i not in before or i in after):
+            node = target.entries[i].node
+            place = f"out[{header.index(target.entries[i].index)}]"
+            now, to = before.get(i, place), after.get(i, place)
+            if target.unique[i] and now == to == place:
+                self.line(f"{place} = {self.text(node)}")
+            elif node.op == "neg" and self.waiting(node):
+                self.line(f"{to} = {now} - {self.text(node).removeprefix('-')}")
+            else:
+                self.line(f"{to} = {now} + {self.text(node, 2)}")
 
 
 def _outer(body: Sequence[Node]) -> set[int]:

@@ -13,6 +13,7 @@ from problems import limits
 from problems.calculus.function import Function, function_of, stacked
 from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
+from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.errors import InputError, shown, unknown
 from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
@@ -67,26 +68,25 @@ class System:
 
     def __init__(
         self,
-        *,
+        function: Callable[..., Any],
         dim: int,
         dof: int | None,
         parameters: Mapping[str, Value],
         invariants: Mapping[str, Callable[..., Any]],
         guards: Mapping[str, Callable[..., Any]],
-        name: str,
+        name: str | None,
     ) -> None:
-        if not isinstance(name, str):
-            raise InputError(f"name={shown(name)} of a system must be a text.")
-        for what, given in (("parameters", parameters), ("invariants", invariants), ("guards", guards)):
-            check_names(what, given)
+        asked = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
+        limits.check(f"a system with {asked}", "COMPONENTS", dim)
         if self.kind != "vector_field" and "energy" in invariants:
             raise InputError("the invariant 'energy' is H itself; give the others only.")
         self.dim = dim
         self.dof = dof
-        self.name = name
+        called = getattr(function, "__name__", "")
+        self.name = name or (called if called.isidentifier() else "system")
         self.bodies: Bodies | None = None
         self.parameters: Mapping[str, Value] = MappingProxyType(
-            {key: _checked(key, value) for key, value in parameters.items()}
+            {key: _parameter(key, value) for key, value in parameters.items()}
         )
         layout: dict[str, tuple[int, int | None]] = {}
         offset = 0
@@ -247,7 +247,7 @@ class System:
         """Whether an invariant is a list of numbers."""
         return invariant in self._vectors
 
-    def pack(self, values: Mapping[str, Value] = MappingProxyType({})) -> NDArray[np.float64]:
+    def pack(self, values: Mapping[str, Value] = NOTHING) -> NDArray[np.float64]:
         """Return the flat parameter vector, defaults filled in.
 
         Parameters
@@ -265,11 +265,11 @@ class System:
             For an unknown name, a wrong length or a value that is not finite.
         """
         par = np.empty(self.n_par)
-        for key in check_names("parameters", values):
+        for key in checked(self.name, "parameters", values, Named[Value]):
             if key not in self._layout:
                 raise unknown(f"parameter of {self.name}", key, self._layout)
         for key, (offset, size) in self._layout.items():
-            value = _checked(key, values[key]) if key in values else self.parameters[key]
+            value = _parameter(key, values[key]) if key in values else self.parameters[key]
             if size is None and isinstance(value, tuple):
                 raise InputError(f"parameter {key!r} of {self.name} is one number, not {len(value)}.")
             if size is not None and (not isinstance(value, tuple) or len(value) != size):
@@ -287,39 +287,13 @@ class System:
         }
 
 
-def name_of(function: Callable[..., Any]) -> str:
-    """Return a function's name as an identifier."""
-    name = getattr(function, "__name__", "system")
-    return name if name.isidentifier() else "system"
-
-
-def check_names(what: str, given: Any) -> Mapping[str, Any]:
-    """Return a mapping from names, or refuse anything else."""
-    if not isinstance(given, Mapping) or not all(isinstance(key, str) and key for key in given):
-        raise InputError(f"{what}={shown(given)} must be a dictionary by name, as in {{'name': ...}}.")
-    return given
-
-
-def check_count(what: str, count: Any) -> int:
-    """Return ``count``, a whole number of at least 1 that is not beyond `problems.limits`, or refuse it."""
-    if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 1:
-        raise InputError(f"{what}={shown(count)} must be a whole number of at least 1.")
-    components = 2 * int(count) if what == "dof" else int(count)
-    limits.check(f"a system with {what}={shown(count)}", "COMPONENTS", components)
-    return int(count)
-
-
-def _checked(name: str, value: Any) -> Value:
-    if not isinstance(name, str) or not name.isidentifier() or name.startswith("__"):
+def _parameter(name: str, value: Any) -> Value:
+    if not name.isidentifier() or name.startswith("__"):
         raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(
-            f"parameter {name!r} is {shown(value)}, not a number or a list of numbers."
-        ) from error
-    if array.ndim > 1 or not np.isfinite(array).all():
+    found = number(value)
+    found = numbers(value) if found is None else found
+    if found is None or found == ():
         raise InputError(
             f"parameter {name!r} is {shown(value)}; give one finite number or a flat list of them."
         )
-    return float(array) if array.ndim == 0 else tuple(array.tolist())
+    return found

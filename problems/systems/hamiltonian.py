@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from problems.calculus.function import Function, LoopTerm, Term, function_of, joined, stacked
 from problems.calculus.gradient import gradient
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError, shown, unknown
-from problems.systems.base import Bodies, System, Value, check_count, name_of
+from problems.systems.base import Bodies, System, Value
 from problems.trace.graph import PAR, Loop, Node, P
 
 
@@ -46,30 +46,22 @@ class Hamiltonian(System):
 
     kind = "hamiltonian"
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         H: Callable[..., Any],
         *,
-        dof: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dof: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         bodies: Bodies | None = None,
         domain: Callable[..., Any] | None = None,
         name: str | None = None,
     ) -> None:
-        dof = check_count("dof", dof)
-        super().__init__(
-            dim=2 * dof,
-            dof=dof,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(H),
-        )
+        super().__init__(H, 2 * dof, dof, parameters, invariants, guards, name)
         if bodies is not None:
-            bodies = _checked_bodies(bodies, self.parameters)
+            bodies = _checked_bodies(bodies, self.parameters, dof)
         self.bodies = bodies
         self._energy = self._scalar(H, "H")
         self._set_energy(self._energy)
@@ -183,10 +175,16 @@ def _energy_gradient(field: Function, dof: int) -> Function:
     return Function(field.graph, slope.outputs + velocity.outputs, loops)
 
 
-def _checked_bodies(bodies: Any, parameters: Mapping[str, Value]) -> Bodies:
+def _checked_bodies(bodies: Any, parameters: Mapping[str, Value], dof: int) -> Bodies:
     if not isinstance(bodies, Bodies):
         raise InputError(f'bodies={shown(bodies)} must be a problems.Bodies, as in Bodies(masses="m").')
     for name in [bodies.masses, *([bodies.G] if isinstance(bodies.G, str) else [])]:
         if name not in parameters:
             raise unknown("parameter in bodies", name, parameters)
+    masses = parameters[bodies.masses]
+    if not isinstance(masses, tuple) or len(masses) * bodies.dimension != dof:
+        raise InputError(
+            f"{bodies} does not fit dof={dof} and {bodies.masses}={shown(masses)}; "
+            f"it needs a list of masses, and dof = {bodies.dimension} times their number."
+        )
     return bodies

@@ -1,14 +1,14 @@
 """Poisson systems y' = B(y) grad H(y), with a skew-symmetric structure matrix B."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 from problems.calculus.function import function_of
 from problems.calculus.gradient import gradient
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value
 from problems.trace import arguments
 from problems.trace.graph import Node
 from problems.trace.source_line import line_of_function
@@ -52,27 +52,19 @@ class Poisson(System):
 
     kind = "poisson"
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         H: Callable[..., Any],
         B: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(H),
-        )
+        super().__init__(H, dim, None, parameters, invariants, guards, name)
         energy = self._scalar(H, "H")
         self._set_energy(energy)
         slope = self._gradient(energy, H)

@@ -1,17 +1,17 @@
 """Systems whose field is not traced: a numba function, or any Python function."""
 
 import inspect
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from problems.calculus.function import Function
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError, shown
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
 
@@ -62,28 +62,20 @@ class Foreign(System):
     kind = "vector_field"
     traced = False
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         f: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(f),
-        )
+        super().__init__(f, dim, None, parameters, invariants, guards, name)
         self.f = f
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")

@@ -1,13 +1,13 @@
 """First-order systems, from their right-hand side written once in ordinary Python arithmetic."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Callable
+from typing import Annotated, Any
 
 from problems.calculus.function import function_of
-from problems.calls import checked
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError
-from problems.systems.base import System, Value, check_count, name_of
+from problems.systems.base import System, Value
 from problems.trace import arguments
 from problems.trace.source_line import line_of_function
 
@@ -27,26 +27,18 @@ class VectorField(System):
 
     kind = "vector_field"
 
-    @checked
+    @checked_arguments
     def __init__(
         self,
         f: Callable[..., Any],
         *,
-        dim: int,
-        parameters: Mapping[str, Value] = MappingProxyType({}),
-        invariants: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
-        guards: Mapping[str, Callable[..., Any]] = MappingProxyType({}),
+        dim: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
         name: str | None = None,
     ) -> None:
-        dim = check_count("dim", dim)
-        super().__init__(
-            dim=dim,
-            dof=None,
-            parameters=parameters,
-            invariants=invariants,
-            guards=guards,
-            name=name or name_of(f),
-        )
+        super().__init__(f, dim, None, parameters, invariants, guards, name)
         value = self._call(f, "f")
         if not arguments.is_list(value) or len(value) != dim:
             got = f"{len(value)} values" if hasattr(value, "__len__") else "one value"

@@ -8,7 +8,7 @@ from .typed import faults
 BY_NAME = r"""
 load('sitnikof')                                             | unknown problem 'sitnikof'; did you mean
 load(3)                                                      | unknown problem 3; known: charged_particle,
-load(None)                                                   | unknown problem None; did you mean
+load(None)                                                   | unknown problem None; known:
 load(['kepler'])                                             | unknown problem ['kepler']; did you mean
 load('kepler', ee=.6)                                        | unknown argument of kepler 'ee'; did you mean
 load('kepler', e='0.6')                                      | e='0.6' of kepler must be an eccentricity, 0
@@ -41,7 +41,7 @@ load('fput', n=2.5)                                          | n=2.5 of fput mus
 load('fput', n=[8])                                          | n=[8] of fput must be a whole number of at
 load('fput', start='modes')                                  | unknown start of fput 'modes'; did you mean
 load('fput', start=3)                                        | unknown start of fput 3; known: mode, thermal
-load('fput', start=None)                                     | unknown start of fput None; did you mean
+load('fput', start=None)                                     | unknown start of fput None; known: mode,
 load('fput', start=['mode'])                                 | unknown start of fput ['mode']; did you mean
 load('fput', temperature=0)                                  | temperature=0 of fput must be a positive
 load('fput', temperature=-1)                                 | temperature=-1 of fput must be a positive
@@ -196,16 +196,16 @@ Hamiltonian()                                                | Hamiltonian needs
 Hamiltonian(osc)                                             | Hamiltonian needs dof; give a value as in
 Hamiltonian(osc, 1)                                          | Hamiltonian takes only H by place and the
 Hamiltonian(osc, dog=1)                                      | unknown argument of Hamiltonian 'dog'; did
-Hamiltonian(osc, dof=0)                                      | dof=0 must be a whole number of at least 1
-Hamiltonian(osc, dof=-1)                                     | dof=-1 must be a whole number of at least 1
-Hamiltonian(osc, dof=1.0)                                    | dof=1.0 must be a whole number of at least 1
-Hamiltonian(osc, dof='1')                                    | dof='1' must be a whole number of at least 1
-Hamiltonian(osc, dof=None)                                   | dof=None must be a whole number of at least 1
-Hamiltonian(osc, dof=True)                                   | dof=True must be a whole number of at least 1
-Hamiltonian(osc, dof=[1])                                    | dof=[1] must be a whole number of at least 1
-Hamiltonian(osc, dof=nan)                                    | dof=nan must be a whole number of at least 1
+Hamiltonian(osc, dof=0)                                      | dof=0 of Hamiltonian must be a whole number
+Hamiltonian(osc, dof=-1)                                     | dof=-1 of Hamiltonian must be a whole number
+Hamiltonian(osc, dof=1.0)                                    | dof=1.0 of Hamiltonian must be a whole number
+Hamiltonian(osc, dof='1')                                    | dof='1' of Hamiltonian must be a whole number
+Hamiltonian(osc, dof=None)                                   | dof=None of Hamiltonian must be a whole
+Hamiltonian(osc, dof=True)                                   | dof=True of Hamiltonian must be a whole
+Hamiltonian(osc, dof=[1])                                    | dof=[1] of Hamiltonian must be a whole number
+Hamiltonian(osc, dof=nan)                                    | dof=nan of Hamiltonian must be a whole number
 Hamiltonian(osc, dof=huge)                                   | HBVM_BENCH_MAX_COMPONENTS
-Hamiltonian(osc, dof=np.array([1]))                          | dof=array([1]) must be a whole number of at
+Hamiltonian(osc, dof=np.array([1]))                          | dof=array([1]) of Hamiltonian must be a whole
 Hamiltonian(lambda q, p, m: m.sum(lambda i: p[i]**2, iter(int, 1)), dof=2) | HBVM_BENCH_MAX_TERMS
 Hamiltonian(lambda q, p, m: m.sum(lambda i: p[i]**2, 5), dof=2) | the index of m.sum is 5; give a range or a
 Hamiltonian(lambda q, p, m: m.sum(lambda i: p[i]**2, None), dof=2) | m.sum needs a term and an index list;
@@ -271,30 +271,32 @@ Hamiltonian(lambda q, par: par.k*q[0], dof=1)                | unknown parameter
 Hamiltonian(lambda q, par: par['k']*q[0], dof=1)             | unknown parameter 'k'; there are none;
 Hamiltonian(lambda q, par: par[0]*q[0], dof=1)               | par[0] is not a parameter; write par.name
 Hamiltonian(lambda *a: a[0], dof=1)                          | H failed with IndexError: tuple index out of
-Hamiltonian(osc, dof=1, parameters={'k': 'a'})               | parameter 'k' is 'a', not a number or a list
+Hamiltonian(osc, dof=1, parameters={'k': 'a'})               | parameter 'k' is 'a'; give one finite number
 Hamiltonian(osc, dof=1, parameters={'k': None})              | parameter 'k' is None; give one finite number
 Hamiltonian(osc, dof=1, parameters={'k': nan})               | parameter 'k' is nan; give one finite number
-Hamiltonian(osc, dof=1, parameters={'k': huge})              | parameter 'k' is about 1e400, not a number or
+Hamiltonian(osc, dof=1, parameters={'k': huge})              | parameter 'k' is about 1e400; give one finite
 Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3, 4]]})  | parameter 'k' is [[1, 2], [3, 4]]; give one
-Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3]]})     | parameter 'k' is [[1, 2], [3]], not a number
-Hamiltonian(osc, dof=1, parameters={'k': 1j})                | parameter 'k' is 1j, not a number or a list
-Hamiltonian(osc, dof=1, parameters={3: 1.0})                 | parameters={3: 1.0} must be a dictionary by
+Hamiltonian(osc, dof=1, parameters={'k': [[1, 2], [3]]})     | parameter 'k' is [[1, 2], [3]]; give one
+Hamiltonian(osc, dof=1, parameters={'k': '2'})               | parameter 'k' is '2'; give one finite number
+Hamiltonian(osc, dof=1, parameters={'k': []})                | parameter 'k' is []; give one finite number
+Hamiltonian(osc, dof=1, parameters={'k': 1j})                | parameter 'k' is 1j; give one finite number
+Hamiltonian(osc, dof=1, parameters={3: 1.0})                 | parameters={3: 1.0} of Hamiltonian must be a
 Hamiltonian(osc, dof=1, parameters={'my k': 1.0})            | the parameter name 'my k' must be an
-Hamiltonian(osc, dof=1, parameters=[1, 2])                   | parameters=[1, 2] must be a dictionary by
-Hamiltonian(osc, dof=1, parameters=3)                        | parameters=3 must be a dictionary by name, as
-Hamiltonian(osc, dof=1, parameters=None)                     | parameters=None must be a dictionary by name,
-Hamiltonian(osc, dof=1, parameters='k')                      | parameters='k' must be a dictionary by name,
-Hamiltonian(osc, dof=1, invariants=osc)                      | invariants=<function osc> must be a
-Hamiltonian(osc, dof=1, invariants=[osc])                    | invariants=[<function osc>] must be a
+Hamiltonian(osc, dof=1, parameters=[1, 2])                   | parameters=[1, 2] of Hamiltonian must be a
+Hamiltonian(osc, dof=1, parameters=3)                        | parameters=3 of Hamiltonian must be a
+Hamiltonian(osc, dof=1, parameters=None)                     | parameters=None of Hamiltonian must be a
+Hamiltonian(osc, dof=1, parameters='k')                      | parameters='k' of Hamiltonian must be a
+Hamiltonian(osc, dof=1, invariants=osc)                      | invariants=<function osc> of Hamiltonian must
+Hamiltonian(osc, dof=1, invariants=[osc])                    | invariants=[<function osc>] of Hamiltonian
 Hamiltonian(osc, dof=1, invariants={'L': 3})                 | invariant 'L' must be a function, not 3
-Hamiltonian(osc, dof=1, invariants={3: osc})                 | invariants={3: <function osc>} must be a
-Hamiltonian(osc, dof=1, invariants={'': osc})                | invariants={'': <function osc>} must be
+Hamiltonian(osc, dof=1, invariants={3: osc})                 | invariants={3: <function osc>} of Hamiltonian
+Hamiltonian(osc, dof=1, invariants={'': osc})                | invariants={'': <function osc>} of
 Hamiltonian(osc, dof=1, invariants={'energy': osc})          | the invariant 'energy' is H itself; give the
 Hamiltonian(osc, dof=1, invariants={'L': lambda q: []})      | invariant 'L' returns an empty list; return a
 Hamiltonian(osc, dof=1, invariants={'L': lambda q: None})    | invariant 'L' returns nothing; end it with a
 Hamiltonian(osc, dof=1, invariants={'L': lambda q: 'a'})     | invariant 'L' returns 'a', which is not a
-Hamiltonian(osc, dof=1, invariants=None)                     | invariants=None must be a dictionary by name,
-Hamiltonian(osc, dof=1, guards=osc)                          | guards=<function osc> must be a
+Hamiltonian(osc, dof=1, invariants=None)                     | invariants=None of Hamiltonian must be a
+Hamiltonian(osc, dof=1, guards=osc)                          | guards=<function osc> of Hamiltonian must be
 Hamiltonian(osc, dof=1, guards={'g': 3})                     | guard 'g' must be a function, not 3
 Hamiltonian(osc, dof=1, guards={'g': lambda q: [q[0]]})      | guard 'g' returns 1 values, not one number;
 Hamiltonian(osc, dof=1, bodies=3)                            | bodies=3 must be a problems.Bodies, as in
@@ -302,11 +304,11 @@ Hamiltonian(osc, dof=1, bodies='m')                          | bodies='m' must b
 Hamiltonian(osc, dof=1, bodies=Bodies(masses='m'))           | unknown parameter in bodies 'm'; there are
 Hamiltonian(osc, dof=1, domain=3)                            | domain must be a function, not 3
 Hamiltonian(osc, dof=1, domain=lambda q: 'a')                | domain returns 'a', which is not a number
-Hamiltonian(osc, dof=1, name=3)                              | name=3 of a system must be a text
+Hamiltonian(osc, dof=1, name=3)                              | name=3 of Hamiltonian must be text
 Hamiltonian(osc, dof=1).function('feild')                    | unknown function of osc 'feild'; did you
 Hamiltonian(osc, dof=1).function(3)                          | unknown function of osc 3; known: field,
 Hamiltonian(osc, dof=1).pack({'k': 1})                       | unknown parameter of osc 'k'; there are
-Hamiltonian(osc, dof=1).pack(3)                              | parameters=3 must be a dictionary by name, as
+Hamiltonian(osc, dof=1).pack(3)                              | parameters=3 of osc must be a dictionary by
 VectorField(lambda y: [y[1]], dim=2)                         | f returns 1 values, not a list of dim=2;
 VectorField(lambda y: y[1], dim=2)                           | f returns one value, not a list of dim=2;
 VectorField(lambda y: None, dim=2)                           | f returns one value, not a list of dim=2;
@@ -317,9 +319,9 @@ VectorField(lambda y: (y[i] for i in range(2)), dim=2)       | f returns one val
 VectorField(lambda y: np.array([y[1], y[0]]), dim=2)         | this makes a numpy array of symbols; write
 VectorField(lambda y: {0: y[1], 1: y[0]}, dim=2)             | f returns 2 values, not a list of dim=2;
 VectorField(lambda q: [q[0], q[1]], dim=2)                   | f asks for an argument 'q'; name those it
-VectorField(lambda y: [y[1], -y[0]], dim=0)                  | dim=0 must be a whole number of at least 1
-VectorField(lambda y: [y[1], -y[0]], dim='2')                | dim='2' must be a whole number of at least 1
-VectorField(lambda y: [y[1], -y[0]], dim=2.0)                | dim=2.0 must be a whole number of at least 1
+VectorField(lambda y: [y[1], -y[0]], dim=0)                  | dim=0 of VectorField must be a whole number
+VectorField(lambda y: [y[1], -y[0]], dim='2')                | dim='2' of VectorField must be a whole number
+VectorField(lambda y: [y[1], -y[0]], dim=2.0)                | dim=2.0 of VectorField must be a whole number
 VectorField(lambda y: [y[1], -y[0]], dim=10**9)              | HBVM_BENCH_MAX_COMPONENTS
 VectorField(lambda y: [y[i] for i in range(100000)], dim=100000) | HBVM_BENCH_MAX_OPERATIONS
 VectorField(lambda y: [y[1], -y[0]])                         | VectorField needs dim; give a value as in
@@ -334,7 +336,7 @@ Poisson(lambda y: y[0]**2, lambda y: 3, dim=2)               | B must return 2 l
 Poisson(lambda y: y[0]**2, lambda y: [[0, 'a'], ['b', 0]], dim=2) | B's entry [0][1] returns 'a', which is
 Poisson(lambda y: y[0]**2, 3, dim=2)                         | B must be a function, not 3
 Poisson(3, lambda y: [[0, 1], [-1, 0]], dim=2)               | H must be a function, not 3
-Poisson(lambda y: y[0]**2, lambda y: [[0, 1], [-1, 0]], dim=2.0) | dim=2.0 must be a whole number of at
+Poisson(lambda y: y[0]**2, lambda y: [[0, 1], [-1, 0]], dim=2.0) | dim=2.0 of Poisson must be a whole number
 Poisson(lambda y: y[0]**2, lambda y: [[0, 1], [-1, 0]], dim=10**6) | HBVM_BENCH_MAX_COMPONENTS
 Poisson(lambda y: y[0]**2, lambda y: np.array([[0, 1], [-1, 0]]), dim=2) | B must return 2 lists of 2
 Poisson(lambda y: y[0]**2, lambda y: [[1, 1], [-1, 0]], dim=2) | B is not skew-symmetric as it is written:
@@ -342,7 +344,7 @@ Poisson(lambda q: q[0]**2, lambda y: [[0, 1], [-1, 0]], dim=2) | H asks for an a
 Foreign(3, dim=2)                                            | f must be a function, not 3
 Foreign(lambda t: t, dim=2)                                  | a field has the arguments (t, y), (t, y, dy),
 Foreign(lambda t, y, a, b: t, dim=2)                         | a field has the arguments (t, y), (t, y, dy),
-Foreign(lambda t, y: y, dim='a')                             | dim='a' must be a whole number of at least 1
+Foreign(lambda t, y: y, dim='a')                             | dim='a' of Foreign must be a whole number of
 Foreign(lambda t, y: y)                                      | Foreign needs dim; give a value as in
 Foreign(lambda t, y: y, dim=10**9)                           | HBVM_BENCH_MAX_COMPONENTS
 """
@@ -378,29 +380,33 @@ Problem(H1, y0=[1, 2, 3], t_end=1.)                          | y0 must be a flat
 Problem(H1, y0='ab', t_end=1.)                               | y0 must be numbers, not 'ab'
 Problem(V2, q0=[1], p0=[1], t_end=1.)                        | a VectorField starts from y0=, of length 2;
 Problem(V2, t_end=1.)                                        | a VectorField starts from y0=, of length 2;
-Problem(V2, y0=[0, 1], t_end='a')                            | t0 and t_end must be numbers, not [0.0, 'a']
-Problem(V2, y0=[0, 1], t_end=None)                           | t0 and t_end must be finite, not [0.0, nan]
-Problem(V2, y0=[0, 1], t_end=nan)                            | t0 and t_end must be finite, not [0.0, nan]
-Problem(V2, y0=[0, 1], t_end=inf)                            | t0 and t_end must be finite, not [0.0, inf]
+Problem(V2, y0=[0, 1], t_end='a')                            | t_end='a' of Problem must be a finite number
+Problem(V2, y0=[0, 1], t_end=None)                           | t_end=None of Problem must be a finite number
+Problem(V2, y0=[0, 1], t_end=nan)                            | t_end=nan of Problem must be a finite number
+Problem(V2, y0=[0, 1], t_end=inf)                            | t_end=inf of Problem must be a finite number
 Problem(V2, y0=[0, 1], t_end=0.)                             | t_end=0.0 must differ from t0=0.0
-Problem(V2, y0=[0, 1], t_end=huge)                           | t0 and t_end must be numbers, not [0.0,
-Problem(V2, y0=[0, 1], t_end=[1, 2])                         | t0 and t_end must be numbers, not [0.0, [1,
-Problem(V2, y0=[0, 1], t_end=1j)                             | t0 and t_end must be numbers, not [0.0, 1j]
-Problem(V2, y0=[0, 1], t0='a', t_end=1.)                     | t0 and t_end must be numbers, not ['a', 1.0]
-Problem(V2, y0=[0, 1], t0=None, t_end=1.)                    | t0 and t_end must be finite, not [nan, 1.0]
+Problem(V2, y0=[0, 1], t_end=huge)                           | t_end=about 1e400 of Problem must be a finite
+Problem(V2, y0=[0, 1], t_end=[1, 2])                         | t_end=[1, 2] of Problem must be a finite
+Problem(V2, y0=[0, 1], t_end='1')                            | t_end='1' of Problem must be a finite number
+Problem(V2, y0=[0, 1], t_end=1., references=[1])             | references=[1] of Problem must be a list of
+emit.numba(P1, 'field')                                      | a system is needed, such as problem.system
+Hamiltonian(osc, dof=1, parameters={'m': [1]}, bodies=Bodies()) | does not fit dof=1 and m=(1.0,)
+Problem(V2, y0=[0, 1], t_end=1j)                             | t_end=1j of Problem must be a finite number
+Problem(V2, y0=[0, 1], t0='a', t_end=1.)                     | t0='a' of Problem must be a finite number
+Problem(V2, y0=[0, 1], t0=None, t_end=1.)                    | t0=None of Problem must be a finite number
 Problem(V2, y0=[0, 1], t0=1., t_end=1.)                      | t_end=1.0 must differ from t0=1.0
 Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 3})        | unknown parameter of system 'k'; there are
-Problem(V2, y0=[0, 1], t_end=1., parameters=[3])             | parameters=[3] must be a dictionary by name,
-Problem(V2, y0=[0, 1], t_end=1., parameters=None)            | parameters=None must be a dictionary by name,
+Problem(V2, y0=[0, 1], t_end=1., parameters=[3])             | parameters=[3] of Problem must be a
+Problem(V2, y0=[0, 1], t_end=1., parameters=None)            | parameters=None of Problem must be a
 Problem(V2, y0=[0, 1], t_end=1., parameters={'k': 'a'})      | unknown parameter of system 'k'; there are
 Problem(V2, y0=[0, 1], t_end=1., times='a')                  | times must be numbers, not 'a'
 Problem(V2, y0=[0, 1], t_end=1., times=[nan])                | times must be finite, not [nan]
 Problem(V2, y0=[0, 1], t_end=1., times=[[0, 1]])             | times must be a flat list, not an array of
-Problem(V2, y0=[0, 1], t_end=1., name=3)                     | name=3 of a Problem must be a text
-Problem(V2, y0=[0, 1], t_end=1., title=3)                    | title=3 of a Problem must be a text
-Problem(V2, y0=[0, 1], t_end=1., arguments=3)                | arguments=3 must be a dictionary by name, as
-Problem(V2, y0=[0, 1], t_end=1., references=3)               | references=3 of a Problem must be a list of
-Problem(V2, y0=[0, 1], t_end=1., references='abc').references | references='abc' of a Problem must be a list
+Problem(V2, y0=[0, 1], t_end=1., name=3)                     | name=3 of Problem must be text
+Problem(V2, y0=[0, 1], t_end=1., title=3)                    | title=3 of Problem must be text
+Problem(V2, y0=[0, 1], t_end=1., arguments=3)                | arguments=3 of Problem must be a dictionary
+Problem(V2, y0=[0, 1], t_end=1., references=3)               | references=3 of Problem must be a list of
+Problem(V2, y0=[0, 1], t_end=1., references='abc').references | references='abc' of Problem must be a list of
 """
 
 

@@ -107,13 +107,28 @@ def test_words_and_names_are_refused_with_the_nearest():
         oscillator(1.0)
 
 
-def test_a_decorator_that_is_given_a_text_as_references_is_told_so():
-    @entry(title="x", references="a book", notes="")
-    def wrong(*, t_end: float = 1.0) -> Problem:
-        return Problem(Hamiltonian(lambda p: p[0], dof=1), q0=[0.0], p0=[0.0], t_end=t_end)
+def by_place(k: float = 1.0) -> Any:
+    """Return no problem."""
 
-    with pytest.raises(InputError, match="references='a book' of a Problem must be a list of texts"):
-        wrong()
+
+def by_name(*, k: float = 1.0) -> Any:
+    """Return no problem."""
+
+
+@pytest.mark.parametrize(
+    ("words", "make", "message"),
+    [
+        ({"references": "a book"}, by_name, "references='a book' of entry must be a list of texts."),
+        ({"title": 3}, by_name, "title=3 of entry must be text."),
+        ({"shows": ("j",)}, by_name, "unknown argument of by_name in shows 'j'; known: k."),
+        ({}, by_place, "k of by_place must be taken by name; write def by_place(*, ...)."),
+        ({}, by_name, "by_name must return a problems.Problem, not None."),
+    ],
+)
+def test_a_decorator_that_is_misused_says_how(words, make, message):
+    with pytest.raises(InputError) as caught:
+        entry(**{"title": "x", "references": (), "notes": "", **words})(make)()
+    assert str(caught.value) == message
 
 
 def test_a_decorated_function_can_be_sent_to_another_process():

@@ -82,6 +82,20 @@ def test_a_name_that_two_offer_is_refused_with_both(offered):
     assert registry.load("pendulum").system.name == "pendulum"
 
 
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("no_such_module:orbits", "cannot be imported from no_such_module:orbits, ModuleNotFoundError"),
+        ("problems:orbits", "cannot be imported from problems:orbits, AttributeError"),
+        ("math:pi", r"is 3\.14.* at math:pi, not a function"),
+    ],
+)
+def test_what_cannot_be_imported_is_told_with_its_place(offered, value, message):
+    offered.append(offer("orbits", value, "hbvm-guest"))
+    with pytest.raises(InputError, match=f"the problem 'orbits' {message}"):
+        registry.load("orbits")
+
+
 def test_the_same_problem_found_twice_is_one(offered, guest):
     offered += [offer("plain", f"{guest}:plain", "hbvm-guest")] * 2
     assert repr(registry.load("plain")) == "plain()"

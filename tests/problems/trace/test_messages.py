@@ -311,10 +311,10 @@ def free(**options: Any) -> Hamiltonian:
         (lambda: load("sitnikov", e=1.5), "e=1.5 of sitnikov must be an eccentricity"),
         (lambda: load("sitnikov", e="a"), "e='a' of sitnikov must be an eccentricity"),
         (lambda: load("sitnikov", d=-1.0), "must be a positive number"),
-        (lambda: Hamiltonian(vector, dof=0), "dof=0 must be a whole number"),
+        (lambda: Hamiltonian(vector, dof=0), "dof=0 of .* must be a whole number"),
         (lambda: Hamiltonian(3, dof=1), "H must be a function, not 3"),  # type: ignore[arg-type]
         (lambda: free(parameters={"a b": 1.0}), "the parameter name 'a b' must be an identifier"),
-        (lambda: free(parameters={"a": "x"}), "parameter 'a' is 'x', not a number"),
+        (lambda: free(parameters={"a": "x"}), "parameter 'a' is 'x'; give one finite number"),
         (lambda: free(parameters={"a": math.inf}), "one finite number"),
         (lambda: free(parameters={"a": 1.0}).pack({"b": 1.0}), "unknown parameter of free 'b'; known: a"),
         (lambda: free(parameters={"a": 1.0}).pack({"a": [1.0, 2.0]}), "'a' of free is one number, not 2"),
@@ -327,7 +327,7 @@ def free(**options: Any) -> Hamiltonian:
         (lambda: Problem(free(), q0=[0], p0=[1, 2], t_end=1), "p0 must be a flat list of length 1"),
         (lambda: Problem(free(), q0=["a"], p0=[1], t_end=1), "q0 must be numbers"),
         (lambda: Problem(free(), q0=[0], p0=[1], t_end=0), "t_end=0 must differ from t0=0.0"),
-        (lambda: Problem(free(), q0=[0], p0=[1], t_end=math.nan), "t0 and t_end must be finite"),
+        (lambda: Problem(free(), q0=[0], p0=[1], t_end=math.nan), "t_end=nan of Problem must be a finite"),
         (
             lambda: Problem(Hamiltonian(lambda p: p[0] ** 4, dof=1), q0=[0], v0=[1], t_end=1),
             "v0= needs constant masses",
