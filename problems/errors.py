@@ -63,7 +63,8 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """
     names = sorted(known)
     folded = {candidate.casefold(): candidate for candidate in names}
-    near = [folded[match] for match in get_close_matches(str(name).casefold()[:80], folded, n=3, cutoff=0.5)]
+    given = (name if isinstance(name, str) else shown(name)).casefold()[:80]
+    near = [folded[match] for match in get_close_matches(given, folded, n=3, cutoff=0.5)]
     if near:
         hint = "did you mean " + " or ".join(repr(candidate) for candidate in near) + "?"
     elif names:

@@ -12,6 +12,7 @@ from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.errors import InputError
 from problems.problem import System
 
+
 class DiffraxProgram(ProgramBase):
     """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
 

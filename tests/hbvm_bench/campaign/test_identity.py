@@ -62,7 +62,7 @@ EDITED = {
     "problems/catalogue/pendulum.py": [False, False],
     "problems/picture.py": [False, False],
     "integrators/plugins/scipy/__init__.py": [False, False],
-    "integrators/testing.py": [False, False],
+    "integrators/testing/rules.py": [False, False],
     "hbvm_bench/measure/metric.py": [True, True],
     "hbvm_bench/measure/measured.py": [True, True],
     "hbvm_bench/measure/drift.py": [True, True],
