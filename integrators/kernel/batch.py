@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.kernel import engine, layout
+from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import failure
 from integrators.kernel.workspace import Context
 from integrators.options import Count
-from integrators.pace import Pace
 from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
 from integrators.times import Counts, plan
 from problems.checks import checked

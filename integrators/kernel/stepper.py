@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from integrators.checkpoints import Identity
 from integrators.kernel import engine, layout
 from integrators.kernel.implicit.workspace import Workspace, report, solver
+from integrators.kernel.pace import Pace
 from integrators.kernel.workspace import Integers
 from integrators.one_thread import one_thread
-from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_state, check_times
 from integrators.times import Counts, plan
 from problems.errors import unknown

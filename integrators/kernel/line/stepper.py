@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from integrators.checkpoints import Identity
 from integrators.kernel.line import engine
 from integrators.kernel.line import layout as at
+from integrators.kernel.pace import Pace
 from integrators.one_thread import one_thread
-from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, check_times
 from integrators.times import Counts, plan
 from integrators.watchdog import Crawl
