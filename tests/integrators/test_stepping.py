@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from integrators import Status, integrate, testing
-from integrators.stepping import FixedStep
+from integrators.stepping import FixedStep, FixedStepper
 from problems import Foreign, Problem, VectorField, emit
 
 
@@ -47,6 +47,17 @@ def test_samples_leave_the_steps_of_a_driven_system_as_they_are():
     often = integrate(problem, RK4(h=0.07), np.linspace(0.0, 1000.0, 7000))
     once = integrate(problem, RK4(h=0.07), [1000.0])
     assert np.array_equal(often.y[-1], once.y[0])  # chaotic: other times, rounded otherwise, would show
+
+
+def test_the_kit_notices_samples_that_change_the_steps(monkeypatch):
+    def aside(stepper, part):
+        stepper._here += 1e-13
+        return stepper._here.copy()
+
+    testing.samples_leave_the_steps_alone(RK4(h=0.25), testing.pendulum())
+    monkeypatch.setattr(FixedStepper, "_aside", aside)
+    with pytest.raises(AssertionError, match="samples leave the steps of RK4"):
+        testing.samples_leave_the_steps_alone(RK4(h=0.25), testing.pendulum())
 
 
 @pytest.mark.parametrize("compiled", [False, True])
