@@ -31,8 +31,12 @@ from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
 # What makes numbers of a solution; a worker process does nothing else with it.
-MEASURES = tuple(
-    f"hbvm_bench.measure.{name}" for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing")
+MEASURES = (
+    *(
+        f"hbvm_bench.measure.{name}"
+        for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing")
+    ),
+    "integrators",  # run first of all its modules, though none of them names it
 )
 # They say, name and keep what is run; all that a number can depend on of it is in the key.
 BOOKKEEPING = frozenset(
