@@ -15,7 +15,9 @@ HIGHEST = MANY - SPARE
 """The highest degree."""
 
 DEFECT = 3e-17
-"""Error of a step's quadrature, estimated by the last coefficient that k nodes see; it is much smaller."""
+"""Largest error allowed to a step's quadrature, as the last coefficient that k nodes see estimates it.
+
+The error itself is much smaller than this estimate."""
 
 
 def choose(system: System, tol: float) -> tuple[int, int, float | None]:

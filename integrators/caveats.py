@@ -26,8 +26,8 @@ def unseen(problem: Problem, why: str | None) -> str | None:
 def sees_kinks(k: int, system: System) -> bool:
     """Whether steps with k nodes look for kinks.
 
-    With few nodes a smooth field looks like one with a kink now and then. So one that is known to
-    have none, or not known to have any, is not suspected.
+    With few nodes a smooth field now and then looks like one with a kink. So with few nodes kinks are
+    looked for only where the traced field is known to have some.
     """
     return k >= 8 or (k >= FEWEST and system.traced and has_kinks(system))
 

@@ -93,10 +93,6 @@ class Gauss(MethodBase):
             max_step=self.max_step, breakpoints=self.breakpoints, max_steps=self.max_steps,
         )  # fmt: skip
 
-    def accepts(self, problem: Problem) -> str | None:
-        """Accept every system of ordinary differential equations."""
-        return None
-
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks that these options do not look for; see `HBVM`."""
         return unseen(problem, blind(self.s, self.tol, self.solver))

@@ -19,7 +19,7 @@ CITATION = """\
 """
 
 TOLERANCE = 3e-16
-"""Of a method that is given neither a step nor a tolerance."""
+"""The tolerance of a method that is given neither a step nor a tolerance."""
 
 Solver = Literal["auto", "fixed_point", "newton", "blended"]
 
@@ -70,9 +70,9 @@ class HBVM(MethodBase):
     ``warnings`` say so. They are looked for in steps that vary (``tol``), that the
     fixed-point iteration solves, and that have eight nodes, or four on a field with ``m.abs``;
     with k = s (`Gauss`) and with a loose tolerance a weak kink can still cost more than the
-    tolerance. Everywhere else - with ``h``, with another solver and where ``"auto"`` goes
-    over to Newton, on Poisson systems - nobody looks, and ``warnings`` say this of a field
-    with ``m.abs`` (`test_own_steps`).
+    tolerance. They are not looked for with ``h``, with another solver, where ``"auto"`` goes
+    over to Newton, and on Poisson systems; of a field with ``m.abs``, ``warnings`` then say so
+    (`test_own_steps`).
 
     These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -81,7 +81,7 @@ class HBVM(MethodBase):
 
     takes the place of the first: the same for constant B and for k = s, of the same
     order, and the energy is kept because B is skew-symmetric; the Casimirs of B are
-    not (``tests/integrators/line/test_poisson``).
+    not (``tests/integrators/kernel/line/test_poisson``).
 
     Parameters
     ----------
@@ -161,8 +161,8 @@ class HBVM(MethodBase):
             )
         if self.tol is None and (given := self.control()):
             raise InputError(
-                f"HBVM takes {', '.join(given)} with a tolerance only; give tol, or choose h "
-                "such that its multiples meet these times."
+                f"HBVM takes {', '.join(given)} with a tolerance only, not with h={self.h!r} alone; give tol "
+                "too, or leave that out."
             )
         if self.k is not None and self.s is not None and self.k < self.s:
             raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")

@@ -54,7 +54,7 @@ class LineIntegral(MethodBase):
     makes 0 up to the error of the quadrature. As ``alpha = O(h^{2s})``, the order
     of HBVM(k, s) is kept.
 
-    Properties, each asserted in ``tests/integrators/line``:
+    Properties, each asserted in ``tests/integrators/kernel/line``:
 
     * order 2s (`test_order`); symmetric (`test_symmetry`);
     * all named invariants are conserved in practice, once k is so large that the

@@ -15,7 +15,9 @@ SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
 
 SHORTEST = 2.0**-48
-"""Of the time: a shorter step cannot be told from none; as in `integrators.kernel.step.control`."""
+"""The shortest step, relative to the time: a shorter one cannot be told from none.
+
+The same number is in `integrators.kernel.step.control`."""
 
 Step = Annotated[
     float, Must("a finite step above 0; the sign of time is that of the times asked for", lambda h: h > 0)

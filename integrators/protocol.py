@@ -4,8 +4,8 @@ Guide for implementers
 ----------------------
 A **method** is a description; it holds options and nothing else.
 
-A method with a fixed step derives from `integrators.stepping.FixedStep`, which leaves of
-this only the options, ``accepts`` and the steps themselves.
+For a method with a fixed step derive from `integrators.stepping.FixedStep`, and only the
+class attributes, ``accepts`` and the function that takes the steps are left to write.
 
 1. Derive a frozen, keyword-only dataclass from `MethodBase`. Annotate each option with
    what must hold of it (`problems.checks`, `integrators.options`): it is checked by that.
@@ -14,7 +14,8 @@ this only the options, ``accepts`` and the steps themselves.
 2. Set the class attributes ``library`` (the package that does the work), ``citation``
    (how its authors ask to be cited) and ``order`` (``None`` where the order varies with
    the tolerance).
-3. ``accepts(problem)`` returns ``None`` or the reason why not, as a sentence.
+3. ``accepts(problem)`` returns ``None`` or the reason why not, as a sentence. Leave it
+   out where the method takes every system.
 4. ``compile(system)`` does all compilation, imports the library (raising
    `problems.errors.MissingLibraryError`) and returns a `Program`, which knows
    the seconds that this took. Parameters are run-time values.
@@ -74,7 +75,7 @@ class Status(StrEnum):
 
 
 class UserError(Exception):
-    """What a function of the user raised, on its way through a method to whoever keeps what was made so far.
+    """Carries what a function of the user raised to the code that keeps the states reached before it.
 
     Attributes
     ----------
@@ -294,8 +295,8 @@ class MethodBase(Called):
             object.__setattr__(self, name, value)
 
     def accepts(self, problem: Problem) -> str | None:
-        """Return ``None`` if the method can integrate ``problem``, else the reason."""
-        raise NotImplementedError
+        """Return ``None`` if the method can integrate ``problem``, else the reason; it can, by default."""
+        return None
 
     def caveat(self, problem: Problem) -> str | None:
         """Return why ``problem`` is outside what the method was made for although it runs, if it is."""

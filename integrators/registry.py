@@ -24,7 +24,7 @@ BUILT_IN = {
     ),
     "integrators.peers.scipy": ("DOP853", "Radau"),
 }  # fmt: skip
-"""Modules and the methods in them; a table, for to look into a module is to import it."""
+"""Modules and the methods in them; written down here, because looking into a module would import it."""
 
 
 def names() -> list[str]:

@@ -60,8 +60,7 @@ class Solution:
     events : dict of str to Occurrences
         Times, states and directions of the events that were asked for, by name.
     error : Exception or None
-        What a function of the user raised, or why that of an event could not be followed, where
-        ``status`` is ``USER_ERROR``.
+        What a function of the user raised, where ``status`` is ``USER_ERROR``.
     """
 
     t: Array

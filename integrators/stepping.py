@@ -24,6 +24,7 @@ from integrators.protocol import (
     Samples,
     Stats,
     Status,
+    UserError,
     check_parameters,
     check_start,
     check_state,
@@ -32,9 +33,6 @@ from integrators.protocol import (
 from integrators.times import plan
 from problems.errors import unknown
 from problems.problem import System
-
-STEPS_AT_ONCE = 1 << 14
-"""Steps of a `March` between two looks at Ctrl-C."""
 
 
 class ProgramBase:
@@ -209,7 +207,8 @@ class StepperBase:
     def _finite(self, t: float, y: Array) -> bool:
         if np.isfinite(y).all():
             return True
-        self._fail(Status.NOT_FINITE, t, f"the state is not finite at t = {t!r}.")
+        if not self._status.failed:
+            self._fail(Status.NOT_FINITE, t, f"the state is not finite at t = {t!r}.")
         return False
 
     def _fail(self, status: Status, t: float, reason: str) -> None:
@@ -218,7 +217,7 @@ class StepperBase:
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         """Return a leading part of ``grid`` (all of it ahead of the present) and the states there.
 
-        The last of these states may be the first that is not finite.
+        The last of these states may be the first that is not finite, which ends the integration.
         """
         raise NotImplementedError
 
@@ -263,11 +262,15 @@ class FixedStepper(StepperBase):
     """
 
     samplings = ("side", "steps", "land")
+    at_once = 1 << 14
+    """Steps between two looks at Ctrl-C."""
 
     def __init__(self, program: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
         self._program, self._par, self._here = program, par, y.copy()
         self._t0, self._n, self._h = t, 0, program.method.h
+        if not program.system.traced:  # slow anyway, and known is then which step it was that failed
+            self.at_once = 1
         if getattr(program.method, "evaluations", None) is not None:
             self._stats.evaluations = 0
 
@@ -281,11 +284,12 @@ class FixedStepper(StepperBase):
             self._restart(self._t, self._y, self._h)
 
     def _go(self, n: int) -> None:
-        """March to the step with number ``n``."""
-        if n > self._n:
-            self._march(n - self._n)
-            self._stats.steps += n - self._n
-            self._n = n
+        """March to the step with number ``n``, or to a failure."""
+        while self._n < n and not self._status.failed:
+            count = min(n - self._n, self.at_once)
+            self._march(count)
+            self._stats.steps += count
+            self._n += count
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         self._towards(float(grid[-1]))
@@ -338,12 +342,19 @@ class FixedStepper(StepperBase):
         self._load_steps(steps)
 
     def _march(self, count: int) -> None:
-        """Take ``count`` own steps."""
-        end = self._n + count
-        for n in range(self._n, end, STEPS_AT_ONCE):
-            t = self._t0 + n * self._h
-            self._program.march(t, self._h, min(STEPS_AT_ONCE, end - n), self._here, self._par)
+        """Take ``count`` own steps, no more than ``at_once``."""
+        self._steps(self._t0, self._h, self._n, count, self._here)
         self._evaluated(count)
+
+    def _steps(self, t: float, h: float, first: int, n: int, y: Array) -> None:
+        """Take steps by the program's `March`; where the user's own field raises, it fails and y is NaN."""
+        try:
+            self._program.march(t, h, first, n, y, self._par)
+        except Exception as error:
+            if self._program.system.traced:
+                raise
+            start, y[:], self.error = t + first * h, np.nan, error
+            self._fail(Status.USER_ERROR, start, f"{UserError(error)} in the step from t = {start!r}.")
 
     def _evaluated(self, steps: int) -> None:
         if (each := self._program.method.evaluations) is not None:
@@ -356,7 +367,7 @@ class FixedStepper(StepperBase):
     def _aside(self, part: float) -> Array:
         """Return the state a throw-away step of length ``part`` after the last own step."""
         y = self._here.copy()
-        self._program.march(self._time(), part, 1, y, self._par)
+        self._steps(self._time(), part, 0, 1, y)
         return y
 
     def _shorten(self, part: float) -> None:
@@ -378,9 +389,12 @@ class FixedStepper(StepperBase):
 
 
 class March(Protocol):
-    """Takes ``n`` steps of length ``h`` from the time ``t``; ``y``, shape (dim,), is changed in place."""
+    """Takes steps ``first`` ... ``first + n - 1`` of length ``h``, of which step i begins at ``t + i h``.
 
-    def __call__(self, t: float, h: float, n: int, y: Array, par: Array, /) -> object: ...
+    The state ``y``, shape (dim,), is changed in place.
+    """
+
+    def __call__(self, t: float, h: float, first: int, n: int, y: Array, par: Array, /) -> object: ...
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -388,9 +402,10 @@ class FixedStep(MethodBase):
     """Base of an integrator with a fixed step: a subclass says how it steps, all the rest is here.
 
     A subclass is a frozen dataclass. It states ``order``, ``library``, ``family``,
-    ``citation`` and ``evaluations``, says in `accepts` which problems it takes, and returns
-    from `march` the function that takes steps. Samples beside the steps and at them,
-    checkpoints, counters, failures and turning round come with it;
+    ``citation`` and ``evaluations`` (without annotations, which would make options of them),
+    says in `accepts` which problems it takes, if not all, and returns
+    from `march` the function that takes steps. Samples at the steps and between them,
+    checkpoints, counters, failures and integration backwards come with it;
     `integrators.testing.check_method` checks them all.
 
     Parameters
@@ -418,10 +433,14 @@ class FixedStep(MethodBase):
     evaluations: ClassVar[int | None] = None
 
     def march(self, system: System) -> March:
-        """Return the function that takes steps of ``system``, compiled if it shall be fast.
+        """Return the function that takes steps of ``system``, with numba if it shall be fast.
 
-        It must depend on nothing but its arguments: steps aside and checkpoints rely on that. It is
-        kept while ``system`` lives, and serves every ``h``.
+        ``problems.emit.numba(system, "field")`` is what it evaluates, ``f(t, y, par, out)``; of a separable
+        system also ``"force"``, p', and ``"velocity_scale"``, c with q' = c p. The field of a
+        `problems.Foreign` is Python: there the function runs as it was before numba compiled it.
+
+        It must depend on nothing but its arguments, because samples between steps and checkpoints rely
+        on that. It is kept while ``system`` lives, and serves every ``h``.
         """
         raise NotImplementedError
 
@@ -442,8 +461,10 @@ class FixedStepProgram(ProgramBase):
         known, key = _marches.setdefault(system, {}), replace(method, h=1.0)
         self.from_cache = key in known
         self.march = known[key] if self.from_cache else method.march(system)
-        # No step at all: what numba compiles at the first call belongs here.
-        self.march(0.0, method.h, 0, np.zeros(system.dim), system.pack())
+        if not system.traced:  # compiled code cannot call a field in Python
+            self.march = getattr(self.march, "py_func", self.march)
+        # No step at all: numba compiles at the first call, and its seconds belong here.
+        self.march(0.0, method.h, 0, 0, np.zeros(system.dim), system.pack())
         known[key] = self.march
         self.compile_seconds = perf_counter() - started
 

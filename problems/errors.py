@@ -63,8 +63,8 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> UnknownNameError:
     """
     names = sorted(known)
     folded = {candidate.casefold(): candidate for candidate in names}
-    word = "" if name is None else str(name).casefold()[:80]
-    near = [folded[match] for match in get_close_matches(word, folded, n=3, cutoff=0.5)]
+    given = "" if name is None else (name if isinstance(name, str) else shown(name)).casefold()[:80]
+    near = [folded[match] for match in get_close_matches(given, folded, n=3, cutoff=0.5)]
     if near:
         hint = "did you mean " + " or ".join(repr(candidate) for candidate in near) + "?"
     elif names:

@@ -20,7 +20,7 @@ NUMBERS = 1_000_000  # held at once, at most
 DEGREES = (8, 24, 64)  # of g along a step: the least, where s is not known, the most to begin with
 CLOSE = 64  # units in the last place: nothing happens in a time as short
 SAME = 1e-5  # of a step: two touches as close are one
-RESULTS = ("steps", "evaluations", "iterations")
+COUNTERS = ("steps", "evaluations", "iterations")
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Found:
     stats : Stats
         Counters of the work done.
     error : Exception or None
-        What a function of the user raised, or why it could not be followed.
+        What a function of the user raised.
     """
 
     events: dict[str, Occurrences]
@@ -124,7 +124,7 @@ class Search:
         stop = self._hits[-1].t if self._terminal is not None else self._t
         status, reason, error = self._outcome(stop, raised)
         steppers = (self._walker, self._probe)
-        work = {name: sum(getattr(stepper.stats, name) or 0 for stepper in steppers) for name in RESULTS}
+        work = {name: sum(getattr(stepper.stats, name) or 0 for stepper in steppers) for name in COUNTERS}
         return Found(
             events={name: self._occurrences(i) for i, name in enumerate(self._names)},
             t_stop=stop,

@@ -3,16 +3,14 @@
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from integrators.events.event import Event, named
 from integrators.events.search import search
 from integrators.options import Count
-from integrators.protocol import MethodBase, as_numbers, check_problem
+from integrators.protocol import MethodBase, check_problem
 from integrators.solution import Solution
 from problems import Problem
 from problems.checks import checked
-from problems.errors import InputError, shown
+from problems.errors import InputError
 
 
 def section(
@@ -60,16 +58,13 @@ def section(
     (3, 4)
     """
     check_problem(problem, method)
-    end = as_numbers("t_end of a section", problem.t_end if t_end is None else t_end)
-    if end.ndim or not np.isfinite(end) or end == problem.t0:
-        raise InputError(
-            f"t_end={shown(t_end)} of a section must be a finite time other than t0={problem.t0!r}."
-        )
-    if count is not None:
-        count = checked("a section", "count", count, Count)
+    end = checked("a section", "t_end", problem.t_end if t_end is None else t_end, float)
+    if end == problem.t0:
+        raise InputError(f"t_end={end!r} of a section must be another time than t0={problem.t0!r}.")
+    count = checked("a section", "count", count, Count | None)
     program = method.compile(problem.system)
-    events = named(Event(g, direction=direction, terminal=int(count or 0), name="section"))
-    found = search(problem, method, program, events, float(end))
+    events = named(Event(g, direction=direction, terminal=count or 0, name="section"))
+    found = search(problem, method, program, events, end)
     passages = found.events["section"]
     return Solution(
         t=passages.t,

@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike
 
 from integrators.kernel.context import ALWAYS_IMPLICIT, DENSE, DONE, LAND, SIDE, Context, Shape
 from integrators.kernel.native import engine
+from integrators.kernel.pace import Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.stepper import HBVMStepper, Program, failure
 from integrators.options import Count
-from integrators.pace import Pace
 from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
 from integrators.times import Counts, plan
 from problems.checks import checked

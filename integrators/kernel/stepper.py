@@ -27,11 +27,11 @@ from integrators.kernel.context import (
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.native import engine
+from integrators.kernel.pace import Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.one_thread import one_thread
 from integrators.options import SHORTEST
-from integrators.pace import Pace
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_state, check_times
 from integrators.times import Counts, plan
 from integrators.watchdog import Crawl

@@ -16,7 +16,7 @@ from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.stepping import ProgramBase, StepperBase
 from integrators.watchdog import Crawl
 from problems.errors import InputError
-from problems.problem import Problem, System
+from problems.problem import System
 
 RTOL_FLOOR = 100 * float(np.finfo(np.float64).eps)
 """SciPy silently raises a smaller rtol to this (`scipy.integrate._ivp.common.validate_tol`)."""
@@ -77,10 +77,6 @@ class _SciPyMethod(MethodBase):
                 f"rtol={self.rtol!r} is below what SciPy attains (100 times the double's epsilon); "
                 f"the least is rtol={RTOL_FLOOR!r}."
             )
-
-    def accepts(self, problem: Problem) -> str | None:
-        """Accept every system."""
-        return None
 
     def compile(self, system: System) -> "SciPyProgram":
         """Compile the vector field of ``system``."""

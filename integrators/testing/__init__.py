@@ -34,6 +34,7 @@ from integrators.testing.trajectory import (
     refuses_bad_times,
     repeats_itself,
     returns_the_times_asked_for,
+    samples_leave_the_steps_alone,
     samplings_work_or_are_refused,
     satisfies_the_protocol,
 )
@@ -63,6 +64,7 @@ CHECKS: tuple[Check, ...] = (
     returns_the_times_asked_for,
     repeats_itself,
     pieces_equal_the_whole,
+    samples_leave_the_steps_alone,
     checkpoints_continue_bit_for_bit,
     refuses_other_checkpoints,
     energy_stays_sane,

@@ -84,6 +84,20 @@ def pieces_equal_the_whole(method: MethodBase, problem: Problem) -> str | None:
     return None
 
 
+def samples_leave_the_steps_alone(method: MethodBase, problem: Problem) -> str | None:
+    """Check that states made beside the steps change nothing of the steps that follow."""
+    grid = irregular(problem)
+    try:
+        often = start(method, problem).advance(grid, sample="side")
+    except InputError:
+        return "it makes no states beside its steps"
+    once = start(method, problem).advance(grid[-1:], sample="side")
+    require(
+        np.array_equal(often.y[-1], once.y[-1]), f"samples leave the steps of {method!r} alone, bit for bit"
+    )
+    return None
+
+
 def samplings_work_or_are_refused(method: MethodBase, problem: Problem) -> str | None:
     """Check that each sampling serves the times or is refused; unknown ones are refused."""
     grid = irregular(problem)

@@ -219,11 +219,11 @@ section(P1, M1, osc, count='a')                              | count='a' of a se
 section(P1, M1, osc, count=True)                             | count=True of a section must be a whole number
 section(P1, M1, osc, count=1.5)                              | count=1.5 of a section must be a whole number
 section(P1, M1, osc, count=huge)                             | terminal=about 1e400 of an event must be
-section(P1, M1, osc, t_end='a')                              | t_end of a section must be numbers, not 'a'
-section(P1, M1, osc, t_end=nan)                              | t_end=nan of a section must be a finite time
-section(P1, M1, osc, t_end=0.)                               | t_end=0.0 of a section must be a finite time
+section(P1, M1, osc, t_end='a')                              | t_end='a' of a section must be a finite number
+section(P1, M1, osc, t_end=nan)                              | t_end=nan of a section must be a finite number
+section(P1, M1, osc, t_end=0.)                               | t_end=0.0 of a section must be another time
 section(P1, M1, osc, t_end=[1, 2])                           | t_end=[1, 2] of a section must be a finite
-section(P1, M1, osc, t_end=huge)                             | t_end of a section must be numbers, not about
+section(P1, M1, osc, t_end=huge)                             | t_end=about 1e400 of a section must be a finite
 section(P1, 'HBVM', osc)                                     | method must be a method such as HBVM(k=8,
 integrate(F(lambda t, y: [1]), M1)                           | system returns an array of shape (1,), not
 integrate(F(lambda t, y: 'ab'), M1)                          | system returns 'ab', not 2 numbers

@@ -34,10 +34,10 @@ class Yoshida6(FixedStep):
         force, scale, dof = emit.numba(system, "force"), emit.numba(system, "velocity_scale"), system.dof
 
         @numba.njit(error_model="numpy")
-        def march(t, h, n, y, par):
+        def march(t, h, first, n, y, par):
             q, p, c, F = y[:dof], y[dof:], np.empty(dof), np.empty(dof)
             scale(t, y, par, c)
-            for i in range(n):
+            for i in range(first, first + n):
                 now = t + i * h
                 for w in WEIGHTS:
                     q += 0.5 * w * h * (c * p)

@@ -36,7 +36,7 @@ FIRST_STEP = 0.01
 because the choice by the field asks for an `ODETerm` and is given a wrapped one."""
 
 MOST_STEPS = 1 << 24
-"""Of a plain adaptive solve, some ten seconds: then it has failed, and runs again under a watch."""
+"""Steps after which a plain adaptive solve, some ten seconds old, gives up and is run again under a watch."""
 
 SHORTENED = 1e-6
 """A step shorter than wanted by this part was shortened, and not only rounded."""

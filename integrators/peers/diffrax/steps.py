@@ -12,9 +12,6 @@ from integrators.watchdog import CRAWL_STEPS, Crawl
 from problems.errors import InputError
 from problems.problem import System
 
-CHUNK = 1 << 18
-"""Fixed steps between two looks at Ctrl-C: so many that the 0.1 ms of a call into JAX is nothing."""
-
 
 class DiffraxProgram(ProgramBase):
     """A solve that JAX has compiled ahead of time, for any start, parameters, step and tolerances.
@@ -66,6 +63,7 @@ class DiffraxStepper(FixedStepper):
     """
 
     samplings = (*FixedStepper.samplings, "end")
+    at_once = 1 << 18  # so many that the 0.1 ms of a call into JAX is nothing
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         super().__init__(program, y, par, t)
@@ -108,9 +106,7 @@ class DiffraxStepper(FixedStepper):
         return np.asarray(y), inner
 
     def _march(self, count: int) -> None:
-        end = self._n + count
-        for n in range(self._n, end, CHUNK):
-            self._states, self._inner = self._solve(self._t0, self._h, n, min(n + CHUNK, end))
+        self._states, self._inner = self._solve(self._t0, self._h, self._n, self._n + count)
         self._evaluated(count)
 
     def _state(self) -> Array:

@@ -58,7 +58,7 @@ class Lanes:
             t_stop=np.full(n, grid[-1]),
             steps=np.zeros(n, dtype=np.int64),
         )
-        # the last lanes begin as a trajectory that is there; what they do is not looked at
+        # A last group that is not full repeats the last trajectory in its spare lanes, which are not read.
         members = np.minimum(np.arange(-(-n // self.size) * self.size), n - 1).reshape(-1, self.size)
         states, values = (
             np.ascontiguousarray(rows[members].transpose(0, 2, 1)) for rows in (given, parameters)
@@ -99,7 +99,7 @@ class Lanes:
         return result
 
     def _one_by_one(self, result: Trajectories, members: Counts, place: int, t0: float) -> None:
-        """Take a group on, lane by lane, whose propagation to the time at ``place`` left some behind."""
+        """Integrate on a group of which some lanes did not reach the time at ``place``, lane by lane."""
         going = set(range(len(members)))
         before = np.full(self.size, result.t[place - 1] if place else t0)
         for number, time in enumerate(result.t[place:].tolist(), place):
@@ -122,8 +122,8 @@ class Lanes:
     ) -> None:
         """Bring the lanes that are going to a time, after a first propagation from ``before``.
 
-        Those that fail go no more, and say why. heyoka leaves a propagation as soon as one lane is
-        not finite, wherever the others are then: they are taken up again.
+        A lane that fails leaves ``going``, and its status and reason are noted. heyoka ends a propagation
+        as soon as one lane is not finite, wherever the others are then, so these are propagated again.
         """
         ta = self._ta
         watches = {lane: Crawl(float(before[lane]), time) for lane in going}
@@ -151,7 +151,7 @@ class Lanes:
             before = self._propagate(time)
 
     def _idle(self, going: set[int]) -> None:
-        """Have the lanes that are not going do what one that is does, so that they stop no other."""
+        """Set the lanes that have ended to the state of one that goes on, so that they do not stop it."""
         ta = self._ta
         idle = [lane for lane in range(self.size) if lane not in going]
         if not (idle and going):

@@ -96,7 +96,7 @@ class Taylor(MethodBase):
 
 
 class TaylorProgram(ProgramBase):
-    """A heyoka integrator, compiled for one system; each start has a copy, or one that another is done with.
+    """A heyoka integrator, compiled for one system; each start has a copy of it, new or left by another.
 
     heyoka keeps compiled code in memory and on disk (``~/.cache/heyoka``).
     ``from_cache`` is True where the code was found in memory, or the disk cache did

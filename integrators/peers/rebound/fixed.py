@@ -20,9 +20,6 @@ Corrector = Literal[0, 3, 5, 7, 11, 17]
 EVALUATIONS = {2: 1, 4: 3, 6: 9, 8: 17}
 """Force evaluations in a step of the leapfrog of each order."""
 
-CHUNK = 1 << 14
-"""Steps between two looks at Ctrl-C; the simulation's clock is set to t0 + n h at each."""
-
 DOMINANCE = 10.0
 """A body dominates if it has this many times the mass of all others together."""
 
@@ -232,11 +229,9 @@ class ReboundStepper(FixedStepper):
         self._simulation = simulation
 
     def _march(self, count: int) -> None:
-        simulation, n = self._simulation, self._n
         with calls(self._stats):
-            for done in range(0, count, CHUNK):
-                simulation.t = self._t0 + (n + done) * self._h
-                simulation.steps(min(CHUNK, count - done))
+            self._simulation.t = self._time()
+            self._simulation.steps(count)
         self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
 
     def _state(self) -> Array:

@@ -16,9 +16,6 @@ from integrators.protocol import Array
 from problems.problem import Problem, System
 
 MOST_BODIES = 9
-LONGEST = 1_000_000
-"""Steps that are taken at a time, REBOUND's own default."""
-
 ROOM = 64
 """Bytes for the processor's modes; C's ``fenv_t`` has 32 on x86-64."""
 
@@ -102,6 +99,7 @@ class Stepper512(ReboundStepper):
     """
 
     samplings = ("side", "steps")
+    at_once = 1_000_000  # REBOUND's own default
 
     def _restart(self, t: float, y: Array, h: float) -> None:
         super()._restart(t, y, h)
@@ -109,8 +107,7 @@ class Stepper512(ReboundStepper):
 
     def _march(self, count: int) -> None:
         with calls(self._stats):
-            for done in range(0, count, LONGEST):
-                self._leap(self._simulation, self._time() + done * self._h, min(LONGEST, count - done))
+            self._leap(self._simulation, self._time(), count)
 
     def _aside(self, part: float) -> Array:
         program = self._program

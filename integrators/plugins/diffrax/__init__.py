@@ -21,7 +21,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from integrators.legendre import polynomials, tables
+from integrators.options import Stages
 from integrators.peers import load
+from problems.checks import checked
 from problems.errors import InputError
 
 load("diffrax", "diffrax", "equinox", "jax", "lineax", "optimistix")
@@ -163,6 +165,11 @@ class _LineIntegral(dx.AbstractImplicitSolver[_Carried], dx.AbstractAdaptiveSolv
         return lx.GMRES(rtol=tolerance, atol=tolerance)
 
 
+def _count(name: str) -> Any:
+    """Return a field for a number of stages, checked as the option of `integrators.HBVM` is."""
+    return eqx.field(static=True, kw_only=True, converter=lambda n: checked("the solver", name, n, Stages))
+
+
 class HBVM(_LineIntegral):
     """HBVM(k, s), which conserves the energy, as a solver of diffrax.
 
@@ -190,14 +197,15 @@ class HBVM(_LineIntegral):
         If not k >= s >= 1.
     """
 
-    k: int = eqx.field(static=True, kw_only=True)
-    s: int = eqx.field(static=True, kw_only=True)
+    k: int = _count("k")
+    s: int = _count("s")
     root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
 
     def __check_init__(self) -> None:
-        _check(self.k, self.s)
+        if self.k < self.s:
+            raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")
 
 
 class Gauss(_LineIntegral):
@@ -214,13 +222,10 @@ class Gauss(_LineIntegral):
         As for `HBVM`.
     """
 
-    s: int = eqx.field(static=True, kw_only=True)
+    s: int = _count("s")
     root_finder: optx.AbstractRootFinder = eqx.field(default_factory=FixedPoint, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     root_find_max_steps: int = eqx.field(default=400, static=True, kw_only=True)  # pyright: ignore[reportIncompatibleVariableOverride]
     linear_solver: lx.AbstractLinearSolver | None = eqx.field(default=None, kw_only=True)
-
-    def __check_init__(self) -> None:
-        _check(self.s, self.s)
 
     @property
     def k(self) -> int:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -241,8 +246,3 @@ class _Equations(eqx.Module):
         values = jax.vmap(lambda t, y: terms.vf_prod(t, y, args, control))(times, stages)
         values = jax.tree.map(lambda f, g: f.astype(g.dtype), values, G)
         return jax.tree.map(lambda g, f: g - apply(table.projection.hi, f), G, values), values
-
-
-def _check(k: int, s: int) -> None:
-    if not (isinstance(k, int) and isinstance(s, int) and k >= s >= 1):
-        raise InputError(f"HBVM needs whole numbers k >= s >= 1, not k={k!r}, s={s!r}; Gauss needs s >= 1.")

@@ -31,9 +31,7 @@ TREE = 3  # of REBOUND's kinds of gravity
 
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 
-LARGEST = (
-    1e-3  # local error that a step may have, relative to the bodies' velocity, where nobody says otherwise
-)
+LARGEST = 1e-3  # by default, the local error that a step may have, relative to the bodies' velocity
 
 # Why a step fails.
 UNKNOWN_METHOD, DIVERGED, ROUGH, UNRESOLVED = range(4)

@@ -11,7 +11,7 @@ of a problem, the steps are the kernel's.
 """
 
 import warnings
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,9 @@ from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
-from problems.checks import checked
-from problems.errors import InputError
+from integrators.protocol import as_numbers
+from problems.checks import Positive, checked
+from problems.errors import InputError, shown
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
 
@@ -107,10 +108,19 @@ class HBVM(OdeSolver):
         self.s, every = checked(name, "s", s, Stages), checked(name, "every", every, Count)
         k = checked(name, "k", k, Stages | None)
         if k is not None and k < self.s:
-            raise InputError(f"HBVM needs k >= s; k={k} is less than s={s}: raise k or lower s.")
-        if interpolant not in ("step", "polynomial"):
-            raise InputError(f"interpolant must be 'step' or 'polynomial', not {interpolant!r}.")
-        self._bound(max_step, first_step, rtol, atol)
+            raise InputError(f"HBVM needs k >= s; k={k} is less than s={self.s}: raise k or lower s.")
+        interpolant = checked(name, "interpolant", interpolant, Literal["step", "polynomial"])
+        self.max_step = (
+            np.inf
+            if isinstance(max_step, float) and max_step == np.inf
+            else checked(name, "max_step", max_step, Positive)
+        )
+        first_step = checked(name, "first_step", first_step, Positive | None)
+        if first_step is not None and first_step > (span := abs(self.t_bound - self.t)):
+            raise InputError(
+                f"first_step={first_step!r} must not be beyond the end, {span!r} from the start."
+            )
+        self._tolerate(rtol, atol)
         if h is not None:
             h = checked(name, "h", h, Step)
             if k is None:
@@ -128,33 +138,30 @@ class HBVM(OdeSolver):
         if self._steps is None:
             if every != 1:
                 raise InputError(
-                    f"every={every} is for compiled fields, whose steps cost less than SciPy's loop over "
-                    "them; leave it out, or compile the function with numba."
+                    f"every={shown(every)} is for compiled fields, whose steps cost less than SciPy's loop "
+                    "over them; leave it out, or compile the function with numba."
                 )
             self._steps = PythonSteps(
                 self, k=k, s=self.s, h=h, first_step=first_step, jac=jac, jac_sparsity=jac_sparsity,
                 interpolant=interpolant,
             )  # fmt: skip
 
-    def _bound(self, max_step: float, first_step: float | None, rtol: Any, atol: Any) -> None:
-        """Keep the bounds of steps and errors, or refuse them."""
-        span = abs(self.t_bound - self.t)
-        if not max_step > 0.0:
-            raise InputError(f"max_step={max_step!r} must be > 0; leave it out for steps of any length.")
-        if first_step is not None and not 0.0 < first_step <= span:
-            raise InputError(
-                f"first_step={first_step!r} must be > 0 and not beyond the end, {span!r} from the start."
-            )
-        if np.any(np.asarray(rtol) < FLOOR):
+    def _tolerate(self, rtol: Any, atol: Any) -> None:
+        """Keep the tolerances, each a number or an array, or refuse them."""
+        relative, self.atol = as_numbers("rtol", rtol), as_numbers("atol", atol)
+        if np.any(relative < FLOOR):
             warnings.warn(
                 f"At least one element of rtol={rtol!r} is too small: {FLOOR:.3g} takes its place.",
                 stacklevel=3,
             )
-        self.max_step, self.rtol, self.atol = max_step, np.maximum(rtol, FLOOR), np.asarray(atol)
-        if self.atol.ndim > 0 and self.atol.shape != (self.n,):
-            raise InputError(f"atol of shape {self.atol.shape} must be a number, or have shape ({self.n},).")
-        if not np.all(self.atol >= 0.0):
-            raise InputError(f"atol={atol!r} must be >= 0.")
+        self.rtol = np.maximum(relative, FLOOR)
+        for which, values in (("rtol", self.rtol), ("atol", self.atol)):
+            if values.ndim > 0 and values.shape != (self.n,):
+                raise InputError(
+                    f"{which} of shape {values.shape} must be a number, or have shape ({self.n},)."
+                )
+        if not (np.all(self.atol >= 0.0) and np.isfinite(self.rtol).all()):
+            raise InputError(f"rtol={shown(rtol)} must be finite, and atol={shown(atol)} must be >= 0.")
 
     def _native(
         self, fun: Any, compiled: Field, k: int | None, h: float | None, first_step: float | None, every: int

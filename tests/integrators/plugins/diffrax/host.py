@@ -1,7 +1,7 @@
 """A pytest plugin that puts our methods into diffrax's own tests, in the place of its implicit solvers.
 
     git clone https://github.com/patrick-kidger/diffrax && cd diffrax
-    PYTHONPATH=<this directory> python -m pytest -o addopts= -p host_diffrax test
+    PYTHONPATH=<this directory> python -m pytest -o addopts= -p host test
 
 Wherever a test makes one of diffrax's implicit solvers it gets one of ours, and
 ``all_ode_solvers`` is ours alone. Tests that ask the class for its tableau see the

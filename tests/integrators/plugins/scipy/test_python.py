@@ -104,8 +104,8 @@ def test_what_the_function_raises_arrives_as_it_is(kind: type[BaseException], af
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"max_step": -1.0}, "max_step=-1.0 must be > 0"),
-        ({"first_step": 11.0}, r"first_step=11.0 must be > 0 and not beyond the end, 10\.0"),
+        ({"max_step": -1.0}, "max_step=-1.0 of HBVM must be a positive number"),
+        ({"first_step": 11.0}, r"first_step=11.0 must not be beyond the end, 10\.0"),
         ({"atol": [1e-6] * 3}, r"atol of shape \(3,\)"),
         ({"atol": -1e-6}, "atol=-1e-06 must be >= 0"),
         ({"jac": np.eye(3)}, r"jac.*\(2, 2\).*\(3, 3\)"),
