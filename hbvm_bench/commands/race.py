@@ -171,7 +171,7 @@ def _show(races: Sequence[Race]) -> None:
     for table in [tables.headline(races), tables.goals(races), *map(tables.fastest, races)]:
         if table.rows:
             terminal.print_table(table)
-    for said in dict.fromkeys(machine.sentence(race.machine) for race in races):
+    for said in machine.sentences(race.machine for race in races):
         terminal.console().print(said, highlight=False)
 
 

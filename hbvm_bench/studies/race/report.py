@@ -179,7 +179,7 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         # older results were timed in another way than the one that was checked
         "peers": peers.kept() if all(race.schema == SCHEMA for race in races) else None,
         "families": [(family.title, family.code) for family in FAMILIES.values()],
-        "processors": list(dict.fromkeys(machine.sentence(race.machine) for race in races)),
+        "processors": machine.sentences(race.machine for race in races),
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
         "command": commands(races),
