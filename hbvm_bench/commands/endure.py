@@ -1,6 +1,5 @@
 """``hbvm-bench endure``."""
 
-import dataclasses
 import math
 import shlex
 import sys
@@ -73,18 +72,17 @@ def endure(
 
 
 def as_data(result: Endurance) -> dict[str, Any]:
-    """Return the result with what is read off it, as plain data for JSON (no not-a-number, no infinity)."""
+    """Return the result with what is read off it, as plain data for JSON."""
     return {
-        "lines": [_finite(dataclasses.asdict(line)) for line in law.lines(result)],
-        "goals": [dataclasses.asdict(goal) for goal in law.goals(result)],
+        "lines": [_line(line) for line in law.lines(result)],
+        "goals": [msgspec.to_builtins(goal) for goal in law.goals(result)],
         "result": msgspec.to_builtins(result),
     }
 
 
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {f"{key:g}" if isinstance(key, float) else key: _finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _line(line: law.Line) -> dict[str, Any]:
+    rms = {f"{year:g}": value for year, value in line.rms.items()}
+    return msgspec.to_builtins(line) | {"rms": rms}
 
 
 def _run(request: Request) -> None:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import drift, machine
-from hbvm_bench.measure.drift import LAWS
 from hbvm_bench.report import shell
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
@@ -17,10 +16,11 @@ from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
-from hbvm_bench.studies.endure.law import goals, lines, mean_in_words
+from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance, of_method
 from hbvm_bench.studies.race.tables import NONE
 from hbvm_bench.summaries import peers
+from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import Table
 
@@ -83,12 +83,10 @@ def tables(result: Endurance) -> list[Table]:
                 line.method,
                 f"{line.starts}" + (f", {line.failed} failed" if line.failed else ""),
                 *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
-                NONE if law is None else LAWS[law.law] if law.law else law.why,
-                NONE
-                if law is None or not law.law
-                else f"{law.slope:.2f} ({law.slope_low:.2f} to {law.slope_high:.2f})",
-                NONE if law is None or law.mean is None else mean_in_words(law.mean),
-                NONE if law is None else f"{law.rate:+.1e} ({law.rate_low:+.1e} to {law.rate_high:+.1e})",
+                NONE if law is None else drift.LAWS[law.law] if law.law else law.why,
+                NONE if law is None or not law.law else power_of(law),
+                NONE if law is None or law.mean is None else mean_in_words(law),
+                NONE if law is None or law.rate is None else rate_in_words(law),
                 NONE if line.seconds is None else seconds(line.seconds),
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
@@ -187,7 +185,7 @@ def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[
         if law is not None and law.law is not None:
             at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
             traces.append(
-                Trace(look[method].number, method, at, law.curve(at, float(t[-1])), "law", LAWS[law.law])
+                Trace(look[method].number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law])
             )
     return Panel(
         "relative energy error, root mean square over the starts",
