@@ -95,7 +95,7 @@ def as_data(races: Sequence[Race]) -> dict[str, Any]:
                 "energy": verdict.goal.energy,
                 "position": verdict.goal.position,
                 "goal": verdict.goal.ratio,
-                **_ratio(verdict.ratio),
+                **_ratio(verdict.comparison),
                 "reached": verdict.reached,
             }
             for race, verdict in verdicts
@@ -120,15 +120,16 @@ def as_data(races: Sequence[Race]) -> dict[str, Any]:
     }
 
 
-def _ratio(ratio: standings.Ratio) -> dict[str, Any]:
+def _ratio(found: standings.Comparison) -> dict[str, Any]:
+    ratio = found.ratio
     return {
-        "ratio": ratio.value,
-        "low": ratio.low,
-        "high": ratio.high,
-        "ours": ratio.ours.setting.method if ratio.ours else None,
-        "ours_seconds": ratio.ours.median if ratio.ours else None,
-        "theirs": ratio.theirs.setting.method if ratio.theirs else None,
-        "theirs_seconds": ratio.theirs.median if ratio.theirs else None,
+        "ratio": ratio.median if ratio else None,
+        "low": ratio.low if ratio else None,
+        "high": ratio.high if ratio else None,
+        "ours": found.ours.setting.method if found.ours else None,
+        "ours_seconds": found.ours.median if found.ours else None,
+        "theirs": found.theirs.setting.method if found.theirs else None,
+        "theirs_seconds": found.theirs.median if found.theirs else None,
     }
 
 

@@ -9,7 +9,7 @@ import pytest
 rebound = pytest.importorskip("rebound")
 
 import integrators  # noqa: E402
-from hbvm_bench import plugin_costs  # noqa: E402
+from hbvm_bench.studies.plugins import costs  # noqa: E402
 from integrators import HBVM, Gauss  # noqa: E402
 from integrators.plugins.rebound import NAME, install  # noqa: E402
 from problems.errors import InputError  # noqa: E402
@@ -50,7 +50,7 @@ def test_energy_and_angular_momentum_are_kept_as_in_the_native_kernel(method: An
         q, p = y.reshape(2, -1, 3)
         return np.cross(q, p).sum(axis=0)
 
-    problem = plugin_costs._planets(masses, flat())
+    problem = costs._planets(masses, flat())
     install(simulation, method)
     simulation.steps(STEPS)
     plugin = flat()
