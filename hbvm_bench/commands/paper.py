@@ -81,7 +81,7 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
 
 def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
     """Write the documents, figures and data of parts that are computed already."""
-    from hbvm_bench.studies.paper.page import as_csv, claims_csv, flat_heads, markdown, page
+    from hbvm_bench.studies.paper.page import as_csv, claims_csv, markdown, page
 
     files: dict[str, bytes] = {
         "report.md": markdown(parts, command).encode(),
@@ -95,7 +95,7 @@ def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
             if picture.plot is not None:
                 files[f"data/{picture.key}.csv"] = plots.as_csv(picture.plot).encode()
         for table in part.tables:
-            files[f"data/{table.key}.csv"] = as_csv([flat_heads(table), *table.rows]).encode()
+            files[f"data/{table.key}.csv"] = as_csv([table.flat_head, *table.rows]).encode()
     write_all({directory / name: data for name, data in files.items()})
 
 

@@ -141,7 +141,7 @@ def table(result: PeerCheck) -> Table:
         f"which our adapter sets to whole steps. Measured on {result.measured[:10]}"
         f"{'' if result.sources == now else ', with an earlier version of this code'}, with {versions}. "
         f"{machine.sentence(result.machine)} To repeat it: {COMMAND}.",
-        words=(1, 2),
+        words=(0, 1, 2),
     )
 
 

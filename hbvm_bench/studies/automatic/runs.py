@@ -255,7 +255,7 @@ def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
         rows,
         "The median of the ratio within each round, and whether it reaches the goal declared before; not as "
         "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -282,7 +282,7 @@ def sides(found: Sequence[Duel]) -> Table:
         "Errors and times",
         ("problem", "goal", "Taylor / HBVM", "quartiles", "method", "time", "steps", "energy", "position"),
         rows,
-        words=(4,),
+        words=(0, 4),
     )
 
 

@@ -103,7 +103,7 @@ def tables(result: Endurance) -> list[Table]:
             + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
             + "Power of t and drift per year with 95 % "
             "intervals over the starts. Time: median of one trajectory.",
-            words=(2 + len(heads),),
+            words=(0, 2 + len(heads)),
         )
     ]
     asked = goals(result)
@@ -113,7 +113,7 @@ def tables(result: Endurance) -> list[Table]:
                 "Goals declared before the run",
                 ("goal", "measured", "verdict"),
                 [(goal.words, goal.measured, "reached" if goal.reached else "missed") for goal in asked],
-                words=(1, 2),
+                words=(0, 1, 2),
             )
         )
     return made

@@ -58,7 +58,7 @@ def behind(races: Sequence[Race]) -> Table:
         "The settings behind these ratios",
         ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
         rows,
-        words=tuple(range(1, len(peers) + 2)),
+        words=range(len(peers) + 2),
     )
 
 
@@ -86,7 +86,7 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
         "How many times as long as our fastest setting each peer's fastest takes. "
         + machine.COLUMNS
         + " Left out: peers without a ratio anywhere.",
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -111,7 +111,7 @@ def goals(races: Sequence[Race]) -> Table:
         "Goals declared before the race",
         ("problem", "peer", "energy, position", "goal", "measured", "verdict"),
         rows,
-        words=(1, 5),
+        words=(0, 1, 5),
     )
 
 
@@ -143,7 +143,7 @@ def fastest(race: Race) -> Table:
         f"The fastest settings with energy error ≤ {power(energy)} and position error ≤ {power(position)}",
         ("family", "setting", "time", "energy", "position", "steps", "evaluations", "× ours"),
         rows,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -166,7 +166,7 @@ def levels(race: Race) -> Table:
         "At other accuracies",
         ("energy, position ≤", "our fastest", "time", *(f"{FAMILIES[p].short} × ours" for p in peers)),
         rows,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -196,7 +196,7 @@ def defaults(race: Race) -> Table | None:
         ("default", "time", "energy", "position", "ours", "time", "× ours"),
         rows,
         "A fixed step has no default: ours is chosen, theirs is not.",
-        words=(4,),
+        words=(0, 4),
     )
 
 
@@ -212,7 +212,7 @@ def compiling(race: Race) -> Table | None:
             for probe in race.probes
         ],
         "Medians. The whole process includes starting Python and importing everything.",
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -240,7 +240,7 @@ def everything(race: Race) -> Table:
         rows,
         "Time: median of a run, with its quartiles. Call: a run that goes next to nowhere, which bounds the "
         "overhead in each time. Brackets: void.",
-        words=(7,),
+        words=(0, 7),
     )
 
 
