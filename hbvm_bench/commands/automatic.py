@@ -9,9 +9,7 @@ from typing import Annotated
 
 import msgspec
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
@@ -19,6 +17,7 @@ from hbvm_bench.run import processes
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
 from hbvm_bench.studies.general import runs as general_
+from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
 
@@ -88,27 +87,27 @@ def _measured(
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:
-    table = Table(
-        "problem", "method", "end", "energy", "steps", "evaluations", "ms", "solver",
-        box=box.SIMPLE_HEAD, pad_edge=False,
-    )  # fmt: skip
     with console.status("compiling") as status:
         found = general_.outcomes(names, limit, lambda text: status.update(f"running {text}"))
-    before = ""
-    for run in found:
-        table.add_row(
-            "" if run.problem == before else run.problem, run.method,
+    rows = [
+        (
+            "" if before is not None and run.problem == before.problem else run.problem,
+            run.method,
             "" if math.isnan(run.error) else f"{run.error:.1e}",
             "" if math.isnan(run.energy) else f"{run.energy:.1e}",
-            str(run.steps), str(run.evaluations), f"{1e3 * run.seconds:.3g}", run.ending or run.solver,
-        )  # fmt: skip
-        before = run.problem
-    console.print(table)
-    console.print(
+            str(run.steps),
+            str(run.evaluations),
+            f"{1e3 * run.seconds:.3g}",
+            run.ending or run.solver,
+        )
+        for before, run in zip((None, *found), found, strict=False)
+    ]
+    head = ("problem", "method", "end", "energy", "steps", "evaluations", "ms", "solver")
+    note = (
         "end: error of the end, of van der Pol and Robertson relative; energy: largest error on the way. "
-        "An evaluation is one of the field at one state; ours evaluates 8 or 16 at a time.",
-        style="dim",
+        "An evaluation is one of the field at one state; ours evaluates 8 or 16 at a time."
     )
+    terminal.print_table(Table("", head, rows, note, words=(0, 1, 7)))
 
 
 __all__ = ["automatic"]

@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import drift, machine
 from hbvm_bench.report import shell
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
 from hbvm_bench.report.figures.png import small
-from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
+from hbvm_bench.report.figures.style import INK, MUTED, Look, base_looks
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
@@ -40,7 +39,7 @@ def write(result: Endurance, directory: Path) -> Path:
     problems.errors.InputError
         If the directory cannot be written.
     """
-    look = looks(result)
+    look = base_looks(result.methods)
     made = over_time(result, look)
     shown = [*tables(result), *filter(None, [peers.kept()])]
     content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
@@ -59,16 +58,6 @@ def write(result: Endurance, directory: Path) -> Path:
         files[f"data/{one.key}.csv"] = data["csv"].encode()
     write_all({directory / name: text for name, text in files.items()})
     return directory / "README.md"
-
-
-def looks(result: Endurance) -> dict[str, Look]:
-    """Return the look of every method, by its text."""
-    made: dict[str, Look] = {}
-    for number, method in enumerate(result.methods, 1):
-        name = parse_spec(method).name
-        dash = DASHES[sum(parse_spec(other).name == name for other in made) % len(DASHES)]
-        made[method] = Look(number, *base_colours(name), dash=dash, marker=MARKERS.get(name, UNKNOWN_MARKER))
-    return made
 
 
 def tables(result: Endurance) -> list[Table]:
