@@ -1,19 +1,17 @@
 """The command ``hbvm-bench automatic``."""
 
 import math
-import shlex
 import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 from rich.console import Console
 
+from hbvm_bench.commands import measuring
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.run import processes
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
 from hbvm_bench.studies.general import runs as general_
@@ -64,25 +62,16 @@ def _measured(
     environment = machine.restricted_to_avx2() if avx2 else {}
     if out is not None:
         ensure_writable(out)
-    words = ["hbvm-bench", "automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
-    words += [] if out is None or out.is_absolute() else ["--out", str(out)]
-    request = automatic_.Request(
-        problems=keys, rounds=rounds, command=shlex.join(words), out=str(scratch / "result.json")
-    )
-    path = scratch / "request.json"
-    path.write_bytes(msgspec.json.encode(request))
-    try:
-        code = processes.wait(
-            [sys.executable, "-m", "hbvm_bench.studies.automatic.runs", str(path)], environment
-        )
-    except KeyboardInterrupt:
-        raise typer.Exit(130) from None
+    words = ["automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
+    command, made = measuring.command(words, out), scratch / "result.json"
+    request = automatic_.Request(problems=keys, rounds=rounds, command=command, out=str(made))
+    code = measuring.measure("hbvm_bench.studies.automatic.runs", request, environment)
     if code == 2:  # it has said why
         raise typer.Exit(2)
     if code != 0:
         print(f"hbvm-bench: the process that measures ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(1)
-    (result,) = automatic_.load(scratch / "result.json")
+    (result,) = automatic_.load(made)
     return result
 
 
