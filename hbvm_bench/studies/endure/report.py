@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
 from hbvm_bench.report import shell
+from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
-from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import INK, MUTED, Look, base_looks
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
@@ -52,10 +52,7 @@ def write(result: Endurance, directory: Path) -> Path:
     data = {"csv": as_csv(made.plot)} if made is not None and made.plot is not None else {}
     more = shell.values(pictures, list(look.values()), data=data)
     files["index.html"] = page.render(title=TITLE, **content, **more).encode()
-    for one in pictures:
-        files[f"figures/{one.key}.svg"] = one.svg.encode()
-        files[f"figures/{one.key}.png"] = small(one.png)
-        files[f"data/{one.key}.csv"] = data["csv"].encode()
+    files |= canvas.files(pictures)
     write_all({directory / name: text for name, text in files.items()})
     return directory / "README.md"
 
