@@ -1,24 +1,21 @@
 """The command ``hbvm-bench automatic``."""
 
 import math
-import shlex
 import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
+from hbvm_bench.commands import measuring
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.run import processes
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
 from hbvm_bench.studies.general import runs as general_
+from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
 
@@ -65,50 +62,41 @@ def _measured(
     environment = machine.restricted_to_avx2() if avx2 else {}
     if out is not None:
         ensure_writable(out)
-    words = ["hbvm-bench", "automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
-    words += [] if out is None or out.is_absolute() else ["--out", str(out)]
-    request = automatic_.Request(
-        problems=keys, rounds=rounds, command=shlex.join(words), out=str(scratch / "result.json")
-    )
-    path = scratch / "request.json"
-    path.write_bytes(msgspec.json.encode(request))
-    try:
-        code = processes.wait(
-            [sys.executable, "-m", "hbvm_bench.studies.automatic.runs", str(path)], environment
-        )
-    except KeyboardInterrupt:
-        raise typer.Exit(130) from None
+    words = ["automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
+    command, made = measuring.command(words, out), scratch / "result.json"
+    request = automatic_.Request(problems=keys, rounds=rounds, command=command, out=str(made))
+    code = measuring.measure("hbvm_bench.studies.automatic.runs", request, environment)
     if code == 2:  # it has said why
         raise typer.Exit(2)
     if code != 0:
         print(f"hbvm-bench: the process that measures ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(1)
-    (result,) = automatic_.load(scratch / "result.json")
+    (result,) = automatic_.load(made)
     return result
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:
-    table = Table(
-        "problem", "method", "end", "energy", "steps", "evaluations", "ms", "solver",
-        box=box.SIMPLE_HEAD, pad_edge=False,
-    )  # fmt: skip
     with console.status("compiling") as status:
         found = general_.outcomes(names, limit, lambda text: status.update(f"running {text}"))
-    before = ""
-    for run in found:
-        table.add_row(
-            "" if run.problem == before else run.problem, run.method,
+    rows = [
+        (
+            "" if before is not None and run.problem == before.problem else run.problem,
+            run.method,
             "" if math.isnan(run.error) else f"{run.error:.1e}",
             "" if math.isnan(run.energy) else f"{run.energy:.1e}",
-            str(run.steps), str(run.evaluations), f"{1e3 * run.seconds:.3g}", run.ending or run.solver,
-        )  # fmt: skip
-        before = run.problem
-    console.print(table)
-    console.print(
+            str(run.steps),
+            str(run.evaluations),
+            f"{1e3 * run.seconds:.3g}",
+            run.ending or run.solver,
+        )
+        for before, run in zip((None, *found), found, strict=False)
+    ]
+    head = ("problem", "method", "end", "energy", "steps", "evaluations", "ms", "solver")
+    note = (
         "end: error of the end, of van der Pol and Robertson relative; energy: largest error on the way. "
-        "An evaluation is one of the field at one state; ours evaluates 8 or 16 at a time.",
-        style="dim",
+        "An evaluation is one of the field at one state; ours evaluates 8 or 16 at a time."
     )
+    terminal.print_table(Table("", head, rows, note, words=(0, 1, 7)))
 
 
 __all__ = ["automatic"]

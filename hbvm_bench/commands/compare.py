@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from hbvm_bench.report import terminal
 from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import compare as comparing
+from hbvm_bench.summaries.table import Table
 
 CHANGED = 1
 
@@ -49,7 +48,7 @@ def _print(found: comparing.Comparison, console: Console, first: str, second: st
         f"numerical metrics of {found.cases} cases: {numbers + changed} compared, {found.equal} equal, "
         f"{found.rounded} within rounding, {changed} changed; {endings} outcomes changed"
     )
-    _table(console, found.changed, first, second)
+    _table(found.changed, first, second)
     if found.noise is not None:
         within = found.timed - len(found.slower) - len(found.faster)
         console.print(
@@ -57,21 +56,18 @@ def _print(found: comparing.Comparison, console: Console, first: str, second: st
             f"noise (a factor of {found.noise:.2f} in a typical case), {len(found.slower)} slower, "
             f"{len(found.faster)} faster"
         )
-    _table(console, [*found.slower, *found.faster], first, second)
+    _table([*found.slower, *found.faster], first, second)
     for sentence in found.untimed:
         console.print(Text(f"time not compared: {sentence}"))
     if found.unchanged:
         console.print("nothing changed beyond noise.")
 
 
-def _table(console: Console, changes: Sequence[comparing.Change], first: str, second: str) -> None:
-    if not changes:
-        return
-    made = Table("problem", "method", "what", first, second, box=box.SIMPLE_HEAD, pad_edge=False)
-    for change in changes:
-        cells = (change.problem, change.method, change.what, change.before, change.after)
-        made.add_row(*(Text(cell) for cell in cells))
-    console.print(made)
+def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None:
+    rows = [(one.problem, one.method, one.what, one.before, one.after) for one in changes]
+    if rows:
+        head = ("problem", "method", "what", first, second)
+        terminal.print_table(Table("", head, rows, words=range(len(head))))
 
 
 __all__ = ["compare"]

@@ -6,11 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 from rich.table import Table
 from rich.text import Text
 
+from hbvm_bench.commands import measuring
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable, write_json
@@ -53,17 +53,15 @@ def doctor(
 
 
 def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
-    from hbvm_bench.run import processes
     from hbvm_bench.studies.peers import check
     from hbvm_bench.summaries import peers
 
     if out is not None:
         ensure_writable(out.parent)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        made, request = Path(scratch) / "result.json", Path(scratch) / "request.json"
-        asked = check.Request(out=str(made), rounds=rounds or check.ROUNDS)
-        request.write_bytes(msgspec.json.encode(asked))
-        code = processes.wait([sys.executable, "-m", "hbvm_bench.studies.peers.check", str(request)])
+        made = Path(scratch) / "result.json"
+        request = check.Request(out=str(made), rounds=rounds or check.ROUNDS)
+        code = measuring.measure("hbvm_bench.studies.peers.check", request)
         result = peers.load(made)
     if code != 0 or result is None:
         print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)

@@ -1,10 +1,7 @@
 """``hbvm-bench endure``."""
 
-import dataclasses
 import math
-import shlex
 import sys
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,9 +9,9 @@ import msgspec
 import typer
 
 from hbvm_bench.campaign.identity import make_method
+from hbvm_bench.commands import measuring
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.run import processes
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.endure import law, runs
 from hbvm_bench.studies.endure.runs import Endurance, Request
@@ -73,33 +70,22 @@ def endure(
 
 
 def as_data(result: Endurance) -> dict[str, Any]:
-    """Return the result with what is read off it, as plain data for JSON (no not-a-number, no infinity)."""
+    """Return the result with what is read off it, as plain data for JSON."""
     return {
-        "lines": [_finite(dataclasses.asdict(line)) for line in law.lines(result)],
-        "goals": [dataclasses.asdict(goal) for goal in law.goals(result)],
+        "lines": [_line(line) for line in law.lines(result)],
+        "goals": [msgspec.to_builtins(goal) for goal in law.goals(result)],
         "result": msgspec.to_builtins(result),
     }
 
 
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {f"{key:g}" if isinstance(key, float) else key: _finite(item) for key, item in value.items()}
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+def _line(line: law.Line) -> dict[str, Any]:
+    rms = {f"{year:g}": value for year, value in line.rms.items()}
+    return msgspec.to_builtins(line) | {"rms": rms}
 
 
 def _run(request: Request) -> None:
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        path = Path(scratch) / "request.json"
-        path.write_bytes(msgspec.json.encode(request))
-        try:
-            code = processes.wait([sys.executable, "-m", "hbvm_bench.studies.endure.runs", str(path)])
-        except KeyboardInterrupt:
-            print(
-                f"hbvm-bench: interrupted; the starts that had ended are kept in {request.out}; "
-                "--redraw shows them.",
-                file=sys.stderr,
-            )
-            raise typer.Exit(130) from None
+    kept = f"the starts that had ended are kept in {request.out}"
+    code = measuring.measure("hbvm_bench.studies.endure.runs", request, kept=kept)
     if code != 0:
         print(f"hbvm-bench: the process that integrates ended with exit code {code}.", file=sys.stderr)
         raise typer.Exit(1)
@@ -108,10 +94,9 @@ def _run(request: Request) -> None:
 def _command(
     years: float | None, starts: int | None, method: list[str] | None, quick: bool, out: Path
 ) -> str:
-    words = ["hbvm-bench", "endure"]
+    words = ["endure"]
     words += ["--years", f"{years:g}"] if years is not None else []
     words += ["--starts", str(starts)] if starts is not None else []
     words += [word for text in method or [] for word in ("--method", text)]
     words += ["--quick"] if quick else []
-    words += [] if out.is_absolute() else ["--out", str(out)]  # a path of this machine is nobody else's
-    return shlex.join(words)
+    return measuring.command(words, out)

@@ -3,13 +3,11 @@
 from typing import Annotated
 
 import typer
-from rich import box
-from rich.table import Table
-from rich.text import Text
 
 import problems
 from hbvm_bench.report import terminal
 from hbvm_bench.summaries import engines as engines_
+from hbvm_bench.summaries.table import Table
 from problems.errors import unknown
 
 
@@ -26,14 +24,13 @@ def engines(
         return
     columns, rows = engines_.matrix(names or [])
     listed = engines_.notes(rows)
-    table = Table("problem", *columns, box=box.SIMPLE_HEAD, pad_edge=False)
-    for name, row in rows.items():
-        cells = ["yes" if row[c] is None else str(listed.index(row[c] or "") + 1) for c in columns]
-        table.add_row(Text(name), *cells)
-    console = terminal.console()
-    console.print(table)
+    cells = [
+        (name, *("yes" if row[c] is None else str(listed.index(row[c] or "") + 1) for c in columns))
+        for name, row in rows.items()
+    ]
+    terminal.print_table(Table("", ("problem", *columns), cells, words=range(len(columns) + 1)))
     for i, reason in enumerate(listed, start=1):
-        console.print(f"{i}. {reason}", highlight=False)
+        terminal.console().print(f"{i}. {reason}", highlight=False)
 
 
 __all__ = ["engines"]

@@ -1,6 +1,5 @@
 """The command ``hbvm-bench headline``."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ from hbvm_bench.report.markdown import in_markdown, plain
 from hbvm_bench.studies.automatic import runs as automatic
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.contests import CONTESTS
-from hbvm_bench.studies.race.results import Race
 from problems.errors import InputError
 
 
@@ -29,7 +27,7 @@ def headline(
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
     parts = []
     for kind, found in races.items():
-        parts += [f"**{plain(kind)}**", *(plain(said) for said in _processors(found))]
+        parts += [f"**{plain(kind)}**", *map(plain, machine.sentences(race.machine for race in found))]
         shown = [tables.headline(found), tables.goals(found), tables.behind(found)]
         parts += [in_markdown(table) for table in shown if table.rows]
         parts += dict.fromkeys(plain(said) for race in found for said in report.earlier_definition(race))
@@ -37,12 +35,8 @@ def headline(
     if duels:
         parts += [in_markdown(automatic.ratios(duels))]
         for kind, runs in duels.items():
-            parts += [plain(f"{kind}: {said}") for said in _processors(runs)]
+            parts += [plain(f"{kind}: {said}") for said in machine.sentences(run.machine for run in runs)]
     print("\n\n".join(parts))
-
-
-def _processors(measured: Sequence[Race] | Sequence[automatic.Result]) -> list[str]:
-    return list(dict.fromkeys(machine.sentence(one.machine) for one in measured))
 
 
 __all__ = ["headline"]

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hbvm_bench.report import terminal
-from hbvm_bench.report.figures import plots
-from hbvm_bench.report.figures.png import small
 from hbvm_bench.store.files import ensure_writable, write_all
 from problems.errors import unknown
 
@@ -81,7 +79,8 @@ def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: st
 
 def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
     """Write the documents, figures and data of parts that are computed already."""
-    from hbvm_bench.studies.paper.page import as_csv, claims_csv, flat_heads, markdown, page
+    from hbvm_bench.report.figures import canvas
+    from hbvm_bench.studies.paper.page import as_csv, claims_csv, markdown, page
 
     files: dict[str, bytes] = {
         "report.md": markdown(parts, command).encode(),
@@ -89,13 +88,9 @@ def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
         "data/claims.csv": claims_csv(parts).encode(),
     }
     for part in parts:
-        for picture in part.pictures:
-            files[f"figures/{picture.key}.svg"] = picture.svg.encode()
-            files[f"figures/{picture.key}.png"] = small(picture.png)
-            if picture.plot is not None:
-                files[f"data/{picture.key}.csv"] = plots.as_csv(picture.plot).encode()
+        files |= canvas.files(part.pictures)
         for table in part.tables:
-            files[f"data/{table.key}.csv"] = as_csv([flat_heads(table), *table.rows]).encode()
+            files[f"data/{table.key}.csv"] = as_csv([table.flat_head, *table.rows]).encode()
     write_all({directory / name: data for name, data in files.items()})
 
 

@@ -1,8 +1,6 @@
 """``hbvm-bench race``."""
 
-import shlex
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,9 +9,9 @@ import msgspec
 import typer
 from rich.text import Text
 
+from hbvm_bench.commands import measuring
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.run import processes
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.race import results, standings, tables
 from hbvm_bench.studies.race.child import Request
@@ -95,7 +93,7 @@ def as_data(races: Sequence[Race]) -> dict[str, Any]:
                 "energy": verdict.goal.energy,
                 "position": verdict.goal.position,
                 "goal": verdict.goal.ratio,
-                **_ratio(verdict.ratio),
+                **_ratio(verdict.comparison),
                 "reached": verdict.reached,
             }
             for race, verdict in verdicts
@@ -120,15 +118,16 @@ def as_data(races: Sequence[Race]) -> dict[str, Any]:
     }
 
 
-def _ratio(ratio: standings.Ratio) -> dict[str, Any]:
+def _ratio(found: standings.Comparison) -> dict[str, Any]:
+    ratio = found.ratio
     return {
-        "ratio": ratio.value,
-        "low": ratio.low,
-        "high": ratio.high,
-        "ours": ratio.ours.setting.method if ratio.ours else None,
-        "ours_seconds": ratio.ours.median if ratio.ours else None,
-        "theirs": ratio.theirs.setting.method if ratio.theirs else None,
-        "theirs_seconds": ratio.theirs.median if ratio.theirs else None,
+        "ratio": ratio.median if ratio else None,
+        "low": ratio.low if ratio else None,
+        "high": ratio.high if ratio else None,
+        "ours": found.ours.setting.method if found.ours else None,
+        "ours_seconds": found.ours.median if found.ours else None,
+        "theirs": found.theirs.setting.method if found.theirs else None,
+        "theirs_seconds": found.theirs.median if found.theirs else None,
     }
 
 
@@ -137,21 +136,9 @@ def _run(request: Request, environment: Mapping[str, str]) -> list[str]:
     keys = request.contests
     failed: list[str] = []
     for group in [keys] if request.quick else [[key] for key in keys]:
-        with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-            path = Path(scratch) / "request.json"
-            path.write_bytes(msgspec.json.encode(msgspec.structs.replace(request, contests=group)))
-            try:
-                code = processes.wait(
-                    [sys.executable, "-m", "hbvm_bench.studies.race.child", str(path)], environment
-                )
-            except KeyboardInterrupt:
-                print(
-                    f"hbvm-bench: interrupted; the problems that had ended are kept in {request.out}; "
-                    "--redraw shows them.",
-                    file=sys.stderr,
-                )
-                raise typer.Exit(130) from None
-        if code != 0:
+        asked = msgspec.structs.replace(request, contests=group)
+        kept = f"the problems that had ended are kept in {request.out}"
+        if measuring.measure("hbvm_bench.studies.race.child", asked, environment, kept) != 0:
             failed += group
     return failed
 
@@ -171,7 +158,7 @@ def _show(races: Sequence[Race]) -> None:
     for table in [tables.headline(races), tables.goals(races), *map(tables.fastest, races)]:
         if table.rows:
             terminal.print_table(table)
-    for said in dict.fromkeys(machine.sentence(race.machine) for race in races):
+    for said in machine.sentences(race.machine for race in races):
         terminal.console().print(said, highlight=False)
 
 
@@ -183,11 +170,10 @@ def _command(
     avx2: bool,
     out: Path,
 ) -> str:
-    words = ["hbvm-bench", "race"]
+    words = ["race"]
     words += [word for key in problem or [] for word in ("--problem", key)]
     words += ["--quick"] if quick else []
     words += ["--rounds", str(rounds)] if rounds else []
     words += [] if compile_times is None else ["--compile" if compile_times else "--no-compile"]
     words += ["--avx2"] if avx2 else []
-    words += [] if out.is_absolute() else ["--out", str(out)]  # a path of this machine is nobody else's
-    return shlex.join(words)
+    return measuring.command(words, out)

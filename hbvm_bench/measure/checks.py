@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Checks
-from hbvm_bench.measure import laws
+from hbvm_bench.measure import drift
 from hbvm_bench.measure.measured import Measured, largest_distance, positions
 from hbvm_bench.measure.starts import scaled
 from hbvm_bench.store.records import Law
@@ -69,7 +69,7 @@ def check(measured: Measured, method: MethodBase, program: Program, asked: Check
             series.append(_errors(problem, start, measured.t, samples.y))
     errors = {name: np.stack([one[name] for one in series])[:, later] for name in series[0]}
     found = {
-        name: laws.find(t[later], rows, signed=name == "energy") if rows.shape[1] else Law(why="no samples")
+        name: drift.fit(t[later], rows, signed=name == "energy") if rows.shape[1] else Law(why="no samples")
         for name, rows in errors.items()
     }
     return Checked(laws=found, t=t[later], errors=errors, reversal=back)

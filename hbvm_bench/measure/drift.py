@@ -18,8 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import ArrayLike, NDArray
 
+from hbvm_bench.store.records import Law
 from problems.errors import InputError
 
 Array = NDArray[np.float64]
@@ -45,98 +47,34 @@ LAWS: dict[str, str] = {
 CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is told by the mean
 
 
-@dataclass(frozen=True)
-class Mean:
-    """The mean of signed errors over the starts, at the end and without the offset of each.
+def curve(law: Law, t: ArrayLike) -> Array:
+    """Return a law as it was fitted, shape (n,), for drawing; not-a-number where there is none.
 
-    Attributes
+    Parameters
     ----------
-    value, error : float
-        The mean and its standard error, which is infinite for one start.
-    low, high : float
-        The 95 % Student interval.
-    positive, starts : int
-        How many of the starts end above 0.
-    span : float
-        Time in which it grew.
+    law : Law
+        What `fit` returned.
+    t : array_like, shape (n,)
+        Times since the start, positive.
     """
-
-    value: float
-    error: float
-    low: float
-    high: float
-    positive: int
-    starts: int
-    span: float
-
-    @property
-    def drifts(self) -> bool | None:
-        """Whether the mean is more than `limit` standard errors from 0; ``None`` for one start."""
-        return None if self.starts < 2 else abs(self.value) > limit(self.starts) * self.error
+    times = np.asarray(t, dtype=np.float64)
+    if law.law is None:
+        return np.full(times.shape, math.nan)
+    if law.law == "exponential":
+        growth = math.nan if law.growth is None else law.growth
+        grown = np.exp(np.minimum(growth * (times - law.end), 0.0))
+    else:
+        slope = math.nan if law.slope is None else law.slope
+        power = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}.get(law.law, slope)
+        grown = (times / law.end) ** power
+    return np.hypot(law.floor, law.reached * grown)
 
 
-@dataclass(frozen=True)
-class Drift:
-    """The law of an error, as far as the samples show it.
-
-    Attributes
-    ----------
-    law : str or None
-        A key of `LAWS`; ``None`` where the samples do not say, with the reason in ``why``.
-    why : str
-        Why there is no law.
-    slope, slope_low, slope_high : float
-        Power of t with its 95 % interval (from leaving out one start at a time, or from
-        the scatter about the fit where there are fewer than three starts); infinite
-        interval where neither is possible.
-    floor : float
-        What is there before the growth: the smallest rms that the fit sees.
-    growth : float
-        With the exponential law, the rate in 1/t; else 0.
-    rate, rate_low, rate_high : float
-        ``mean`` per unit of time, with its interval; infinite interval for one start,
-        not-a-number for errors without a sign.
-    starts : int
-        Number of trajectories.
-    reached : float
-        What the growth alone has reached at the end of the span; 0 for a bound.
-    mean : Mean or None
-        Over the starts; ``None`` for errors without a sign.
-    """
-
-    law: str | None
-    why: str
-    slope: float
-    slope_low: float
-    slope_high: float
-    floor: float
-    growth: float
-    rate: float
-    rate_low: float
-    rate_high: float
-    starts: int
-    reached: float = 0.0
-    mean: Mean | None = None
-
-    def curve(self, t: ArrayLike, end: float) -> Array:
-        """Return the law as it was fitted, shape (n,), for drawing; not-a-number where there is none.
-
-        Parameters
-        ----------
-        t : array_like, shape (n,)
-            Times since the start, positive.
-        end : float
-            The last time of the samples that were fitted.
-        """
-        times = np.asarray(t, dtype=np.float64)
-        if self.law is None:
-            return np.full(times.shape, math.nan)
-        if self.law == "exponential":
-            grown = np.exp(np.minimum(self.growth * (times - end), 0.0))
-        else:
-            power = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}.get(self.law, self.slope)
-            grown = (times / end) ** power
-        return np.hypot(self.floor, self.reached * grown)
+def drifts(law: Law) -> bool | None:
+    """Whether the mean is more than `limit` standard errors from 0; ``None`` for one start."""
+    if law.mean is None or law.mean_error is None:
+        return None
+    return abs(law.mean) > limit(law.starts) * law.mean_error
 
 
 def rms(errors: ArrayLike) -> Array:
@@ -177,8 +115,8 @@ def told(starts: int) -> str:
     )
 
 
-def mean(t: ArrayLike, errors: ArrayLike) -> Mean:
-    """Return the mean over the starts of what the errors have grown by at the end.
+def mean(t: ArrayLike, errors: ArrayLike) -> Law:
+    """Return the mean over the starts of what the errors have grown by at the end, without a law.
 
     The offset of a trajectory, its mean over the first window of time, is taken off:
     what the evaluation of an invariant adds throughout is no drift. End less begin is
@@ -199,15 +137,26 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Mean:
     value, n = float(np.mean(ends)), ends.size
     error = math.sqrt(float(np.sum((ends - value) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
     span = float(times[-1] - times[first].mean())
-    return Mean(value, error, *_interval(value, error, n), int(np.sum(ends > 0.0)), n, span)
+    rate, low, high = (_finite(one / span) for one in (value, *_interval(value, error, n)))
+    return Law(
+        mean=value,
+        mean_error=_finite(error),
+        positive=int(np.sum(ends > 0.0)),
+        rate=rate,
+        rate_low=low,
+        rate_high=high,
+        end=float(times[-1]),
+        starts=n,
+    )
 
 
-def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
+def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
     """Find the law of an error.
 
     A law with a name is preferred to an arbitrary power of t, unless the interval of
     the power excludes both 1/2 and 1. Signed errors that grow by a power of t, whatever
-    it is, are called a drift where the mean over the starts is one (`Mean.drifts`).
+    it is, are called a drift where the mean over the starts is one (`drifts`). Samples that
+    are not finite end the series; fewer than two leave no law.
 
     Parameters
     ----------
@@ -220,46 +169,51 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Drift:
 
     Returns
     -------
-    Drift
+    Law
+        Intervals from leaving out one start at a time, or from the scatter about the fit
+        where there are fewer than three starts.
 
     Raises
     ------
     problems.errors.InputError
-        If the shapes do not fit, the times are not positive and ascending, or a number
-        is not finite.
+        If the shapes do not fit, or the times are not positive and ascending.
     """
     times, rows = _checked(t, errors)
-    drift = mean(times, rows) if signed else None
+    good = np.isfinite(rows).all(axis=0)
+    size = good.size if good.all() else int(np.argmin(good))
+    if size < 2:
+        return Law(why="the error is not finite from the first samples on", starts=len(rows))
+    times, rows = times[:size], rows[:, :size]
+    found = mean(times, rows) if signed else Law(end=float(times[-1]), starts=len(rows))
+    if size < good.size:
+        found = replace(found, why=f"only to t = {times[-1]:.4g}, where the error is last finite")
     middle, label = _windows(times)
     values = _windowed(rows, label)
     if not np.any(values):
-        return _drift("bounded", "", (0.0, 0.0, 0.0), 0.0, 0.0, drift, len(rows))
+        return replace(found, law="bounded", slope=0.0, slope_low=0.0, slope_high=0.0)
     kept = values > 0.0
     decades = math.log10(times[-1] / times[0])
     if kept.sum() < FEWEST_WINDOWS or decades < SHORTEST:
         why = f"the law needs samples in {FEWEST_WINDOWS} windows over {SHORTEST} decades of time"
-        return _drift(
-            None, why, (math.nan, -math.inf, math.inf), float(values[kept].min()), 0.0, drift, len(rows)
-        )
+        return replace(found, why=why, floor=float(values[kept].min()))
     fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
-    slope = _slope(times, rows, fits["power"])
-    named = [
-        name for name in CURVES if name != "power" or not any(slope[1] <= a <= slope[2] for a in (0.5, 1.0))
-    ]
+    slope, low, high = _slope(times, rows, fits["power"])
+    named = [name for name in CURVES if name != "power" or not any(low <= a <= high for a in (0.5, 1.0))]
     law = min(named, key=lambda name: fits[name].score)
     if fits[law].score > fits["bounded"].score - EVIDENCE or fits[law].above < FEWEST_ABOVE:
         law = "bounded"
-    if drift is not None and drift.drifts and law in ("square root", "linear", "power"):
+    if drifts(found) and law in ("square root", "linear", "power"):
         fits["drift"], law = fits["power"], "drift"
-    return _drift(
-        law,
-        "",
-        slope,
-        math.exp(fits[law].parameters[0]),
-        _rate_of_growth(times, rows, math.exp(fits[law].parameters[0])) if law == "exponential" else 0.0,
-        drift,
-        len(rows),
-        0.0 if law == "bounded" else math.exp(fits[law].parameters[1]),
+    floor = math.exp(fits[law].parameters[0])
+    return replace(
+        found,
+        law=law,
+        slope=slope,
+        slope_low=_finite(low),
+        slope_high=_finite(high),
+        floor=floor,
+        growth=_finite(_rate_of_growth(times, rows, floor)) if law == "exponential" else None,
+        reached=0.0 if law == "bounded" else math.exp(fits[law].parameters[1]),
     )
 
 
@@ -380,23 +334,10 @@ def _checked(t: ArrayLike, errors: ArrayLike) -> tuple[Array, Array]:
     rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))
     if times.ndim != 1 or times.size < 2 or rows.ndim != 2 or rows.shape[1] != times.size:
         raise InputError(f"errors of shape {rows.shape} do not belong to times of shape {times.shape}.")
-    if not (np.isfinite(times).all() and np.isfinite(rows).all()):
-        raise InputError("the law of an error needs finite numbers; cut the series before it is not finite.")
-    if times[0] <= 0.0 or np.any(np.diff(times) <= 0.0):
+    if not (times[0] > 0.0 and np.all(np.diff(times) > 0.0)):
         raise InputError(f"times since the start must be positive and ascending; the first is {times[0]:g}.")
     return times, rows
 
 
-def _drift(
-    law: str | None,
-    why: str,
-    slope: tuple[float, float, float],
-    floor: float,
-    growth: float,
-    drift: Mean | None,
-    starts: int,
-    reached: float = 0.0,
-) -> Drift:
-    ends = (math.nan,) * 3 if drift is None else (drift.value, drift.low, drift.high)
-    rate, low, high = (end / (drift.span if drift else 1.0) for end in ends)
-    return Drift(law, why, *slope, floor, growth, rate, low, high, starts, reached, drift)
+def _finite(number: float) -> float | None:
+    return float(number) if math.isfinite(number) else None

@@ -4,7 +4,6 @@ Measured as one case: every trajectory's invariants against its own start, the p
 of a few of them against 128-bit Taylor solutions, and the time of all.
 """
 
-import gc
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.file import Ensemble, TimingPlan
 from hbvm_bench.measure.measured import Measured, ahead, largest_distance, position_error, positions
 from hbvm_bench.measure.starts import cloud
-from hbvm_bench.measure.timing import sampled
+from hbvm_bench.measure.timing import no_collection, sampled
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters, TimingRound
@@ -200,17 +199,12 @@ class EnsembleRun:
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
     ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
-        collecting = gc.isenabled()
-        gc.disable()
-        try:
+        with no_collection():
             spent = 0.0
             for _ in range(repeats - 1):
                 spent += integrate(self.program, self.starts, self.problem, self.sample, clock).seconds
             members = integrate(self.program, self.starts, self.problem, self.sample, clock)
             spent += members.seconds
-        finally:
-            if collecting:
-                gc.enable()
         failed = [one for one in members.status if one is not Status.FINISHED]
         status = failed[0] if failed else Status.FINISHED
         return spent / repeats, Samples(np.array([self.problem.t_end]), members.y[:1], status)

@@ -2,7 +2,7 @@
 
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -102,6 +102,19 @@ def sentence(described: Mapping[str, str | int]) -> str:
         )
         + "."
     )
+
+
+def sentences(described: Iterable[Mapping[str, str | int]]) -> list[str]:
+    """Say what kinds of processor times belong to, each once, with the range of its clock's readings."""
+    kinds: dict[str, list[Mapping[str, str | int]]] = {}
+    for one in described:
+        kinds.setdefault(sentence({**one, "clock_ghz": ""}), []).append(one)
+    said = []
+    for alike in kinds.values():
+        clocks = sorted({str(one["clock_ghz"]) for one in alike if "clock_ghz" in one}, key=float)
+        ends = dict.fromkeys((*clocks[:1], *clocks[-1:]))
+        said.append(sentence({**alike[0], "clock_ghz": " to ".join(ends)}))
+    return said
 
 
 def restricted_to_avx2() -> dict[str, str]:

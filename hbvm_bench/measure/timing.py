@@ -3,9 +3,11 @@
 import gc
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
+from statistics import median, quantiles
 from typing import Any, Protocol
 
 import numpy as np
@@ -78,17 +80,12 @@ class Run:
         """
         end = np.array([self.t_end])
         spent, samples = 0.0, None
-        collecting = gc.isenabled()
-        gc.disable()
-        try:
+        with no_collection():
             for _ in range(repeats):
                 stepper = self.program.start(self.y0, self.par, self.t0)
                 start = clock()
                 samples = stepper.advance(end, sample=self.sample)
                 spent += clock() - start
-        finally:
-            if collecting:
-                gc.enable()
         if samples is None:
             raise ValueError(f"repeats must be at least 1, not {repeats!r}")
         return spent / repeats, samples
@@ -96,6 +93,65 @@ class Run:
     def until(self, share: float) -> "Run":
         """Return the run over the first ``share`` of the span."""
         return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
+
+
+@contextmanager
+def no_collection() -> Iterator[None]:
+    """Keep garbage collection off, for something to be timed."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
+
+
+def interleaved(
+    samples: Sequence[Callable[[], float]], rounds: int, *, alternate: bool = True
+) -> list[list[float]]:
+    """Take one sample of each in every round, so that what else the machine does meets them all.
+
+    Parameters
+    ----------
+    samples : sequence of callable
+        Each takes one sample and returns its seconds.
+    rounds : int
+        How many.
+    alternate : bool
+        Whether every other round goes backwards, so that none is always the first.
+
+    Returns
+    -------
+    list of list of float
+        The seconds of each, round by round.
+    """
+    taken: list[list[float]] = [[] for _ in samples]
+    for number in range(rounds):
+        turns = list(zip(samples, taken, strict=True))
+        for sample, seconds in reversed(turns) if alternate and number % 2 else turns:
+            seconds.append(sample())
+    return taken
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The median of samples with their quartiles, which a single sample does not have."""
+
+    median: float
+    low: float | None
+    high: float | None
+
+    @classmethod
+    def of(cls, samples: Sequence[float]) -> "Spread":
+        """Return the spread of samples, at least one."""
+        low, high = quantiles(samples, n=4, method="inclusive")[::2] if len(samples) > 1 else (None, None)
+        return cls(median(samples), low, high)
+
+
+def ratios(seconds: Sequence[float | None], base: Sequence[float | None]) -> list[float]:
+    """Return ``seconds`` over ``base`` within each interleaved round that has both."""
+    return [a / b for a, b in zip(seconds, base, strict=True) if a is not None and b is not None]
 
 
 def repeats_for(seconds: float, shortest: float) -> int:

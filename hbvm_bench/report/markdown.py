@@ -30,7 +30,7 @@ def block(text: object) -> str:
 
 def in_markdown(table: Table) -> str:
     """Return a table in markdown, with its title before and its note after it."""
-    rule = (":--" if table.is_words(index) else "--:" for index in range(len(table.head)))
+    rule = (":--" if index in table.words else "--:" for index in range(len(table.head)))
     lines = [table.head, *table.rows]
     text = [f"| {' | '.join(plain(cell) for cell in line)} |" for line in lines]
     text.insert(1, f"| {' | '.join(rule)} |")

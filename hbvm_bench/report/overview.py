@@ -60,7 +60,7 @@ def overview(records: Sequence[Record], numbers: dict[str, int]) -> Overview:
                 ("need", "first choices", "problems"),
                 [(answer.title, answer.text, str(answer.problems)) for answer in answers],
                 "In brackets: on how many problems it is near the best, and its median factor behind it.",
-                words=(1,),
+                words=(0, 1),
             )
         )
     families, matrix = outcomes.matrix(records)

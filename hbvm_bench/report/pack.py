@@ -19,7 +19,7 @@ from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report.content import Content
 from hbvm_bench.report.figures import motion
 from hbvm_bench.report.figures.canvas import Picture
-from hbvm_bench.report.figures.plots import as_csv, as_json, numbers
+from hbvm_bench.report.figures.plots import as_json, numbers
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
@@ -137,11 +137,7 @@ def results_json(content: Content) -> dict[str, Any]:
 
 def files(content: Content) -> dict[str, bytes]:
     """Return the data of a report as files by their path beside the page."""
-    made = {
+    return {
         "data/results.csv": results_csv(content.records).encode(),
         "data/results.json": json_of(results_json(content)),
     }
-    for picture in content.pictures:
-        if picture.plot is not None:
-            made[f"data/{picture.key}.csv"] = as_csv(picture.plot).encode()
-    return made

@@ -37,8 +37,7 @@ def versions(records: Sequence[Record]) -> list[tuple[str, str]]:
 def processors(records: Sequence[Record]) -> list[str]:
     """Say what kinds of processor the times were taken on; nothing where none were taken."""
     timings = [record.timing for record in records if record.timing is not None and record.timing.rounds]
-    said = [machine.sentence(timing.machine) for timing in timings if timing.machine]
-    return list(dict.fromkeys(said))
+    return machine.sentences(timing.machine for timing in timings if timing.machine)
 
 
 def machines(records: Sequence[Record]) -> list[tuple[str, str]]:

@@ -51,7 +51,7 @@ def print_table(table: Table) -> None:
     )
     for index, head in enumerate(table.head):
         made.add_column(
-            Text(head), justify="left" if table.is_words(index) else "right", overflow="fold", min_width=6
+            Text(head), justify="left" if index in table.words else "right", overflow="fold", min_width=6
         )
     for row in table.rows:
         made.add_row(*(Text(cell) for cell in row))

@@ -6,12 +6,11 @@ from pathlib import Path
 from hbvm_bench.report import pack
 from hbvm_bench.report.as_markdown import markdown
 from hbvm_bench.report.content import Content, gather
+from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.html import page
 from hbvm_bench.store.files import write_all
 from hbvm_bench.store.store import Store, again
 from problems.errors import InputError
-
-FIGURES = "figures"
 
 
 def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]:
@@ -48,11 +47,5 @@ def write_report(stores: Store | Sequence[Store], directory: Path) -> list[Path]
 
 def rendered(content: Content) -> dict[str, bytes]:
     """Return all files of a report by their path in its directory."""
-    made: dict[str, bytes] = {}
-    for picture in content.pictures:
-        made[f"{FIGURES}/{picture.key}.svg"] = picture.svg.encode()
-        made[f"{FIGURES}/{picture.key}.png"] = picture.png
-    made |= pack.files(content)
-    made["report.md"] = markdown(content).encode()
-    made["index.html"] = page(content).encode()
-    return made
+    documents = {"report.md": markdown(content).encode(), "index.html": page(content).encode()}
+    return canvas.files(content.pictures) | pack.files(content) | documents

@@ -193,8 +193,8 @@ class Law(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         Mean signed drift per unit of time, with its 95 % interval over the starts;
         for the energy only, the other invariants' errors have no sign.
     mean, mean_error : float or None
-        Mean over the starts at the end, without the offset of each, and its standard
-        error (`hbvm_bench.measure.drift.Mean`); for the energy of several starts only.
+        Mean over the starts at the end, without the offset of each
+        (`hbvm_bench.measure.drift.mean`); its standard error with several starts only.
     positive : int or None
         How many of the starts end above 0.
     reached : float

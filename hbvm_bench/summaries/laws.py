@@ -85,3 +85,9 @@ def text(law: Law) -> str:
     if law.slope_low is None or law.slope_high is None:
         return f"{SHORT[law.law]} ({law.slope:.2f})"
     return f"{SHORT[law.law]} ({law.slope:.2f}, {law.slope_low:.2f} to {law.slope_high:.2f})"
+
+
+def power_of(law: Law) -> str:
+    """Return the power of t with its interval, where it has one: ``"0.52 (0.41 to 0.63)"``."""
+    bare = law.slope_low is None or law.slope_high is None
+    return f"{law.slope:.2f}" + ("" if bare else f" ({law.slope_low:.2f} to {law.slope_high:.2f})")

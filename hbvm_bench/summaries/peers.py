@@ -6,12 +6,13 @@ printed in every report.
 
 from collections.abc import Iterable
 from pathlib import Path
-from statistics import median, quantiles
+from statistics import median
 
 import msgspec
 
 from hbvm_bench.campaign.identity import digest_of, make_method
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import Spread, ratios
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import Table
 
@@ -55,16 +56,16 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     difference: float
 
     @property
-    def ratios(self) -> list[float]:
-        """Harness over library, round by round."""
-        return [a / b for a, b in zip(self.seconds, self.alone, strict=True)]
+    def ratio(self) -> Spread:
+        """Harness over library within each round."""
+        return Spread.of(ratios(self.seconds, self.alone))
 
     @property
     def beyond(self) -> bool:
         """Whether the harness costs more than is allowed, takes other steps or comes elsewhere."""
         other = self.steps != self.alone_steps or not self.difference <= DIFFERENCE
         overhead = median(a - b for a, b in zip(self.seconds, self.alone, strict=True))
-        return other or (median(self.ratios) > ALLOWED and overhead > OVERHEAD)
+        return other or (self.ratio.median > ALLOWED and overhead > OVERHEAD)
 
 
 class PeerCheck(msgspec.Struct, frozen=True, kw_only=True):
@@ -104,14 +105,14 @@ def table(result: PeerCheck) -> Table:
     """Return the result as a table; rows beyond what is allowed are marked."""
     rows: list[tuple[str, ...]] = []
     for row in result.rows:
-        low, middle, high = quantiles(row.ratios, n=4, method="inclusive")
+        ratio = row.ratio
         mark = " (beyond)" if row.beyond else ""
         rows.append(
             (
                 row.method,
                 row.problem,
                 row.call,
-                f"{middle:.3f} [{low:.3f}, {high:.3f}]{mark}",
+                f"{ratio.median:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]{mark}",
                 in_words(median(row.alone)),
                 str(row.steps),
                 str(row.alone_steps),
@@ -140,7 +141,7 @@ def table(result: PeerCheck) -> Table:
         f"which our adapter sets to whole steps. Measured on {result.measured[:10]}"
         f"{'' if result.sources == now else ', with an earlier version of this code'}, with {versions}. "
         f"{machine.sentence(result.machine)} To repeat it: {COMMAND}.",
-        words=(1, 2),
+        words=(0, 1, 2),
     )
 
 

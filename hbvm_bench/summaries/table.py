@@ -1,6 +1,7 @@
 """Tables of text: what the summaries of a run say in rows."""
 
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -12,21 +13,29 @@ class Table:
     title : str
         One line.
     head : tuple of str
-        Column heads; the first column is text, the others are numbers unless in ``words``.
-    rows : list of tuple of str
+        Column heads.
+    rows : sequence of tuple of str
         Cells.
     note : str
-        A sentence under the table.
-    words : tuple of int
-        Which other columns hold words.
+        What the columns mean, under the table.
+    words : collection of int
+        Which columns hold words; the others hold numbers.
+    key : str
+        Anchor and file name, where it has one.
+    groups : tuple of (str, int)
+        Labels over columns, each with how many it is over; may be empty.
     """
 
     title: str
     head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
+    rows: Sequence[tuple[str, ...]]
     note: str = ""
-    words: tuple[int, ...] = field(default=())
+    words: Collection[int] = (0,)
+    key: str = ""
+    groups: tuple[tuple[str, int], ...] = ()
 
-    def is_words(self, column: int) -> bool:
-        """Whether a column holds words, to be read from the left."""
-        return column == 0 or column in self.words
+    @property
+    def flat_head(self) -> list[str]:
+        """One head per column, with the label over it before it."""
+        labels = [label for label, width in self.groups for _ in range(width)] or [""] * len(self.head)
+        return [f"{label}: {word}" if label else word for label, word in zip(labels, self.head, strict=True)]

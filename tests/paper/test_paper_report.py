@@ -13,8 +13,9 @@ from hbvm_bench.report.figures.canvas import picture
 from hbvm_bench.report.figures.png import small
 from hbvm_bench.studies.paper import others, page, tasks
 from hbvm_bench.studies.paper.departure import departure
-from hbvm_bench.studies.paper.document import Claim, Part, Table, number, sheet
+from hbvm_bench.studies.paper.document import Claim, Part, number, sheet
 from hbvm_bench.studies.paper.henon_heiles_figures import fates
+from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.protocol import Samples, Status
 from problems import Hamiltonian
@@ -73,9 +74,7 @@ def test_numbers_are_short(value, text):
 
 
 def test_hostile_words_cannot_break_the_documents():
-    table = Table(
-        "hostile", HOSTILE, (HOSTILE, "n"), ((HOSTILE, "1e-3"),), numbers=frozenset({1}), caption=HOSTILE
-    )
+    table = Table(HOSTILE, (HOSTILE, "n"), [(HOSTILE, "1e-3")], HOSTILE, key="hostile")
     part = Part("hostile", HOSTILE, [HOSTILE], [Claim(HOSTILE, HOSTILE, HOSTILE, "holds")], [HOSTILE, table])
     html = page.page([part], HOSTILE)
     assert html.count("<script>") == 1

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from hbvm_bench.report.figures.plots import Plot
+from hbvm_bench.report.figures.plots import Plot, as_csv
 from hbvm_bench.report.figures.png import small, with_small_images
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
 
@@ -92,6 +92,17 @@ class Picture:
 def drawing() -> AbstractContextManager[None]:
     """Return the context in which figures are made, so that they all look alike."""
     return mpl.rc_context(SETTINGS)
+
+
+def files(pictures: Iterable[Picture]) -> dict[str, bytes]:
+    """Return the drawings, images and numbers of figures by their path beside a report."""
+    made: dict[str, bytes] = {}
+    for one in pictures:
+        made[f"figures/{one.key}.svg"] = one.svg.encode()
+        made[f"figures/{one.key}.png"] = one.png
+        if one.plot is not None:
+            made[f"data/{one.key}.csv"] = as_csv(one.plot).encode()
+    return made
 
 
 def picture(

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
-from hbvm_bench.measure.laws import curve, find
 from hbvm_bench.report.figures.canvas import Picture, log_axis, picture, power_range
 from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
@@ -101,7 +100,7 @@ def _drift(case: Drawn, invariant: str) -> Found | None:
     later = t >= t[-1] / EARLIEST
     if later.sum() < 2 or not np.isfinite(error).all():
         return None
-    law = find(t[later], error[None, later], signed=False)
+    law = drift.fit(t[later], error[None, later], signed=False)
     return t[1:], error[None, 1:], law
 
 
@@ -122,6 +121,6 @@ def _law(law: Law, t: Array) -> tuple[Array, Array]:
     if law.law is None or t.size < 2:
         return np.empty(0), np.empty(0)
     at = np.geomspace(max(t[0], t[-1] / EARLIEST) if law.starts == 1 else t[0], t[-1], LAW_POINTS)
-    fitted = curve(law, at)
+    fitted = drift.curve(law, at)
     good = fitted > 0
     return at[good], fitted[good]

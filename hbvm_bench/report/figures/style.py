@@ -7,7 +7,8 @@ nothing rests on colour alone.
 
 import colorsys
 import hashlib
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from hbvm_bench.campaign.spec import parse_spec
@@ -119,6 +120,18 @@ def looks(records: Sequence[Record]) -> dict[str, Look]:
             marker=MARKERS.get(name, UNKNOWN_MARKER),
         )
     return {record.id: by_method[record.case.method] for record in records}
+
+
+def base_looks(methods: Iterable[str]) -> dict[str, Look]:
+    """Return the look of every method by its text: its name's base colour, dashes tell settings apart."""
+    made: dict[str, Look] = {}
+    settings: Counter[str] = Counter()
+    for number, method in enumerate(dict.fromkeys(methods), 1):
+        name = parse_spec(method).name
+        dash = DASHES[settings[name] % len(DASHES)]
+        settings[name] += 1
+        made[method] = Look(number, *base_colours(name), dash=dash, marker=MARKERS.get(name, UNKNOWN_MARKER))
+    return made
 
 
 def base_colours(name: str) -> tuple[str, str]:

@@ -12,9 +12,10 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median, quantiles
+from statistics import median
 
 import msgspec
 import numpy as np
@@ -22,7 +23,8 @@ import numpy as np
 from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
-from hbvm_bench.measure.timing import Run
+from hbvm_bench.measure.timing import Run, Spread, interleaved
+from hbvm_bench.measure.timing import ratios as per_round
 from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.run import processes
 from hbvm_bench.store.files import atomic, ensure_writable, write_json
@@ -81,19 +83,9 @@ class Duel:
     theirs: Side
 
     @property
-    def ratio(self) -> float:
-        """The median of their time over ours within each round."""
-        return median(self._ratios)
-
-    @property
-    def quartiles(self) -> tuple[float, float]:
-        """Of the same."""
-        low, _, high = quantiles(self._ratios, n=4, method="inclusive")
-        return low, high
-
-    @property
-    def _ratios(self) -> list[float]:
-        return [b / a for a, b in zip(self.ours.seconds, self.theirs.seconds, strict=True)]
+    def ratio(self) -> Spread:
+        """Their time over ours within each round."""
+        return Spread.of(per_round(self.theirs.seconds, self.ours.seconds))
 
     @property
     def as_accurate(self) -> bool:
@@ -108,7 +100,7 @@ class Duel:
     @property
     def reached(self) -> bool:
         """Whether the goal is: fast enough, and as accurate."""
-        return self.as_accurate and self.ratio >= self.goal
+        return self.as_accurate and self.ratio.median >= self.goal
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):
@@ -255,7 +247,7 @@ def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
         if duels:
             goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in duels)
             settings = dict.fromkeys(duel.theirs.method for duel in duels)
-            cells = ("not run" if duel is None else f"{duel.ratio:.2f}× {duel.verdict}" for duel in found)
+            cells = ("not run" if one is None else f"{one.ratio.median:.2f}× {one.verdict}" for one in found)
             rows.append((key, " or ".join(settings), " or ".join(goals), *cells))
     return Table(
         "How many times as long as HBVM() the Taylor method takes",
@@ -263,7 +255,7 @@ def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
         rows,
         "The median of the ratio within each round, and whether it reaches the goal declared before; not as "
         "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -271,14 +263,14 @@ def sides(found: Sequence[Duel]) -> Table:
     """Return both sides' errors and times."""
     rows = []
     for duel in found:
-        low, high = duel.quartiles
+        ratio = duel.ratio
         for first, side in ((True, duel.ours), (False, duel.theirs)):
             rows.append(
                 (
                     duel.problem if first else "",
                     f"≥ {duel.goal:g}" if first else duel.verdict,
-                    f"{duel.ratio:.2f}" if first else "",
-                    f"{low:.2f} … {high:.2f}" if first else "",
+                    f"{ratio.median:.2f}" if first else "",
+                    f"{ratio.low:.2f} … {ratio.high:.2f}" if first else "",
                     side.method,
                     f"{1e3 * median(side.seconds):.3g} ms",
                     str(side.steps),
@@ -290,7 +282,7 @@ def sides(found: Sequence[Duel]) -> Table:
         "Errors and times",
         ("problem", "goal", "Taylor / HBVM", "quartiles", "method", "time", "steps", "energy", "position"),
         rows,
-        words=(4,),
+        words=(0, 4),
     )
 
 
@@ -345,16 +337,17 @@ def _duel(key: str, problem: Problem, rounds: int) -> Duel:
     methods = [make_method(text) for text in (OURS, THEIRS)]
     runs = [Run.of(problem, method) for method in methods]
     errors = [_errors(problem, method, run, true) for method, run in zip(methods, runs, strict=True)]
-    seconds: list[list[float]] = [[], []]
-    for number in range(rounds):
-        for i in (0, 1) if number % 2 else (1, 0):  # so that neither is always the first
-            spent, reached = runs[i].seconds(clock=time.thread_time)
-            if reached.status is not Status.FINISHED:
-                raise InputError(f"{methods[i]!r} did not finish: {reached.reason}")
-            seconds[i].append(spent)
+
+    def sample(i: int) -> float:
+        spent, reached = runs[i].seconds(clock=time.thread_time)
+        if reached.status is not Status.FINISHED:
+            raise InputError(f"{methods[i]!r} did not finish: {reached.reason}")
+        return spent
+
+    theirs, ours = interleaved([partial(sample, 1), partial(sample, 0)], rounds)
     ours, theirs = (
         Side(repr(method), *error, seconds=samples)
-        for method, error, samples in zip(methods, errors, seconds, strict=True)
+        for method, error, samples in zip(methods, errors, (ours, theirs), strict=True)
     )
     return Duel(key, GOALS[key], ours, theirs)
 

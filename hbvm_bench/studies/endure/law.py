@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift
-from hbvm_bench.measure.drift import Drift, Mean
+from hbvm_bench.store.records import Law
 from hbvm_bench.studies.endure.runs import DECADES, OURS, Endurance, of_method
 
 # The goals declared for a million years.
@@ -29,8 +29,8 @@ class Line:
         Trajectories that finished and that did not.
     rms : dict of float to float
         Root mean square over the starts of the relative energy error, by time in years.
-    drift : Drift or None
-        Its law; ``None`` without a finished trajectory.
+    drift : Law or None
+        Of its error; ``None`` without a finished trajectory.
     seconds : float or None
         Median of the trajectories.
     times_ours : float or None
@@ -41,7 +41,7 @@ class Line:
     starts: int
     failed: int
     rms: dict[float, float]
-    drift: Drift | None
+    drift: Law | None
     seconds: float | None
     times_ours: float | None
 
@@ -85,24 +85,24 @@ def goals(result: Endurance) -> list[Goal]:
         return []
     by_method = {line.method: line for line in lines(result)}
     ours = by_method.get(OURS)
-    if ours is None or ours.drift is None or (mean := ours.drift.mean) is None:
+    if ours is None or (law := ours.drift) is None or law.mean is None:
         return []
-    rms, law = ours.rms[DECADES[-1]], ours.drift
+    rms = ours.rms[DECADES[-1]]
     made = [
         Goal(f"rms of dE/E at 1e6 years at most {RMS_GOAL:.0e}", f"{rms:.1e}", rms <= RMS_GOAL),
         Goal(
             f"mean drift at most {RATE_GOAL:.0e} per year, within its interval",
-            f"{law.rate:+.1e} ({law.rate_low:+.1e} to {law.rate_high:+.1e})",
-            law.rate_low <= RATE_GOAL and law.rate_high >= -RATE_GOAL,
+            rate_in_words(law),
+            (law.rate_low is None or law.rate_low <= RATE_GOAL)
+            and (law.rate_high is None or law.rate_high >= -RATE_GOAL),
         ),
         Goal(
-            f"no drift: mean within {drift.limit(mean.starts):.3g} of its standard errors"
-            if mean.starts > 1
+            f"no drift: mean within {drift.limit(law.starts):.3g} of its standard errors"
+            if law.starts > 1
             else "no drift",
-            f"{mean_in_words(mean)}, {abs(mean.value) / mean.error:.1f} standard errors"
-            if mean.error
-            else mean_in_words(mean),
-            mean.drifts is False,
+            mean_in_words(law)
+            + (f", {abs(law.mean) / law.mean_error:.1f} standard errors" if law.mean_error else ""),
+            drift.drifts(law) is False,
         ),
     ]
     for line in by_method.values():
@@ -118,10 +118,16 @@ def goals(result: Endurance) -> list[Goal]:
     return made
 
 
-def mean_in_words(mean: Mean) -> str:
+def mean_in_words(law: Law) -> str:
     """Return the mean over the starts with its standard error and the count of signs."""
-    signs = f"{mean.positive} of {mean.starts} positive"
-    return f"{mean.value:+.1e}" + (f" ± {mean.error:.1e}" if mean.starts > 1 else "") + f"; {signs}"
+    spread = "" if law.mean_error is None else f" ± {law.mean_error:.1e}"
+    return f"{law.mean:+.1e}{spread}; {law.positive} of {law.starts} positive"
+
+
+def rate_in_words(law: Law) -> str:
+    """Return the mean drift per year with its interval, which one start does not have."""
+    bare = law.rate_low is None or law.rate_high is None
+    return f"{law.rate:+.1e}" + ("" if bare else f" ({law.rate_low:+.1e} to {law.rate_high:+.1e})")
 
 
 def _seconds(result: Endurance, method: str) -> float | None:

@@ -7,20 +7,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import drift, machine
-from hbvm_bench.measure.drift import LAWS
 from hbvm_bench.report import shell
+from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
-from hbvm_bench.report.figures.png import small
-from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
+from hbvm_bench.report.figures.style import INK, MUTED, Look, base_looks
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
-from hbvm_bench.studies.endure.law import goals, lines, mean_in_words
+from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance, of_method
 from hbvm_bench.studies.race.tables import NONE
 from hbvm_bench.summaries import peers
+from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import Table
 
@@ -40,7 +39,7 @@ def write(result: Endurance, directory: Path) -> Path:
     problems.errors.InputError
         If the directory cannot be written.
     """
-    look = looks(result)
+    look = base_looks(result.methods)
     made = over_time(result, look)
     shown = [*tables(result), *filter(None, [peers.kept()])]
     content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
@@ -53,22 +52,9 @@ def write(result: Endurance, directory: Path) -> Path:
     data = {"csv": as_csv(made.plot)} if made is not None and made.plot is not None else {}
     more = shell.values(pictures, list(look.values()), data=data)
     files["index.html"] = page.render(title=TITLE, **content, **more).encode()
-    for one in pictures:
-        files[f"figures/{one.key}.svg"] = one.svg.encode()
-        files[f"figures/{one.key}.png"] = small(one.png)
-        files[f"data/{one.key}.csv"] = data["csv"].encode()
+    files |= canvas.files(pictures)
     write_all({directory / name: text for name, text in files.items()})
     return directory / "README.md"
-
-
-def looks(result: Endurance) -> dict[str, Look]:
-    """Return the look of every method, by its text."""
-    made: dict[str, Look] = {}
-    for number, method in enumerate(result.methods, 1):
-        name = parse_spec(method).name
-        dash = DASHES[sum(parse_spec(other).name == name for other in made) % len(DASHES)]
-        made[method] = Look(number, *base_colours(name), dash=dash, marker=MARKERS.get(name, UNKNOWN_MARKER))
-    return made
 
 
 def tables(result: Endurance) -> list[Table]:
@@ -83,12 +69,10 @@ def tables(result: Endurance) -> list[Table]:
                 line.method,
                 f"{line.starts}" + (f", {line.failed} failed" if line.failed else ""),
                 *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
-                NONE if law is None else LAWS[law.law] if law.law else law.why,
-                NONE
-                if law is None or not law.law
-                else f"{law.slope:.2f} ({law.slope_low:.2f} to {law.slope_high:.2f})",
-                NONE if law is None or law.mean is None else mean_in_words(law.mean),
-                NONE if law is None else f"{law.rate:+.1e} ({law.rate_low:+.1e} to {law.rate_high:+.1e})",
+                NONE if law is None else drift.LAWS[law.law] if law.law else law.why,
+                NONE if law is None or not law.law else power_of(law),
+                NONE if law is None or law.mean is None else mean_in_words(law),
+                NONE if law is None or law.rate is None else rate_in_words(law),
                 NONE if line.seconds is None else seconds(line.seconds),
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
@@ -105,7 +89,7 @@ def tables(result: Endurance) -> list[Table]:
             + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
             + "Power of t and drift per year with 95 % "
             "intervals over the starts. Time: median of one trajectory.",
-            words=(2 + len(heads),),
+            words=(0, 2 + len(heads)),
         )
     ]
     asked = goals(result)
@@ -115,7 +99,7 @@ def tables(result: Endurance) -> list[Table]:
                 "Goals declared before the run",
                 ("goal", "measured", "verdict"),
                 [(goal.words, goal.measured, "reached" if goal.reached else "missed") for goal in asked],
-                words=(1, 2),
+                words=(0, 1, 2),
             )
         )
     return made
@@ -187,7 +171,7 @@ def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[
         if law is not None and law.law is not None:
             at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
             traces.append(
-                Trace(look[method].number, method, at, law.curve(at, float(t[-1])), "law", LAWS[law.law])
+                Trace(look[method].number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law])
             )
     return Panel(
         "relative energy error, root mean square over the starts",

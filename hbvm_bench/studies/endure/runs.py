@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.grid import GOLDEN
 from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import no_collection
 from hbvm_bench.report import terminal
 from hbvm_bench.run import processes
 from hbvm_bench.store.files import write_json
@@ -221,11 +222,10 @@ def run(problem: Problem, program: Program, text: str, start: int, times: Array)
     y0 = perturbed(problem, start)
     stepper = program.start(y0, problem.par, problem.t0)
     gc.collect()
-    gc.disable()
-    begin = time.perf_counter()
-    samples = stepper.advance(times)
-    seconds = time.perf_counter() - begin
-    gc.enable()
+    with no_collection():
+        begin = time.perf_counter()
+        samples = stepper.advance(times)
+        seconds = time.perf_counter() - begin
     if samples.status is not Status.FINISHED:
         return Trajectory(method=text, start=start, status=samples.status.value, reason=samples.reason)
     return Trajectory(

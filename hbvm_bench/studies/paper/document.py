@@ -10,6 +10,7 @@ from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.figures.canvas import Picture, new
 from hbvm_bench.report.figures.read_off import read_off
 from hbvm_bench.report.figures.style import MARKERS, OTHERS, UNKNOWN_MARKER, Look, base_colours
+from hbvm_bench.summaries.table import Table
 
 VERDICTS = {
     "holds": "confirmed",
@@ -56,33 +57,6 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table.
-
-    Attributes
-    ----------
-    key, title, caption : str
-        Anchor and file name, heading, what the columns mean.
-    head : tuple of str
-        Names of the columns.
-    rows : tuple of tuple of str
-        The cells.
-    numbers : frozenset of int
-        Columns that are set right; the first one is code where it is not among them.
-    groups : tuple of (str, int)
-        Labels over columns, each with how many it is over; may be empty.
-    """
-
-    key: str
-    title: str
-    head: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    numbers: frozenset[int] = frozenset()
-    caption: str = ""
-    groups: tuple[tuple[str, int], ...] = ()
-
-
-@dataclass(frozen=True)
 class Part:
     """One of the paper's experiments.
 
@@ -95,7 +69,7 @@ class Part:
     claims : sequence of Claim
         What the paper says and what came out.
     blocks : sequence of str, Picture or Table
-        In order.
+        In order; a table has a key.
     """
 
     key: str

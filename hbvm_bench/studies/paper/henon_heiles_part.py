@@ -8,9 +8,10 @@ import numpy as np
 from hbvm_bench.studies.paper import henon_heiles as experiment
 from hbvm_bench.studies.paper import henon_heiles_figures as figures
 from hbvm_bench.studies.paper import others
-from hbvm_bench.studies.paper.document import Claim, Part, Table, number
+from hbvm_bench.studies.paper.document import Claim, Part, number
 from hbvm_bench.studies.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
 from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
@@ -188,9 +189,9 @@ def _step_table(steps: Steps) -> Table:
             (f"{gauss.h:g}", *cells(gauss), *cells(hbvm))
             for gauss, hbvm in zip(steps["gauss"], steps["hbvm"], strict=True)
         ),
-        numbers=frozenset(range(7)),
+        words=(),
         groups=(("", 1), ("Gauss, s = 2", 3), ("HBVM(4,2)", 3)),
-        caption=f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {experiment.T_END:,.0f}; "
+        note=f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {experiment.T_END:,.0f}; "
         "a step whose equations find no solution counts as leaving. Agrees: time up to which the first of "
         f"them is within {experiment.AGREES:g} of the true orbit. Staying inside is what the energy gives; "
         "a true orbit takes a smaller step under either method.",
@@ -217,8 +218,8 @@ def _others(results: Results) -> Table:
             )
             for row in rows
         ),
-        numbers=frozenset(range(1, 4)),
-        caption=f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
+        words=(0, 4),
+        note=f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
         f"triangle; time at which the orbit is {experiment.AGREES:g} from that of HBVM(15,10), h = 1/4. "
         "Chaos doubles every error about every five units of time, so no double precision orbit agrees "
         "much longer than two hundred.",

@@ -11,7 +11,8 @@ from markupsafe import Markup, escape
 from hbvm_bench.report import shell
 from hbvm_bench.report.figures.canvas import Picture, inline_svg
 from hbvm_bench.report.markdown import code, plain
-from hbvm_bench.studies.paper.document import LOOKS, NAMES, VERDICTS, Part, Table
+from hbvm_bench.studies.paper.document import LOOKS, NAMES, VERDICTS, Part
+from hbvm_bench.summaries.table import Table
 
 TITLE = "The seed paper, run again"
 PAPER = (
@@ -30,7 +31,7 @@ def markdown(parts: Sequence[Part], command: str) -> str:
     """Return the report as markdown with relative links to its figures."""
     environment = shell.environment("hbvm_bench.studies.paper", autoescape=False)
     environment.filters |= {"code": code, "prose": prose}
-    environment.globals |= {"kind": kind, "cell": markdown_cell, "heads": flat_heads}
+    environment.globals |= {"kind": kind, "cell": markdown_cell}
     text = environment.get_template("paper.md.j2").render(**_values(parts, command))
     return re.sub(r"\n{3,}", "\n\n", text)
 
@@ -72,12 +73,6 @@ def drawing(picture: Picture) -> Markup:
 def kind(block: object) -> str:
     """Return what a block of a part is: ``text``, ``picture`` or ``table``."""
     return "picture" if isinstance(block, Picture) else "table" if isinstance(block, Table) else "text"
-
-
-def flat_heads(table: Table) -> list[str]:
-    """Return one head per column, with its group's label before it."""
-    labels = [label for label, width in table.groups for _ in range(width)] or [""] * len(table.head)
-    return [f"{label}: {word}" if label else word for label, word in zip(labels, table.head, strict=True)]
 
 
 def prose(text: str) -> str:

@@ -8,9 +8,10 @@ import numpy as np
 from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper import period_annulus as experiment
 from hbvm_bench.studies.paper import period_annulus_figures as figures
-from hbvm_bench.studies.paper.document import Claim, Part, Table, number
+from hbvm_bench.studies.paper.document import Claim, Part, number
 from hbvm_bench.studies.paper.period_annulus import DEGREES, NODES, PRINTED, STEPS, Edge
 from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from problems import emit
@@ -206,9 +207,9 @@ def _limit_table(cells: Cells, limits: Limits) -> Table:
         title="What limits the long span",
         head=("h", "s", "k", "error in H", "departs at", "H has risen by", "error in H"),
         rows=tuple(rows),
-        numbers=frozenset(range(7)),
+        words=(),
         groups=(("", 3), ("HBVM(k, s), span 2500", 3), ("span 100", 1)),
-        caption="The nearest start that departs: when, and by how many H* round-off has raised its H up to "
+        note="The nearest start that departs: when, and by how many H* round-off has raised its H up to "
         "then. That rise is the error of the entry. Over a span of 100 there are three revolutions at most, "
         f"and what is left is the spacing of the doubles at c*, which is {number(spacing)} in H/H*.",
     )
@@ -226,9 +227,9 @@ def _spread_table(spreads: Spreads) -> Table:
         title="How much of a Gauss entry is chance",
         head=("h", "s", "paper", "Q = (0, 1)", "smallest", "median", "largest", "median/paper"),
         rows=tuple(cells(key) for key in PRINTED),
-        numbers=frozenset(range(8)),
+        words=(),
         groups=(("", 2), ("error in H", 1), (f"here, {len(experiment.ENDS)} bisections", 4), ("", 1)),
-        caption="The same bisection from ends Q = (0, 1), (0, 1 + 1/64), (0, 1 + 2/64), …, which visits "
+        note="The same bisection from ends Q = (0, 1), (0, 1 + 1/64), (0, 1 + 2/64), …, which visits "
         "other points and ends at other boundaries of the layer. The printed errors are typical draws.",
     )
 
@@ -258,8 +259,8 @@ def _table(cells: Cells) -> Table:
         ),
         groups=(("", 3), ("Gauss(s)", 5), ("HBVM(k, s)", 5)),
         rows=tuple(rows),
-        numbers=frozenset(range(13)),
-        caption="The point is (0, c); the error is |H(0, c) − H*|/H*, evaluated in double-double; ratio: of "
+        words=(),
+        note="The point is (0, c); the error is |H(0, c) − H*|/H*, evaluated in double-double; ratio: of "
         "the error here to the printed one.",
     )  # fmt: skip
 
@@ -283,6 +284,6 @@ def _others(results: Results) -> Table:
             )
             for row in rows
         ),
-        numbers=frozenset({1, 2}),
-        caption=f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
+        words=(0, 3),
+        note=f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )

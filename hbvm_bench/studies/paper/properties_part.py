@@ -3,8 +3,9 @@
 from functools import partial
 
 from hbvm_bench.studies.paper import properties, properties_figures
-from hbvm_bench.studies.paper.document import Claim, Part, Table, number
+from hbvm_bench.studies.paper.document import Claim, Part, number
 from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 
@@ -82,8 +83,8 @@ def part(results: Results) -> Part:
                         for method, defect in results["claims/symplectic"]
                     ),
                 ),
-                numbers=frozenset({2}),
-                caption="The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
+                words=(0, 1),
+                note="The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
                 "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not "
                 "symplectic; Gauss the other way about.",
             ),

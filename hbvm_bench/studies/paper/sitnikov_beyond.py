@@ -8,8 +8,9 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, Table, number, picture, sheet
+from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
+from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
 FAMILY_COLOURS = {"gauss": GAUSS, "hbvm": HBVM}
@@ -189,7 +190,7 @@ def step_table(rows: Sequence[StepRow]) -> Table:
         title="The step and its price",
         head=("s", "h", *("Gauss", "HBVM") * 5),
         rows=tuple(lines),
-        numbers=frozenset(range(12)),
+        words=(),
         groups=(
             ("", 2),
             ("planetoid lost at", 2),
@@ -198,7 +199,7 @@ def step_table(rows: Sequence[StepRow]) -> Table:
             ("error of the period", 2),
             ("z at 1500 off by", 2),
         ),
-        caption="HBVM with k = 18. Largest relative error of H; rotation of the ellipses less the true one; "
+        note="HBVM with k = 18. Largest relative error of H; rotation of the ellipses less the true one; "
         "relative error of the primaries' period; |z − true z| at the end. A planetoid that is lost has no "
         "such numbers.",
     )

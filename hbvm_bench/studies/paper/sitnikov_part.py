@@ -7,9 +7,10 @@ import numpy as np
 from hbvm_bench.studies.paper import axis_figures, axis_motion, others, sitnikov, sitnikov_beyond
 from hbvm_bench.studies.paper import sitnikov_claims as claims
 from hbvm_bench.studies.paper import sitnikov_figures as figures
-from hbvm_bench.studies.paper.document import Part, Table, number
+from hbvm_bench.studies.paper.document import Part, number
 from hbvm_bench.studies.paper.sitnikov import Orbit, StepRow
 from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.summaries.table import Table
 
 NODE_STEPS = (0.5, 0.25)
 SCANS = 3  # tasks of the scan over eccentricities
@@ -161,8 +162,8 @@ def _others(results: Results) -> Table:
             )
             for row in rows
         ),
-        numbers=frozenset(range(1, 6)),
-        caption="One setting per method, chosen by us for accuracy. Evaluations: of the vector "
+        words=(0, 6),
+        note="One setting per method, chosen by us for accuracy. Evaluations: of the vector "
         "field, where the library counts them. `hbvm-bench run sitnikov` has "
         "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
         "nothing.",

@@ -5,7 +5,6 @@ by round, in one process on one core, with compiling and setting up outside both
 `hbvm_bench.summaries.peers.PeerCheck`; ``hbvm-bench doctor --peers --out`` keeps it.
 """
 
-import gc
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -22,7 +21,7 @@ import problems
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import ensemble, machine
 from hbvm_bench.measure.starts import cloud
-from hbvm_bench.measure.timing import WARM_UP, Run
+from hbvm_bench.measure.timing import WARM_UP, Run, interleaved, no_collection
 from hbvm_bench.run import processes
 from hbvm_bench.store.files import write_json
 from hbvm_bench.studies.peers import alone as peers_alone
@@ -197,19 +196,13 @@ def _row(pair: Pair, rounds: int, short: bool) -> Row:
     if status is not Status.FINISHED:
         raise InputError(f"{pair.method} ended as {status.value}")
     _, alone_steps, alone_y = _alone(script)  # its first run is not counted either
-    taken: list[tuple[float, float]] = []
-    for number in range(rounds):
-        if number % 2:  # so that neither is always the first
-            other, mine = _alone(script)[0], harness.seconds(clock=CLOCK)[0]
-        else:
-            mine, other = harness.seconds(clock=CLOCK)[0], _alone(script)[0]
-        taken.append((mine, other))
+    seconds, alone = interleaved([lambda: harness.seconds(clock=CLOCK)[0], lambda: _alone(script)[0]], rounds)
     return Row(
         problem=title,
         method=repr(method),
         call=pair.call,
-        seconds=[mine for mine, _ in taken],
-        alone=[other for _, other in taken],
+        seconds=seconds,
+        alone=alone,
         steps=int(steps),
         alone_steps=int(alone_steps),
         difference=float(np.abs(y - alone_y).max() / np.abs(alone_y).max()),
@@ -219,15 +212,10 @@ def _row(pair: Pair, rounds: int, short: bool) -> Row:
 def _alone(script: Script) -> tuple[float, int, Array]:
     """Return seconds, steps and the end of one run of a library alone, garbage collection off as in `Run`."""
     run = script.begin()
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
+    with no_collection():
         start = CLOCK()
         made = script.go(run)
         spent = CLOCK() - start
-    finally:
-        if collecting:
-            gc.enable()
     return spent, *script.end(run, made)
 
 

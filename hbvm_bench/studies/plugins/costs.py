@@ -7,6 +7,7 @@ the other, several rounds of it, so that what else the machine does meets them a
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 import integrators
 import problems
 from hbvm_bench.measure.measured import position_error
+from hbvm_bench.measure.timing import interleaved
 from problems.catalogue.pendulum import exact_state
 from problems.errors import unknown
 from problems.problem import Problem
@@ -60,12 +62,14 @@ def measure(host: str, rounds: int) -> list[Cost]:
     problem, reference, rows = HOSTS[host]()
     names = [name for name, _ in rows]
     first = [run() for _, run in rows]
-    seconds = np.empty((len(rows), rounds))
-    for j in range(rounds):
-        for i, (_, run) in enumerate(rows):
-            start = time.perf_counter()
-            run()
-            seconds[i, j] = time.perf_counter() - start
+
+    def sample(run: Run) -> float:
+        start = time.perf_counter()
+        run()
+        return time.perf_counter() - start
+
+    samples = [partial(sample, run) for _, run in rows]
+    seconds = np.array(interleaved(samples, rounds, alternate=False))
     energies = [float(problem.errors(y)["energy"].max()) for y in first]
     true = np.stack([problem.y0, reference])
     positions = [float(position_error(problem, (y[-1] - reference)[None], true)[0]) for y in first]

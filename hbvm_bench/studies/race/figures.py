@@ -10,7 +10,15 @@ from matplotlib.lines import Line2D
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MARKERS, MUTED, UNKNOWN_MARKER, Look, base_colours
+from hbvm_bench.report.figures.style import (
+    INK,
+    MARKERS,
+    MUTED,
+    UNKNOWN_MARKER,
+    Look,
+    base_colours,
+    base_looks,
+)
 from hbvm_bench.studies.race import standings
 from hbvm_bench.studies.race.results import Outcome, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
@@ -22,11 +30,7 @@ TOP = 1
 
 def looks(races: Sequence[Race]) -> dict[str, Look]:
     """Return the look of every method that runs in the races, by its name."""
-    names = [parse_spec(o.setting.method).name for race in races for o in race.outcomes]
-    return {
-        name: Look(number, *base_colours(name), dash=(), marker=MARKERS.get(name, UNKNOWN_MARKER))
-        for number, name in enumerate(dict.fromkeys(names), 1)
-    }
+    return base_looks(parse_spec(o.setting.method).name for race in races for o in race.outcomes)
 
 
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:

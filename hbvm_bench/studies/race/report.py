@@ -9,9 +9,8 @@ from pathlib import Path
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report import shell
+from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.figures.canvas import Picture
-from hbvm_bench.report.figures.plots import as_csv
-from hbvm_bench.report.figures.png import small
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
@@ -26,7 +25,6 @@ from hbvm_bench.studies.race.standings import calibrated, present
 from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.table import Table
 
-FIGURES = "figures"
 BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful
 
 RULES_TEXT = f"""
@@ -83,17 +81,12 @@ def write(races: Sequence[Race], directory: Path) -> list[Path]:
     found = by_kind(directory, list(CONTESTS))
     if len(found) > 1:
         top.insert(1, tables.kinds(found))
-    made: dict[str, bytes] = {
+    made = {
         "data/settings.csv": settings_csv(sections).encode(),
         "README.md": markdown(sections, top).encode(),
         "index.html": page(sections, top, look).encode(),
+        **canvas.files(s.picture for s in sections if s.picture is not None),
     }
-    for one in sections:
-        if one.picture is not None and one.picture.plot is not None:
-            key = one.picture.key
-            made[f"{FIGURES}/{key}.svg"] = one.picture.svg.encode()
-            made[f"{FIGURES}/{key}.png"] = small(one.picture.png)
-            made[f"data/{key}.csv"] = as_csv(one.picture.plot).encode()
     write_all({directory / name: data for name, data in made.items()})
     return [directory / "README.md", directory / "index.html"]
 
@@ -179,12 +172,11 @@ def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, obj
         # older results were timed in another way than the one that was checked
         "peers": peers.kept() if all(race.schema == SCHEMA for race in races) else None,
         "families": [(family.title, family.code) for family in FAMILIES.values()],
-        "processors": list(dict.fromkeys(machine.sentence(race.machine) for race in races)),
+        "processors": machine.sentences(race.machine for race in races),
         "machine": list(last.machine.items()),
         "versions": list(last.versions.items()),
         "command": commands(races),
         "started": sorted({s.race.started[:10] for s in sections}),
-        "figures": FIGURES,
     }
 
 

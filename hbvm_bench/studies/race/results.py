@@ -6,11 +6,12 @@
 """
 
 from pathlib import Path
-from statistics import median, quantiles
+from statistics import median
 
 import msgspec
 
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.files import ensure_writable, write_json
 from hbvm_bench.store.records import decoded
 from problems.errors import InputError
@@ -159,12 +160,9 @@ class Outcome(msgspec.Struct, frozen=True, kw_only=True):
         return median(self.taken) if self.taken else None
 
     @property
-    def quartiles(self) -> tuple[float, float] | None:
-        """First and third quartile of the seconds of a run."""
-        if len(self.taken) < 2:
-            return None
-        low, _, high = quantiles(self.taken, n=4, method="inclusive")
-        return low, high
+    def time(self) -> Spread | None:
+        """The same with its quartiles."""
+        return Spread.of(self.taken) if self.taken else None
 
     @property
     def counts(self) -> bool:

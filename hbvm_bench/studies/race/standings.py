@@ -1,8 +1,9 @@
 """Who is how fast at which accuracy: read off the outcomes of a contest, the same way for every family."""
 
 from dataclasses import dataclass
-from statistics import median, quantiles
+from statistics import median
 
+from hbvm_bench.measure.timing import Spread, ratios
 from hbvm_bench.studies.race.results import Goal, Outcome, Race
 from hbvm_bench.studies.race.settings import OURS
 
@@ -12,24 +13,20 @@ POSITION_OVER_ENERGY = 1e3
 
 
 @dataclass(frozen=True)
-class Ratio:
+class Comparison:
     """A peer's best time over our best time.
 
     Attributes
     ----------
     ours, theirs : Outcome or None
         The fastest settings that are accurate enough; ``None`` where none is.
-    value : float or None
-        Median of the ratios within each interleaved round.
-    low, high : float or None
-        Quartiles of the same.
+    ratio : Spread or None
+        Of their time over ours within each interleaved round.
     """
 
     ours: Outcome | None
     theirs: Outcome | None
-    value: float | None
-    low: float | None
-    high: float | None
+    ratio: Spread | None = None
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Verdict:
     """A goal and what was measured."""
 
     goal: Goal
-    ratio: Ratio
+    comparison: Comparison
     reached: bool
 
 
@@ -63,20 +60,15 @@ def default(race: Race, family: str) -> Outcome | None:
     )
 
 
-def ratio(ours: Outcome | None, theirs: Outcome | None) -> Ratio:
+def compare(ours: Outcome | None, theirs: Outcome | None) -> Comparison:
     """Compare two outcomes of one contest."""
-    if ours is None or theirs is None or not ours.median or not theirs.median:
-        return Ratio(ours, theirs, None, None, None)
-    pairs = [
-        b / a for a, b in zip(ours.seconds, theirs.seconds, strict=True) if a is not None and b is not None
-    ]
-    low, high = (None, None) if len(pairs) < 2 else quantiles(pairs, n=4, method="inclusive")[::2]
-    return Ratio(ours, theirs, median(pairs) if pairs else None, low, high)
+    found = [] if ours is None or theirs is None else ratios(theirs.seconds, ours.seconds)
+    return Comparison(ours, theirs, Spread.of(found) if found else None)
 
 
-def at(race: Race, family: str, energy: float, position: float, ours: str = OURS) -> Ratio:
+def at(race: Race, family: str, energy: float, position: float, ours: str = OURS) -> Comparison:
     """Compare the best settings of a peer and of ours at one accuracy."""
-    return ratio(best(race, ours, energy, position), best(race, family, energy, position))
+    return compare(best(race, ours, energy, position), best(race, family, energy, position))
 
 
 def verdict(race: Race, goal: Goal) -> Verdict:
@@ -84,18 +76,18 @@ def verdict(race: Race, goal: Goal) -> Verdict:
     if goal.position is None:
         theirs = best(race, goal.family, goal.energy, float("inf"))
         allowed = float("inf") if theirs is None or theirs.position is None else theirs.position
-        found = ratio(best(race, OURS, goal.energy, allowed), theirs)
+        found = compare(best(race, OURS, goal.energy, allowed), theirs)
     else:
         found = at(race, goal.family, goal.energy, goal.position)
-    return Verdict(goal, found, found.value is not None and found.value >= goal.ratio)
+    return Verdict(goal, found, found.ratio is not None and found.ratio.median >= goal.ratio)
 
 
-def untuned(race: Race, family: str) -> Ratio:
+def untuned(race: Race, family: str) -> Comparison:
     """Compare a peer at its defaults with the fastest of ours that is as accurate, in both errors."""
     theirs = default(race, family)
     if theirs is None or theirs.energy is None or theirs.position is None:
-        return Ratio(None, theirs, None, None, None)
-    return ratio(best(race, OURS, theirs.energy, theirs.position), theirs)
+        return Comparison(None, theirs)
+    return compare(best(race, OURS, theirs.energy, theirs.position), theirs)
 
 
 def present(race: Race) -> list[str]:

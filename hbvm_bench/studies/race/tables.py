@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 
 from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import Spread
 from hbvm_bench.studies.race import standings
 from hbvm_bench.studies.race.results import Outcome, Probe, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
-from hbvm_bench.studies.race.standings import LEVELS, POSITION_OVER_ENERGY, Ratio
+from hbvm_bench.studies.race.standings import LEVELS, POSITION_OVER_ENERGY, Comparison
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import Table
 
@@ -57,7 +58,7 @@ def behind(races: Sequence[Race]) -> Table:
         "The settings behind these ratios",
         ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
         rows,
-        words=tuple(range(1, len(peers) + 2)),
+        words=range(len(peers) + 2),
     )
 
 
@@ -85,7 +86,7 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
         "How many times as long as our fastest setting each peer's fastest takes. "
         + machine.COLUMNS
         + " Left out: peers without a ratio anywhere.",
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -102,7 +103,7 @@ def goals(races: Sequence[Race]) -> Table:
                     FAMILIES[goal.family].short,
                     f"{power(goal.energy)}, {position}",
                     f"≥ {goal.ratio:g}",
-                    ratio_text(found.ratio),
+                    ratio_text(found.comparison.ratio),
                     "reached" if found.reached else "missed",
                 )
             )
@@ -110,7 +111,7 @@ def goals(races: Sequence[Race]) -> Table:
         "Goals declared before the race",
         ("problem", "peer", "energy, position", "goal", "measured", "verdict"),
         rows,
-        words=(1, 5),
+        words=(0, 1, 5),
     )
 
 
@@ -125,7 +126,7 @@ def fastest(race: Race) -> Table:
         if found is None:
             rows.append((name, _why_none(race, family), *[NONE] * 6))
             continue
-        ratio = "1" if family == OURS else ratio_text(standings.ratio(ours, found))
+        ratio = "1" if family == OURS else ratio_text(standings.compare(ours, found).ratio)
         rows.append(
             (
                 name,
@@ -142,7 +143,7 @@ def fastest(race: Race) -> Table:
         f"The fastest settings with energy error ≤ {power(energy)} and position error ≤ {power(position)}",
         ("family", "setting", "time", "energy", "position", "steps", "evaluations", "× ours"),
         rows,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -165,7 +166,7 @@ def levels(race: Race) -> Table:
         "At other accuracies",
         ("energy, position ≤", "our fastest", "time", *(f"{FAMILIES[p].short} × ours" for p in peers)),
         rows,
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -185,7 +186,7 @@ def defaults(race: Race) -> Table | None:
                 error(found.theirs.position),
                 ours.setting.method if ours else "none is as accurate",
                 time_of(ours) if ours else NONE,
-                ratio_text(found) if found.value else NONE,
+                ratio_text(found.ratio),
             )
         )
     if not rows:
@@ -195,7 +196,7 @@ def defaults(race: Race) -> Table | None:
         ("default", "time", "energy", "position", "ours", "time", "× ours"),
         rows,
         "A fixed step has no default: ours is chosen, theirs is not.",
-        words=(4,),
+        words=(0, 4),
     )
 
 
@@ -211,7 +212,7 @@ def compiling(race: Race) -> Table | None:
             for probe in race.probes
         ],
         "Medians. The whole process includes starting Python and importing everything.",
-        words=(1,),
+        words=(0, 1),
     )
 
 
@@ -239,7 +240,7 @@ def everything(race: Race) -> Table:
         rows,
         "Time: median of a run, with its quartiles. Call: a run that goes next to nowhere, which bounds the "
         "overhead in each time. Brackets: void.",
-        words=(7,),
+        words=(0, 7),
     )
 
 
@@ -248,12 +249,12 @@ def asked(race: Race) -> tuple[float, float]:
     return race.contest.energy, race.contest.position
 
 
-def ratio_text(ratio: Ratio) -> str:
+def ratio_text(ratio: Spread | None) -> str:
     """Write a ratio with its quartiles."""
-    if ratio.value is None:
+    if ratio is None:
         return NONE
     spread = "" if ratio.low is None or ratio.high is None else f" ({number(ratio.low)}–{number(ratio.high)})"
-    return f"{number(ratio.value)}×{spread}"
+    return f"{number(ratio.median)}×{spread}"
 
 
 def number(value: float) -> str:
@@ -281,25 +282,25 @@ def count(value: int | None) -> str:
 
 def time_of(outcome: Outcome) -> str:
     """Write the median time of a run with its quartiles."""
-    if outcome.median is None:
+    time = outcome.time
+    if time is None:
         return NONE
-    low_high = outcome.quartiles
-    spread = "" if low_high is None else f" ({seconds(low_high[0])} – {seconds(low_high[1])})"
-    return f"{seconds(outcome.median)}{spread}"
+    spread = "" if time.low is None or time.high is None else f" ({seconds(time.low)} – {seconds(time.high)})"
+    return f"{seconds(time.median)}{spread}"
 
 
-def _headline_cell(race: Race, peer: str, ratio: Ratio) -> str:
+def _headline_cell(race: Race, peer: str, found: Comparison) -> str:
     if peer not in standings.present(race):
         return NONE
-    if ratio.theirs is None:
+    if found.theirs is None:
         return _why_none(race, peer)
-    return ratio_text(ratio) if ratio.ours is not None else "only the peer reaches it"
+    return ratio_text(found.ratio) if found.ours is not None else "only the peer reaches it"
 
 
-def _level_cell(ratio: Ratio) -> str:
-    if ratio.theirs is None:
+def _level_cell(found: Comparison) -> str:
+    if found.theirs is None:
         return "not reached"
-    return ratio_text(ratio) if ratio.ours is not None else f"{time_of(ratio.theirs)} alone"
+    return ratio_text(found.ratio) if found.ours is not None else f"{time_of(found.theirs)} alone"
 
 
 def _why_none(race: Race, family: str) -> str:

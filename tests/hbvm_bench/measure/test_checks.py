@@ -4,7 +4,7 @@ import pytest
 import problems
 from hbvm_bench.campaign.file import Checks, Ensemble, TimingPlan
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.measure import ensemble, laws
+from hbvm_bench.measure import ensemble
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
@@ -75,17 +75,6 @@ def test_a_run_that_fails_has_no_law_and_says_why():
     assert not measured.complete
     assert checked.laws["energy"].law is None
     assert "ends at t = " in checked.laws["energy"].why
-
-
-def test_a_law_is_plain_numbers_and_draws_its_curve():
-    t = np.geomspace(1.0, 1e4, 300)
-    rng = np.random.default_rng(3)
-    rows = np.cumsum(rng.normal(size=(6, t.size)) * np.sqrt(np.diff(t, prepend=0.0)), axis=1)
-    law = laws.find(t, 1e-16 * rows, signed=True)
-    assert law.law == "square root"
-    assert law.slope_low < 0.5 < law.slope_high
-    assert laws.curve(law, np.array([1e4]))[0] == pytest.approx(1e-16 * 100.0, rel=1.0)
-    assert laws.find(t, np.full((1, t.size), np.nan), signed=True).law is None
 
 
 def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():

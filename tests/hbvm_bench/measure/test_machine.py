@@ -59,6 +59,14 @@ def test_what_was_not_recorded_is_said_and_not_guessed():
     assert "not recorded" in machine.sentence({})
 
 
+def test_a_kind_of_processor_is_said_once_with_the_range_of_its_clock():
+    read = [ZEN4, ZEN4 | {"clock_ghz": "3.6"}, ZEN5, ZEN4 | {"clock_ghz": "3.65", "cores": 8}, ZEN5]
+    first, second = machine.sentences(read)
+    assert first == machine.sentence(ZEN4).replace("3.7 GHz", "3.6 to 3.7 GHz")
+    assert second == machine.sentence(ZEN5)
+    assert machine.sentences([ZEN4, ZEN4]) == [machine.sentence(ZEN4)]
+
+
 def test_a_machine_is_itself_whatever_its_clock_says_today_and_what_older_results_lack():
     assert machine.same(ZEN4, ZEN4 | {"clock_ghz": "2.6", "vector_bits": 512})
     assert machine.same(OLD, ZEN4)

@@ -123,3 +123,22 @@ def test_a_campaign_s_round_is_of_such_runs(monkeypatch):
     monkeypatch.setattr(timing, "sampled", lambda run, program, plan: seen.append(run) or "not timed")
     timing.time_round(problems.load("pendulum", t_end=1.0), Landing(), TimingPlan())
     assert [run.sample for run in seen] == ["land"]
+
+
+@pytest.mark.parametrize(("alternate", "order"), [(True, "abbaab"), (False, "ababab")])
+def test_no_sample_is_always_the_first_of_its_round(alternate, order):
+    taken = []
+
+    def sample(name):
+        taken.append(name)
+        return float(len(taken))
+
+    seconds = timing.interleaved([lambda: sample("a"), lambda: sample("b")], rounds=3, alternate=alternate)
+    assert "".join(taken) == order
+    assert seconds == [[i + 1.0 for i, name in enumerate(order) if name == one] for one in "ab"]
+
+
+def test_ratios_are_of_the_rounds_that_both_have():
+    found = timing.Spread.of(timing.ratios([3.0, None, 6.0, 4.0], [1.0, 1.0, 2.0, None]))
+    assert found == timing.Spread(3.0, 3.0, 3.0)
+    assert timing.Spread.of([2.0]) == timing.Spread(2.0, None, None)

@@ -11,10 +11,11 @@ from playwright.sync_api import expect
 
 from hbvm_bench.commands import paper
 from hbvm_bench.studies.endure import report as endure
-from hbvm_bench.studies.paper.document import Claim, Part, Table
+from hbvm_bench.studies.paper.document import Claim, Part
 from hbvm_bench.studies.paper.properties import Order
 from hbvm_bench.studies.paper.properties_figures import order
 from hbvm_bench.studies.race import report as race
+from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench.studies import test_endure
 from tests.hbvm_bench.studies.race.conftest import made_up
 
@@ -28,7 +29,7 @@ def made_up_part():
     """Return a part of the paper's report with one of everything."""
     rows = [Order(s, s, [0.2, 0.1], [0.2 ** (2 * s), 0.1 ** (2 * s)], 2.0 * s) for s in (1, 2)]
     claim = Claim("It is of order 2s", "Section 2", "2.00 at `h=0.1`, 3.4e-15", "holds")
-    table = Table("numbers", "Numbers", ("method", "error"), (("Gauss(s=2)", "3.4e-15"),), frozenset({1}))
+    table = Table("Numbers", ("method", "error"), [("Gauss(s=2)", "3.4e-15")], key="numbers")
     return Part("made-up", "Made up", ["A sentence."], [claim], [order(rows), table])
 
 

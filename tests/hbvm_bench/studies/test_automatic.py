@@ -18,9 +18,8 @@ def test_both_sides_are_measured_on_the_same_trajectory():
         assert len(side.seconds) == 2
         assert min(side.seconds) > 0.0
     assert duel.ours.steps < duel.theirs.steps / 3
-    low, high = duel.quartiles
-    assert low <= high
-    assert duel.reached == (duel.as_accurate and duel.ratio >= 1.5)
+    assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
+    assert duel.reached == (duel.as_accurate and duel.ratio.median >= 1.5)
 
 
 def test_other_problems_and_too_few_rounds_are_refused(capsys):

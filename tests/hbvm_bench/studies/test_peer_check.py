@@ -70,7 +70,7 @@ def test_the_harness_takes_the_library_s_own_steps_to_its_own_end(pair):
 def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(
     monkeypatch, tmp_path, result, beyond
 ):
-    def wait(command):
+    def wait(command, environment):
         request = msgspec.json.decode(Path(command[-1]).read_bytes())
         write_json(Path(request["out"]), result)
         return 0
@@ -94,7 +94,7 @@ def test_the_reports_print_what_was_kept_with_its_day_machine_and_command():
 
 
 def test_a_process_that_dies_leaves_nothing(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(processes, "wait", lambda command: -9)
+    monkeypatch.setattr(processes, "wait", lambda command, environment: -9)
     out = tmp_path / "peers.json"
     assert cli.main(["doctor", "--peers", "--out", str(out)]) == 1
     assert "exit code -9" in capsys.readouterr().err
