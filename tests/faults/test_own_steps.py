@@ -27,7 +27,7 @@ FAULTS = [
     Fault(
         "HBVM(k=4, s=2, h=0.1, breakpoints=[1])",
         lambda: HBVM(k=4, s=2, h=0.1, breakpoints=[1.0]),
-        "takes breakpoints with a tolerance only; give tol",
+        "takes breakpoints with a tolerance only, not with h=0.1 alone; give tol",
     ),
     Fault("Gauss(s=2, h=0.1, max_steps=9)", lambda: Gauss(s=2, h=0.1, max_steps=9), "Gauss takes max_steps"),
     Fault(
