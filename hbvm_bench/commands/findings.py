@@ -10,9 +10,12 @@ from hbvm_bench.summaries import engines
 from problems.analysis import structure
 from problems.analysis.latex import latex
 from problems.catalogue import expression
-from problems.errors import InputError
+from problems.errors import InputError, unknown
 from problems.problem import Problem
 from problems.systems.base import System
+
+SHORTEST = 3
+"""Letters that a formula's only name may have: q, p10."""
 
 DEGREES = (1, 2, 3, 4, 5)  # of the methods for which k is given
 
@@ -91,12 +94,16 @@ def inspect(text: str, parameters: str = "") -> Findings:
 
 
 def _problem(text: str) -> Problem | None:
-    """Return the problem that a text names, or ``None`` if it is not such a call."""
+    """Return the problem that a text names, or ``None`` if it is a formula."""
     try:
-        named = parse_spec(text).name in problems.names()
+        name = parse_spec(text).name
     except InputError:
-        named = text.partition("(")[0].strip() in problems.names()
-    return make_problem(text) if named else None
+        name = text.partition("(")[0].strip()
+    else:
+        # A bare word or a call of one is a misspelt problem rather than a formula: q and p1 are shorter.
+        if len(name) > SHORTEST and name not in problems.names():
+            raise unknown("problem", name, problems.names())
+    return make_problem(text) if name in problems.names() else None
 
 
 def _describe(name: str, system: System, problem: Problem) -> Findings:

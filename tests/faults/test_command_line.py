@@ -189,7 +189,8 @@ inspect "p^2/2 - k*q" --par "k=a"                          | cannot read 'k=a'; 
 inspect "p^2/2 - k*q" --par "kk=1"                         | the formula 'p^2/2 - k*q' contains 'k', which
 inspect "p^2/2 - q" --par "k=1"                            | unknown parameter, not in the formula, 'k';
 inspect "p^2/2" --par "k=1,k=2"                            | the parameter 'k' is given twice
-inspect "keplr()"                                          | cannot read the formula 'keplr()': unknown
+inspect "keplr()"                                          | unknown problem 'keplr'; did you mean 'kepler'
+inspect "schwarzchild"                                     | unknown problem 'schwarzchild'; did you mean
 inspect "kepler(ee=1)"                                     | unknown argument of kepler 'ee'; did you mean
 inspect "kepler()" --par "k=1"                             | parameters belong to formulas; write them into
 inspect "1"                                                | the formula '1' contains no coordinate; use q
