@@ -19,6 +19,7 @@ from integrators.kernel.context import (
     KINKS_KEPT,
     LAND,
     NOT_FINITE,
+    NOT_KEPT,
     SCATTERED,
     SIDE,
     UNDERFLOW,
@@ -26,6 +27,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
+from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import engine
 from integrators.kernel.pace import Pace
 from integrators.kernel.step.engine import steps
@@ -58,8 +60,11 @@ class Program(Protocol):
     def description(self) -> str: ...
     @property
     def lanes(self) -> bool: ...
-    def context(self, *, side: bool = False) -> Context: ...
-    def load(self, context: Context, par: Array) -> None: ...
+
+    kept: Kept | None
+
+    def contexts(self) -> tuple[Context, Context]: ...
+    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
     def implicit(self) -> Workspace: ...
 
@@ -80,8 +85,6 @@ class Checkpoint:
 
     identity: Identity
     words: Counts
-    state: Array
-    e: Array  # what the state has lost to rounding
     arrays: tuple[Array, ...]
     implicit: tuple[Any, ...] | None
     taken: int  # steps since the trajectory's start
@@ -114,9 +117,7 @@ class HBVMStepper:
     _words: ClassVar[tuple[str, ...]] = (
         "h", "t0", "n", "length", "solved", "age", "free", "implicit", "slow", "held", "left",
     )  # fmt: skip
-    _arrays: ClassVar[tuple[str, ...]] = ("values", "strict", "floored")
-    _state: ClassVar[tuple[str, str]] = ("state", "error")
-    _engine: ClassVar[engine.Engine] = steps
+    _arrays: ClassVar[tuple[str, ...]] = ("state", "error", "values", "strict", "floored")
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
@@ -127,19 +128,12 @@ class HBVMStepper:
         self._implicit: tuple[Workspace, Workspace] | None = None
         self._dim, self._pace = y.size, Pace(CHUNK, y.size)
         self._status, self._reason = Status.RUNNING, ""
-        self._context, self._side = self._memories(y, par, t0)
-        self._begin(y, t0)
-
-    def _memories(self, y: Array, par: Array, t0: float) -> tuple[Any, Any]:
-        """Return the memory of the trajectory, and that of partial steps."""
-        program = self._program
-        self._context, self._side = program.context(), program.context(side=True)
-        for context in (self._context, self._side):
-            program.load(context, par)
+        self._context, self._side = program.contexts()
+        program.load((self._context, self._side), y, par, t0)
         self._context.strategy = program.solver.strategy
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
-        return self._context, self._side
+        self._begin(y, t0)
 
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
@@ -147,7 +141,7 @@ class HBVMStepper:
         self._uncounted = ctx.steps  # steps that are not of this trajectory
         ctx.t0 = t0
         self._first_length(t0)
-        self._engine(engine.RESET, ctx.address, out=y.ctypes.data)
+        steps(engine.RESET, ctx.address, out=y.ctypes.data)
 
     def _first_length(self, t0: float) -> None:
         """Set the length of the first step from t0."""
@@ -202,14 +196,18 @@ class HBVMStepper:
         stages hold the positions only ("second") or the whole state ("first"); and, once
         there is an implicit solver, ``"implicit"``, a dict: own steps that it solved, times
         that it took over, Jacobians (and whether they are "traced" or by "differences"),
-        factorizations, rescues of steps that a fixed Jacobian could not solve.
+        factorizations, rescues of steps that a fixed Jacobian could not solve. With several
+        invariants also ``"lost"``, how often one had moved in a step by more than rounding
+        accounts for (k is then too small), and ``"left_out"``, the names of those that follow
+        from others.
         """
-        ctx = self._context
+        ctx, kept = self._context, self._program.kept
         extra: dict[str, Any] = {
             "partial_steps": ctx.partial,
             "restarts": ctx.restarts,
             "lanes": self._program.lanes,
             "form": "second" if self._program.second else "first",
+            **(kept.report(ctx) if kept else {}),
         }
         if self._implicit is not None:
             extra["implicit"] = {
@@ -322,16 +320,18 @@ class HBVMStepper:
         """Words of a checkpoint."""
         return [self._context.slots[name].place for name in self._words]
 
+    @property
+    def _kept(self) -> tuple[str, ...]:
+        """Arrays of a checkpoint."""
+        return self._arrays + (self._program.kept.arrays if self._program.kept else ())
+
     @one_thread
     def checkpoint(self) -> Checkpoint:
         """Return a copy of all that the continuation depends on."""
-        state, error, *arrays = (getattr(self._context, name).copy() for name in self._state + self._arrays)
         return Checkpoint(
             self._identity,
             self._context.words[self._places],
-            state,
-            error,
-            tuple(arrays),
+            tuple(getattr(self._context, name).copy() for name in self._kept),
             None if self._implicit is None else self._implicit[0].save(),
             self._taken,
             self._status,
@@ -351,8 +351,7 @@ class HBVMStepper:
         self._identity.check(checkpoint, Checkpoint)
         self._context.words[self._places] = checkpoint.words
         self._set_step(self._context.h)
-        kept = (checkpoint.state, checkpoint.e, *checkpoint.arrays)
-        for name, array in zip(self._state + self._arrays, kept, strict=True):
+        for name, array in zip(self._kept, checkpoint.arrays, strict=True):
             getattr(self._context, name)[:] = array
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
@@ -395,7 +394,7 @@ class HBVMStepper:
             self._take_implicit()
         try:
             with self._pace:
-                outcome = self._engine(
+                outcome = steps(
                     what, self._context.address, self._side.address, between, times.size,
                     times.ctypes.data, targets, parts, made, out.ctypes.data, budget,
                 )  # fmt: skip
@@ -422,7 +421,7 @@ class HBVMStepper:
         """Return the status that an outcome stands for, and the reason as a sentence."""
         if self.error is not None:
             return Status.USER_ERROR, f"{UserError(self.error)} in the step from t = {self.t!r}."
-        return failure(outcome, self._context, self.t, self._solver)
+        return failure(outcome, self._program, (self._context, self._side), self.t, self._solver)
 
 
 class AdaptiveStepper(HBVMStepper):
@@ -642,8 +641,13 @@ class AdaptiveStepper(HBVMStepper):
         return super()._failure(outcome)
 
 
-def failure(outcome: int, ctx: Context, t: float, solver: str = "fixed-point") -> tuple[Status, str]:
+def failure(
+    outcome: int, program: Program, contexts: tuple[Context, Context], t: float, solver: str = "fixed-point"
+) -> tuple[Status, str]:
     """Return the status that an outcome of the kernel stands for, and the reason as a sentence."""
+    ctx = contexts[0]
+    if outcome == NOT_KEPT and program.kept:
+        return Status.NOT_INVARIANT, program.kept.refusal(contexts, t)
     if outcome == NOT_FINITE:
         return Status.NOT_FINITE, f"the vector field is not finite in the step from t = {t!r}."
     if outcome == SCATTERED:

@@ -243,5 +243,7 @@ call_sweeps = _caller(3)
 """``call_sweeps(fused, ctx, count, tested)``: see `integrators.kernel.step.fused`."""
 call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
+call_line = _caller(2, types.int64)
+"""``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
