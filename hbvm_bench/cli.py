@@ -44,6 +44,7 @@ SEPARATE = {
     "merge": "hbvm_bench.commands.merge",
     "plugins": "hbvm_bench.commands.plugins",
     "run": "hbvm_bench.commands.run",
+    "warm": "hbvm_bench.commands.warm",
 }
 
 
