@@ -181,17 +181,6 @@ put_upper = _half(4)
 
 
 @intrinsic
-def upper(typing, x):
-    """Keep the upper four lanes and set the lower ones to zero."""
-
-    def generate(context, builder, sig, args):
-        zero = ir.Constant(vector(WIDTH), [0.0] * WIDTH)
-        return builder.shuffle_vector(zero, args[0], indices(0, 1, 2, 3, 12, 13, 14, 15))
-
-    return signature(EIGHT, EIGHT), generate
-
-
-@intrinsic
 def larger(typing, x, y):
     """Lane by lane the larger of two vectors that are not negative; NaN where either is."""
 
