@@ -29,6 +29,7 @@ app = typer.Typer(
 
 # Commands with an implementation of their own; each is imported only when it is asked for.
 SEPARATE = {
+    "advise": "hbvm_bench.commands.advise",
     "automatic": "hbvm_bench.commands.automatic",
     "race": "hbvm_bench.commands.race",
     "endure": "hbvm_bench.commands.endure",
