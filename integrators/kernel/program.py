@@ -10,6 +10,7 @@ from integrators.caveats import sees_kinks
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
 from integrators.kernel.line.kept import Kept
@@ -19,7 +20,8 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
+from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
@@ -156,7 +158,7 @@ class HBVMProgram:
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return HBVMStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        return FixedStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def batch(
         self,
@@ -237,6 +239,7 @@ class HBVMProgram:
             context.par[:] = par
             if self.second:
                 context.velocity[: self.shape.rows] = self._velocity(par)
+        contexts[0].h = self.h
         if self.kept:
             self.kept.load(contexts, y, par, t0)
 
@@ -339,6 +342,12 @@ class AdaptiveProgram(HBVMProgram):
         """Return a stepper at ``t0``; as `HBVMProgram.start`."""
         values = check_parameters(par, self.system)
         return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+
+    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
+        super().load(contexts, y, par, t0)
+        contexts[0].next_length = self.first or 0.0
+        contexts[0].doubt_end = t0
 
     def _context(self, *, side: bool) -> Context:
         context = super()._context(side=True)  # with a matrix of its own
