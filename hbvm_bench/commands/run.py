@@ -58,7 +58,9 @@ def run(
             ensure_writable(report_to, keep=False)
         store.prepare()
         _measure(campaign, cases, store, pool, timing, _command(name, problem, method, step))
-    terminal.print_results(store.records())
+    records = store.records()
+    terminal.print_results(records)
+    terminal.print_goals(campaign, records)
     if report_to is not None:
         from hbvm_bench.report.write import write_report
 
