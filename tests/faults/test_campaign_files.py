@@ -33,9 +33,9 @@ METHODS                                                      => campaign 'x' has
 PROBLEMS                                                     => campaign 'x' has no problems; give at least
 problems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => Object missing required field `name`
 RIGHT\nnmae = "y"                                            => unknown key 'nmae'; did you mean 'name'?
-RIGHT\ntitle = 3                                             => Expected `str | array`, got `int`, at `title`
+RIGHT\ntitle = 3                                             => Expected `str`, got `int`, at `title`
 RIGHT\ndescription = []                                      => Expected `str`, got `array`, at `description`
-name = 3\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => Expected `str | array`, got `int`, at
+name = 3\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => Expected `str`, got `int`, at
 name = ""\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => campaign name '' must be a
 name = "../x"\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => campaign name '../x'
 name = ".x"\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => campaign name '.x' must be
@@ -55,7 +55,7 @@ PROBLEMS\nproblems = ["fput(n=100000000)"]                   => the limit is
 PROBLEMS\nproblems = ["lennard_jones(rings=1000)"]           => the limit is
 PROBLEMS\nproblems = ["kepler()", "kepler()"]                => HBVM(k=4, s=2, h=0.1) on kepler(e=0.6) is
 PROBLEMS\nproblems = [{}]                                    => Object missing required field `use`, at
-PROBLEMS\nproblems = [{use = 3}]                             => Expected `str | array`, got `int`, at
+PROBLEMS\nproblems = [{use = 3}]                             => Expected `str`, got `int`, at
 PROBLEMS\nproblems = [{us = "kepler()"}]                     => unknown key 'us'; did you mean 'use' or
 PROBLEMS\nproblems = [{use = "kepler()", grid = 3}]          => Expected `object | null`, got `int`, at
 PROBLEMS\nproblems = [{use = "kepler()", grid = {count = 0}}] => Expected `int` >= 1, at
@@ -91,10 +91,10 @@ METHODS\nmethods = [{use = "HBVM(k=4,s=2,h={h})"}]           => unknown value in
 METHODS\nmethods = [{use = "HBVM()"}, {use = "HBVM()"}]      => HBVM(tol=3e-16) on kepler(e=0.6) is given
 METHODS\nmethods = [{use = "HBVM()", settings = "best"}]     => unknown settings 'best'; known: as published,
 METHODS\nmethods = [{use = "HBVM()", settings = 3}]          => unknown settings '3'; known: as published,
-METHODS\nmethods = [{use = "HBVM()", note = 3}]              => Expected `str | array`, got `int`, at
+METHODS\nmethods = [{use = "HBVM()", note = 3}]              => Expected `str`, got `int`, at
 METHODS\nmethods = [{use = "HBVM()", only = "kepler"}]       => Expected `array`, got `str`, at
 METHODS\nmethods = [{use = "HBVM()", only = ["keplr"]}]      => unknown problem of the campaign 'keplr'; did
-METHODS\nmethods = [{use = "HBVM()", only = [3]}]            => Expected `str | array`, got `int`, at
+METHODS\nmethods = [{use = "HBVM()", only = [3]}]            => Expected `str`, got `int`, at
 METHODS\nmethods = [{use = "HBVM()", sweep = {k = [1]}}]     => HBVM(): the sweep gives values of 'k', which
 METHODS\nmethods = [{use = "HBVM()", sweep = 3}]             => Expected `object`, got `int`, at
 METHODS\nmethods = [{use = "HBVM()", role = "ours"}]         => unknown key 'role'; did you mean 'only' or
@@ -118,7 +118,7 @@ RIGHT\n[grid]\ncount = 1000000000000\nspacing = "irregular"  => the limit is
 RIGHT\n[grid]\ncount = 1000000000000\nspacing = "log"        => the limit is
 RIGHT\n[grid]\ncount = 10\nstep = 1                          => a grid has a step or a count, not both, at
 RIGHT\n[grid]\nspacing = "even"                              => Invalid enum value 'even', at `grid.spacing`
-RIGHT\n[grid]\nspacing = 3                                   => Expected `str | array`, got `int`, at `grid.spacing`
+RIGHT\n[grid]\nspacing = 3                                   => Expected `str`, got `int`, at `grid.spacing`
 RIGHT\n[grid]\nspacing = "log"\nstep = 1                     => a grid with spacing='log' has a count, not a
 RIGHT\n[grid]\nfirst = 1                                     => first= belongs to a grid with spacing='log',
 RIGHT\n[grid]\nspacing = "log"\nfirst = 1e9                  => a grid that begins at first=1000000000.0 lies
@@ -177,7 +177,7 @@ RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = nan     => Expected `float`
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = inf     => Expected `float` <= 1e+300, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = "a"     => Expected `float`, got `str`, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncuont = 10                   => unknown key 'cuont'; did you mean 'count'?
-RIGHT\n[[ensembles]]\nproblem = 3\nmethods = []\ncount = 10  => Expected `str | array`, got `int`, at
+RIGHT\n[[ensembles]]\nproblem = 3\nmethods = []\ncount = 10  => Expected `str`, got `int`, at
 RIGHT\n[[ensembles]]\nproblem = "kepler()"\nmethods = []\ncount = 10 => Expected `array` of length >= 1, at
 """
 
