@@ -44,6 +44,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         time; a hundredth of the span by default.
     also : list of float
         Further times after the start, where they lie within the span.
+    multiple_of : float, optional
+        Moves every time between the ends to the nearest multiple of this after the start, such
+        as a year, which a step may divide.
     own_steps : bool
         Whether samples are moved to the nearest own steps of a method with a fixed one, so
         that they cost it nothing in quality, and the end is that of a run without samples,
@@ -57,6 +60,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     spacing: Spacing = "equal"
     first: Positive | None = None
     also: list[Positive] = []
+    multiple_of: Positive | None = None
     own_steps: bool = False
 
     def __post_init__(self) -> None:
@@ -83,14 +87,13 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             For more samples than `problems.limits` allow, or ``first`` beyond the span.
         """
         times, span = self._shared(problem), problem.t_end - problem.t0
-        further = np.array([t for t in self.also if t < abs(span)])
-        if further.size:
-            times = np.union1d(times, problem.t0 + np.copysign(further, span))
-            times = times if span > 0.0 else times[::-1]
-        if not (self.own_steps and h):
+        further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)
+        times = np.union1d(times, further)[:: 1 if span > 0.0 else -1] if further.size else times
+        unit = h if self.own_steps and h else self.multiple_of
+        if not unit:
             return times
-        own = np.unique(np.rint(np.abs(times - problem.t0) / h)) * h
-        inside = own[own < abs(span) * (1 - 1e-12)]
+        after = np.unique(np.rint(np.abs(times - problem.t0) / unit)) * unit
+        inside = after[after < abs(span) * (1 - 1e-12)]
         return np.append(problem.t0 + np.copysign(inside, span), problem.t_end)
 
     def _shared(self, problem: Problem) -> NDArray[np.float64]:

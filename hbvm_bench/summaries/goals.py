@@ -49,6 +49,11 @@ class Verdict:
     why: str
     comparison: Comparison
 
+    @property
+    def reached(self) -> bool:
+        """Whether it is."""
+        return self.verdict == "reached"
+
 
 def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
     """Return the verdict on every goal, problem by problem.
