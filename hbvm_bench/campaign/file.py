@@ -46,6 +46,8 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         What is asked for, declared before the run.
     grid, limits, timing, checks
         Shared by all cases.
+    quick : bool
+        Whether only those settings are run that are marked for a quick run.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     limits: Limits = Limits()
     timing: TimingPlan = TimingPlan()
     checks: Checks = Checks()
+    quick: bool = False
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", self.name):
@@ -104,7 +107,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for entry in self.entries()
             for chosen in _chosen(entry)
             for method in self.methods
-            for text in _settings(method, name_of(entry), chosen)
+            for text in _settings(method, name_of(entry), chosen, self.quick)
         ]
         return made + [
             Case(
@@ -116,7 +119,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             )
             for entry in self.ensembles
             for method in entry.methods
-            for text in _settings(method, parse_spec(entry.problem).name, {})
+            for text in _settings(method, parse_spec(entry.problem).name, {}, self.quick)
         ]
 
     def _count(self) -> int:
@@ -149,13 +152,14 @@ def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
     return [entry.values | chosen for chosen in combinations(entry.sweep)]
 
 
-def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar]) -> list[str]:
+def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar], quick: bool) -> list[str]:
     if method.only and problem not in method.only:
         return []
     for text in method.texts:
         _all_used(text, method.sweep)
     chosen = list(combinations(method.sweep))
-    return [fill(text, {**values, **one}) for text in method.texts for one in chosen]
+    made = [fill(text, {**values, **one}) for text in method.texts for one in chosen]
+    return [made[place] for place in method.quick] if quick and method.quick else made
 
 
 def _all_used(text: str, sweep: Mapping[str, object]) -> None:

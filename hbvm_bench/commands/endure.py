@@ -11,7 +11,6 @@ from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import carry_out
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.store.store import Store
 from hbvm_bench.studies.endure import law, runs
 from hbvm_bench.studies.endure.runs import Endurance
 from hbvm_bench.summaries.goals import as_data as goals_as_data
@@ -54,20 +53,20 @@ def endure(
     from hbvm_bench.studies.endure import report
 
     if as_json:
-        terminal.print_json(as_data(result, directory))
+        terminal.print_json(as_data(result))
     else:
         for table in report.tables(result):
             terminal.print_table(table)
-        terminal.console().print(machine.sentence(result.machine), highlight=False)
+        terminal.console().print(machine.sentence(result.run.machine), highlight=False)
     terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
 
 
-def as_data(result: Endurance, directory: Path) -> dict[str, Any]:
+def as_data(result: Endurance) -> dict[str, Any]:
     """Return the result with what is read off it, as plain data for JSON."""
     return {
         "lines": [_line(line) for line in law.lines(result)],
         "goals": goals_as_data(law.goals(result)),
-        "result": run_as_json(Store(directory).index(), result.records),
+        "result": run_as_json(result.run.index, result.run.records),
     }
 
 

@@ -38,6 +38,8 @@ class Verdict:
         Why nothing was measured, or why it is void.
     comparison : Comparison
         The cases that decide; for a goal without a peer it has only ours.
+    records : sequence of Record
+        Of all cases on the problem.
     """
 
     goal: Goal
@@ -48,6 +50,7 @@ class Verdict:
     verdict: Literal["reached", "missed", "void"]
     why: str
     comparison: Comparison
+    records: Sequence[Record]
 
     @property
     def reached(self) -> bool:
@@ -112,6 +115,7 @@ def _alone(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdic
         verdict="reached" if reached else "missed",
         why=why,
         comparison=Comparison(ours, None),
+        records=records,
     )
 
 
@@ -142,6 +146,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], asked: 
         verdict="void" if blind else "reached" if reached else "missed",
         why=why,
         comparison=found,
+        records=records,
     )
 
 

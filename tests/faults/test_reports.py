@@ -8,6 +8,7 @@ import pytest
 
 from hbvm_bench import cli
 from hbvm_bench.report.markdown import code
+from hbvm_bench.store import kept
 from hbvm_bench.store.records import printable
 from hbvm_bench.store.store import Store
 from hbvm_bench.studies.automatic import runs as automatic
@@ -15,6 +16,7 @@ from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
+from tests.hbvm_bench.studies.test_automatic import made as a_duel
 from tests.hbvm_bench.studies.test_endure import made as an_endurance
 
 ENSEMBLE = """
@@ -81,10 +83,11 @@ def stored_results(directory):
         timing = msgspec.structs.replace(record.timing, machine=said["machine"])
         store.save(msgspec.structs.replace(record, timing=timing, versions=said["versions"]))
     store.write_index(msgspec.structs.replace(store.index(), command=said["command"]))
-    ours = automatic.Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
-    duels = [automatic.Duel("kepler", 2.0, ours, ours)]
+    run = a_duel(said["machine"])
+    records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
+    index = msgspec.structs.replace(run.index, command=said["command"])
     (directory / "automatic").mkdir()
-    automatic.save([automatic.Result(duels=duels, **said)], directory / "automatic" / "one.json")
+    kept.save([kept.Kept(index=index, records=records)], directory / "automatic" / "one.json")
 
 
 @pytest.mark.parametrize(
@@ -134,7 +137,7 @@ def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
     for read in (
         lambda: results.load(tmp_path, list(CONTESTS)),
         lambda: Store(tmp_path).index(),
-        lambda: automatic.load(tmp_path / "one.json"),
+        lambda: kept.load(tmp_path / "one.json", "automatic"),
     ):
         with pytest.raises(InputError, match=r"is not the (result|index) of"):
             read()

@@ -43,11 +43,11 @@ class Line:
 
 def lines(result: Endurance) -> list[Line]:
     """Return one line per method, in the order of declaration."""
-    ours = standings.best(standings.among(result.records, ""), {})
+    ours = standings.best(standings.among(result.run.records, ""), {})
     wanted = sorted({*(decade for decade in DECADES if decade <= result.years), result.years})
     places = [int(np.flatnonzero(result.t == year)[0]) for year in wanted if year in result.t]
     made = []
-    for record in result.records:
+    for record in result.run.records:
         errors = result.errors.get(record.case.method, np.empty((0, 0)))
         ratio = standings.compare(ours, record).ratio
         made.append(
@@ -70,7 +70,7 @@ def lines(result: Endurance) -> list[Line]:
 
 def goals(result: Endurance) -> list[Verdict]:
     """Return the verdicts on what was asked for; none for a span short of a million years."""
-    return verdicts(result.campaign, result.records)
+    return verdicts(result.run.index.campaign, result.run.records)
 
 
 def mean_in_words(law: Law) -> str:

@@ -42,8 +42,8 @@ def write(result: Endurance, directory: Path) -> Path:
     look = base_looks(result.methods)
     made = over_time(result, look)
     shown = [*tables(result), *filter(None, [peers.kept()])]
-    content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
-    content["processor"] = machine.sentence(result.machine)
+    content = {"result": result, "run": result.run, "tables": shown, "picture": made, "figure": FIGURE}
+    content["processor"] = machine.sentence(result.run.machine)
     environment = shell.environment("hbvm_bench.studies.endure", autoescape=False)
     environment.filters |= {"code": code, "table": in_markdown}
     files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}

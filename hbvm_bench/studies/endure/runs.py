@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure.starts import PERTURBATION
-from hbvm_bench.store.records import Record
+from hbvm_bench.store import kept
+from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.store import Store
-from problems.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -29,52 +29,39 @@ class Endurance:
 
     Attributes
     ----------
-    problem : str
-        As it prints.
-    years : float
-        The span.
-    starts : int
-        Declared starts of each method.
-    perturbation : float
-        See `hbvm_bench.measure.starts`.
-    campaign : Campaign
-        As run.
-    records : list of Record
-        Of the methods, in order.
+    run : Kept
+        What was asked for, and the records.
     t : ndarray, shape (n,)
         Sampling times after the start, in years.
     errors : dict of ndarray, shape (starts, n)
         Signed relative errors of the energy from each start that reached the end, by method.
-    command, started
-        How to run it again, and when it ran.
     """
 
-    problem: str
-    years: float
-    starts: int
-    perturbation: float
-    campaign: Campaign
-    records: list[Record]
+    run: Kept
     t: Array
     errors: dict[str, Array]
-    command: str
-    started: str
+    perturbation: float = PERTURBATION
+
+    @property
+    def problem(self) -> str:
+        """The problem, as it prints."""
+        return self.run.records[0].case.problem
+
+    @property
+    def years(self) -> float:
+        """The span."""
+        problem = make_problem(self.problem)
+        return problem.t_end - problem.t0
+
+    @property
+    def starts(self) -> int:
+        """Declared starts of each method."""
+        return self.run.index.campaign.checks.starts
 
     @property
     def methods(self) -> list[str]:
         """The methods, as they print."""
-        return [one.case.method for one in self.records]
-
-    @property
-    def machine(self) -> dict[str, str | int]:
-        """Where it was timed."""
-        timed = [one.timing.machine for one in self.records if one.timing is not None]
-        return (timed or [one.machine for one in self.records])[0]
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Of all libraries."""
-        return {name: number for one in self.records for name, number in one.versions.items()}
+        return [one.case.method for one in self.run.records]
 
 
 def campaign(
@@ -105,24 +92,11 @@ def read(directory: Path) -> Endurance:
         If there is none, or another campaign's.
     """
     store = Store(directory)
-    index = store.index()
-    if index.campaign.name != NAME:
-        raise InputError(f"{str(directory)!r} has results of {index.campaign.name!r}, not of {NAME}.")
-    records = store.records()
-    if not records:
-        raise InputError(f"the run in {str(directory)!r} has no finished case yet; run: {index.command}.")
-    series = {one.case.method: store.series(one.id) for one in records}
-    problem = make_problem(records[0].case.problem)
+    run = kept.of(store, NAME)
+    series = {one.case.method: store.series(one.id) for one in run.records}
     times = [one["drift.t"] for one in series.values() if "drift.t" in one]
     return Endurance(
-        problem=records[0].case.problem,
-        years=problem.t_end - problem.t0,
-        starts=index.campaign.checks.starts,
-        perturbation=PERTURBATION,
-        campaign=index.campaign,
-        records=records,
+        run,
         t=times[0] if times else np.empty(0),
         errors={method: one["drift.energy"] for method, one in series.items() if "drift.energy" in one},
-        command=index.command,
-        started=min(one.finished for one in records),
     )
