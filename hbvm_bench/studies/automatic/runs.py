@@ -136,8 +136,8 @@ def markdown(results: Mapping[str, Sequence[Kept]]) -> str:
     parts = [
         "# HBVM() against heyoka's Taylor method",
         "HBVM() chooses k, s and its steps by itself; heyoka's Taylor method likewise has no step to set. "
-        "The ratio is the Taylor method's time over ours within each round, of one core's time, alternating: the "
-        "median over the rounds.",
+        "The ratio is the Taylor method's time over ours within each round, of one core's time, "
+        "alternating: the median over the rounds.",
         POSITION + " Here: the geometric mean over ten such times.",
         in_markdown(ratios(results)),
     ]
@@ -187,13 +187,13 @@ def sides(found: Sequence[Duel]) -> Table:
     for duel in found:
         ratio = duel.ratio
         for first, side in ((True, duel.ours), (False, duel.theirs)):
-            spread = first and ratio is not None and ratio.low is not None
+            spread = ratio is not None and ratio.low is not None and f"{ratio.low:.2f} … {ratio.high:.2f}"
             rows.append(
                 (
                     duel.problem if first else "",
                     f"≥ {duel.goal:g}" if first else duel.words,
                     f"{ratio.median:.2f}" if first and ratio is not None else "",
-                    f"{ratio.low:.2f} … {ratio.high:.2f}" if spread else "",
+                    spread if first and spread else "",
                     side.case.method,
                     *(format_metric(side, key) for key in METRICS),
                 )
