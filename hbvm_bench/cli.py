@@ -131,6 +131,7 @@ def show(
     if not records:
         raise InputError(f"the run in {str(directory)!r} has no finished case yet; run: {index.command}.")
     terminal.print_results(records, metric, sort)
+    terminal.print_goals(index.campaign, records)
     missing = len(index.ids) - len(records)
     if missing:
         terminal.console(stderr=True).print(f"{missing} of {len(index.ids)} cases have not run yet.")
