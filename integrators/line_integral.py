@@ -162,7 +162,11 @@ class LineIntegral(MethodBase):
         """
         from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 
+        made: HBVMProgram | AdaptiveProgram
         if self.tol is not None:
-            return AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
-        assert self.h is not None
-        return HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
+            made = AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
+        else:
+            assert self.h is not None
+            made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
+        made.method = self
+        return made
