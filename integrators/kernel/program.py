@@ -26,7 +26,7 @@ from problems.problem import System
 
 TOLERANCE = 1e-16
 
-FIRST_RATE = 0.01
+FIRST_RATE = math.log2(0.01)
 
 MARGIN = 0.82
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
@@ -200,6 +200,7 @@ class HBVMProgram:
             shared = {"projection": scaled["projection"]} if side else scaled
             made = Context(self.shape, {**self._fixed, **shared})
             made.tolerance = TOLERANCE
+            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
@@ -325,7 +326,6 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.longest = math.inf if self.max_step is None else self.max_step
         context.stop = context.length_limit = math.inf
-        context.log_rate = math.log(FIRST_RATE)
         return context
 
 

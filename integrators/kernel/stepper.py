@@ -112,9 +112,10 @@ class HBVMStepper:
 
     # What a checkpoint holds besides the state and its error; the values matter to the next start.
     _words: ClassVar[tuple[str, ...]] = (
-        "h", "t0", "n", "length", "solved", "age", "free", "implicit", "slow", "held", "left",
+        "h", "t0", "n", "length", "older_length", "solved", "age", "free", "rate",
+        "implicit", "slow", "held", "left",
     )  # fmt: skip
-    _arrays: ClassVar[tuple[str, ...]] = ("values", "strict", "floored")
+    _arrays: ClassVar[tuple[str, ...]] = ("values", "older_values", "strict", "floored")
     _state: ClassVar[tuple[str, str]] = ("state", "error")
     _engine: ClassVar[engine.Engine] = steps
     error: Exception | None = None
@@ -439,7 +440,7 @@ class AdaptiveStepper(HBVMStepper):
         *HBVMStepper._words,
         "time_low", "next_length", "length_after", "length_behind",
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
-        "length_limit", "log_rate", "kinks", "kink_end", "doubt_end",
+        "length_limit", "kinks", "kink_end", "doubt_end",
     )  # fmt: skip
     _arrays = (*HBVMStepper._arrays, "next_state", "next_error", "kink_places")
 
