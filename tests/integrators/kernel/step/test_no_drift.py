@@ -1,4 +1,4 @@
-"""What the iteration leaves when it stops acts in the same direction in each step: next to nothing is left."""
+"""What the iteration leaves when it stops acts in the same direction in each step."""
 
 import numpy as np
 import pytest
