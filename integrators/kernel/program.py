@@ -29,7 +29,7 @@ from problems.problem import System
 
 TOLERANCE = 1e-16
 
-FIRST_RATE = 0.01
+FIRST_RATE = math.log2(0.01)
 
 MARGIN = 0.82
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
@@ -230,6 +230,7 @@ class HBVMProgram(Compiled):
             tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
+            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
@@ -368,7 +369,6 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.longest = math.inf if self.max_step is None else self.max_step
         context.stop = context.length_limit = math.inf
-        context.log_rate = math.log(FIRST_RATE)
         return context
 
 
