@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,6 +81,7 @@ class HBVMProgram(Compiled):
 
     varying = False
     """Whether steps vary in length."""
+    _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
         self,
@@ -158,7 +160,7 @@ class HBVMProgram(Compiled):
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return FixedStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        return self._stepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def batch(
         self,
@@ -284,6 +286,7 @@ class AdaptiveProgram(HBVMProgram):
     """
 
     varying = True
+    _stepper = AdaptiveStepper
 
     def __init__(
         self,
@@ -338,11 +341,6 @@ class AdaptiveProgram(HBVMProgram):
             f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self.breakpoints.tolist()!r}, "
             f"max_steps={self.max_steps!r}{kept})"
         )
-
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
-        """Return a stepper at ``t0``; as `HBVMProgram.start`."""
-        values = check_parameters(par, self.system)
-        return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
