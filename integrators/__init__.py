@@ -14,6 +14,7 @@ from integrators.solution import Solution, load
 from integrators.watch import Progress
 
 if TYPE_CHECKING:
+    from integrators.advice import advise as advise
     from integrators.events import Event as Event
     from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
@@ -35,6 +36,7 @@ __all__ = [
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",
+    "advise": "integrators.advice",
     "order_of": "integrators.order",
     "section": "integrators.events",
     "stability": "integrators.order",
