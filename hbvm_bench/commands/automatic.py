@@ -33,6 +33,9 @@ def automatic(
         Path | None,
         typer.Option("--out", help="Keep the result there, as <kind of processor>.json, with a page of all."),
     ] = None,
+    redraw: Annotated[
+        bool, typer.Option("--redraw", help="Draw the report of --out again; run nothing.")
+    ] = False,
 ) -> None:
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
@@ -46,13 +49,28 @@ def automatic(
     if general:
         _general(console, problems or [], limit)
         return
+    from hbvm_bench.studies.automatic import report
+
+    if redraw:
+        _publish(out or Path("reports/automatic"))
+        return
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         result = _measured(problems or [], rounds, avx2, out, Path(scratch))
-    page = automatic_.keep(result, out) if out is not None else None
-    terminal.print_table(automatic_.sides(result.duels))
+    terminal.print_table(report.sides(result.duels))
     console.print(machine.sentence(result.machine), highlight=False)
-    if page is not None:
-        terminal.console(stderr=True).print(str(page), style="dim")
+    if out is not None:
+        automatic_.keep(result, out)
+        _publish(out)
+
+
+def _publish(directory: Path) -> None:
+    from hbvm_bench.commands.publishing import publish
+    from hbvm_bench.studies.automatic import report
+
+    found = automatic_.by_kind(directory)
+    if not found:
+        raise InputError(f"there is no result of automatic in {str(directory)!r}; run it with --out first.")
+    publish(report.document(found), directory)
 
 
 def _measured(

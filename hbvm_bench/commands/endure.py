@@ -58,6 +58,7 @@ def endure(
         ensure_writable(directory)
         _run(request)
     result = runs.load(directory)
+    from hbvm_bench.commands.publishing import publish
     from hbvm_bench.studies.endure import report
 
     if as_json:
@@ -66,7 +67,7 @@ def endure(
         for table in report.tables(result):
             terminal.print_table(table)
         terminal.console().print(machine.sentence(result.machine), highlight=False)
-    terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
+    publish(report.document(result), directory)
 
 
 def as_data(result: Endurance) -> dict[str, Any]:

@@ -4,35 +4,31 @@
 processor lie side by side, one file each::
 
     DIR/<kind>.json     e.g. znver4-256bit.json, znver4-256bit-avx2.json
-    DIR/README.md       all of them, one column for each kind
+    DIR/README.md       all of them, one column for each kind, and index.html the same
 """
 
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 
 import msgspec
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method, make_problem
 from hbvm_bench.measure import machine
-from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Run, Spread, interleaved
 from hbvm_bench.measure.timing import ratios as per_round
-from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.run import processes
-from hbvm_bench.store.files import atomic, ensure_writable, write_json
+from hbvm_bench.store.files import ensure_writable, write_json
 from hbvm_bench.store.records import decoded
 from hbvm_bench.studies.race import truth
 from hbvm_bench.studies.race.accuracy import sample_times
 from hbvm_bench.studies.race.contests import chosen
-from hbvm_bench.summaries.table import Table
 from integrators.protocol import MethodBase, Status
 from problems.errors import InputError
 from problems.problem import Problem
@@ -183,8 +179,8 @@ def load(path: Path) -> list[Result]:
     return kept.runs
 
 
-def keep(result: Result, directory: Path) -> Path:
-    """Write a result beside those of other kinds of processor, and the page that shows all.
+def keep(result: Result, directory: Path) -> None:
+    """Write a result beside those of other kinds of processor.
 
     Problems that were not run this time are kept from the file of the same kind, with the
     machine, the versions, the command and the date that they were measured with.
@@ -202,88 +198,11 @@ def keep(result: Result, directory: Path) -> Path:
         for one in (load(path) if path.is_file() else [])
     ]
     save([*(one for one in old if one.duels), result], path)
-    page = directory / "README.md"
-    with atomic(page) as temporary:
-        temporary.write_text(markdown(by_kind(directory)), encoding="utf-8")
-    return page
 
 
 def by_kind(directory: Path) -> dict[str, list[Result]]:
     """Return the results in a directory by the kind of processor."""
     return {path.stem: load(path) for path in sorted(directory.glob("*.json"))}
-
-
-def markdown(results: Mapping[str, Sequence[Result]]) -> str:
-    """Return the page: the ratios by kind of processor, then each kind's numbers."""
-    parts = [
-        "# HBVM() against heyoka's Taylor method",
-        f"HBVM() chooses k, s and its steps by itself; heyoka's `{THEIRS}` likewise has no step to set. The "
-        "ratio is the Taylor method's time over ours within each round, of one core's time, alternating: the "
-        "median over the rounds.",
-        POSITION + " Here: the geometric mean over ten such times.",
-        in_markdown(ratios(results)),
-    ]
-    for kind, runs in results.items():
-        parts += [f"## {plain(kind)}"]
-        for run in runs:
-            libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
-            parts += [
-                plain(machine.sentence(run.machine)),
-                in_markdown(sides(run.duels)),
-                f"Measured on {plain(run.started[:10])} with {plain(libraries)}: {code(run.command)}",
-            ]
-    return "\n\n".join(parts) + "\n"
-
-
-def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
-    """Return how many times as long the Taylor method takes, one column for each kind of processor."""
-    rows = []
-    for key in GOALS:
-        found = [
-            next((duel for run in runs for duel in run.duels if duel.problem == key), None)
-            for runs in results.values()
-        ]
-        duels = [duel for duel in found if duel is not None]
-        if duels:
-            goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in duels)
-            settings = dict.fromkeys(duel.theirs.method for duel in duels)
-            cells = ("not run" if one is None else f"{one.ratio.median:.2f}× {one.verdict}" for one in found)
-            rows.append((key, " or ".join(settings), " or ".join(goals), *cells))
-    return Table(
-        "How many times as long as HBVM() the Taylor method takes",
-        ("problem", "against", "goal", *results),
-        rows,
-        "The median of the ratio within each round, and whether it reaches the goal declared before; not as "
-        "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
-        words=(0, 1),
-    )
-
-
-def sides(found: Sequence[Duel]) -> Table:
-    """Return both sides' errors and times."""
-    rows = []
-    for duel in found:
-        ratio = duel.ratio
-        for first, side in ((True, duel.ours), (False, duel.theirs)):
-            rows.append(
-                (
-                    duel.problem if first else "",
-                    f"≥ {duel.goal:g}" if first else duel.verdict,
-                    f"{ratio.median:.2f}" if first else "",
-                    f"{ratio.low:.2f} … {ratio.high:.2f}" if first else "",
-                    side.method,
-                    f"{1e3 * median(side.seconds):.3g} ms",
-                    str(side.steps),
-                    f"{side.energy:.1e}",
-                    f"{side.position:.1e}",
-                )
-            )
-    return Table(
-        "Errors and times",
-        ("problem", "goal", "Taylor / HBVM", "quartiles", "method", "time", "steps", "energy", "position"),
-        rows,
-        words=(0, 4),
-    )
 
 
 def asked(keys: Sequence[str], rounds: int) -> list[str]:
