@@ -211,10 +211,10 @@ def _(block: Table, at: Place) -> Markup:
     )
     save = Markup(' <a href="data/{0}.csv" download="{0}.csv">CSV</a>').format(block.key) if block.key else ""
     return Markup(
-        '<div class="scroll table {}" tabindex="0" role="region" aria-label="{}">\n<table class="words">\n'
+        '<div{} tabindex="0" role="region" aria-label="{}">\n<table class="words">\n'
         "{}<thead>{}<tr>{}</tr></thead>\n<tbody>\n{}\n</tbody>\n</table>\n</div>\n{}"
     ).format(
-        block.key,
+        _class("scroll", block.key),
         block.title or block.head[0],
         Markup("<caption>{}</caption>").format(words(block.title)) if block.title else "",
         Markup('<tr class="over">{}</tr>').format(over) if over else "",
