@@ -13,6 +13,7 @@ from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.solution import Solution
 
 if TYPE_CHECKING:
+    from integrators.advice import advise as advise
     from integrators.events import Event as Event
     from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
@@ -24,6 +25,7 @@ __all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", 
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",
+    "advise": "integrators.advice",
     "order_of": "integrators.order",
     "section": "integrators.events",
     "stability": "integrators.order",

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
-from hbvm_bench.report.document import Document, Files, Note, Section, attempt
+from hbvm_bench.report.document import Document, Note, attempt
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
-from hbvm_bench.studies.endure.runs import Endurance, of_method
+from hbvm_bench.studies.endure.runs import Endurance
 from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -33,30 +33,24 @@ floor and a growth are fitted together to the logarithm of the rms over windows 
 
 def document(result: Endurance) -> Document:
     """Return the report."""
-    look = looks(result.methods)
+    look, run = looks(result.methods), result.run
     return Document(
         "Endurance: the energy of the outer Solar System",
         [
             "How the energy error grows with time, ours beside the peers', in one run.",
             f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
             f"position and momentum is changed by up to {result.perturbation} of itself "
-            "(`hbvm_bench.studies.endure.runs.perturbed`).",
+            "(`hbvm_bench.measure.starts`).",
         ],
         [
-            Note(machine.sentence(result.machine)),
+            Note(machine.sentence(run.machine)),
             *attempt(
                 ("the tables", lambda: tables(result)),
                 PEERS,
                 ("the figure", lambda: over_time(result, look)),
             ),
             Note(METHOD),
-            Section(
-                "Raw data",
-                [Files("Every start with every sample", {"endure.json": None})],
-                "data-files",
-                nav="Data",
-            ),
-            again("endure", result.command, result.started[:10], result.machine, result.versions),
+            again("endure", run.command, run.started[:10], run.machine, run.versions),
         ],
         list(look.values()),
     )
@@ -112,11 +106,8 @@ def tables(result: Endurance) -> list[Table]:
 
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
-    t = np.array(result.t)
-    shown = [
-        (method, np.array([run.errors for run in of_method(result, method)])) for method in result.methods
-    ]
-    shown = [(method, errors) for method, errors in shown if errors.size]
+    t = result.t
+    shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
     if not shown:
         return None
     values = np.concatenate([drift.rms(errors) for _, errors in shown])
@@ -166,7 +157,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
 
 
 def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[str, Look]) -> Panel:
-    t = np.array(result.t)
+    t = result.t
     found = {line.method: line.drift for line in lines(result)}
     traces = []
     for method, errors in shown:

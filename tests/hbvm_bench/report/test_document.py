@@ -36,10 +36,6 @@ from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.html import Place
 from hbvm_bench.report.write import rendered, write
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.automatic import report as automatic
-from hbvm_bench.studies.automatic import runs as automatic_runs
-from hbvm_bench.studies.endure import report as endure
-from hbvm_bench.studies.endure import runs as endure_runs
 from hbvm_bench.studies.paper import report as paper
 from hbvm_bench.studies.paper import results as kept
 from hbvm_bench.studies.race import report as race
@@ -192,16 +188,12 @@ def test_a_figure_of_a_campaign_that_fails_loses_no_other(tmp_path, monkeypatch)
 def stored_document(name: str) -> Document:
     """Return a committed report, made again from what is stored beside it."""
     folder = REPORTS / name
-    if name == "automatic":
-        return automatic.document(automatic_runs.by_kind(folder))
-    if name == "endure":
-        return endure.document(endure_runs.load(folder))
     if name == "race":
         return race.document(results.load(folder, list(CONTESTS)), results.by_kind(folder, list(CONTESTS)))
     return paper.document(kept.load(folder))
 
 
-@pytest.mark.parametrize("name", ["automatic", "endure", "race", "paper"])
+@pytest.mark.parametrize("name", ["race", "paper"])
 def test_a_stored_report_is_redrawn_with_the_same_markdown(name, monkeypatch):
     # drawing costs seconds, and other versions of matplotlib draw other bytes
     monkeypatch.setattr(

@@ -47,7 +47,7 @@ def folder(request, tmp_path_factory):
     if request.param == "race":
         made = race.document([made_up_race()])
     elif request.param == "endure":
-        made = endure.document(test_endure.made(years=1e5, starts=3))
+        made = endure.document(test_endure.made(target, years=1e5, starts=3))
     else:
         made = made_up_document()
     write(made, target)
