@@ -111,7 +111,7 @@ def test_there_is_an_example_of_every_kind_of_block(ranked):
 @pytest.mark.parametrize("index", range(len(get_args(Block))))
 def test_a_block_says_the_same_in_both_and_nothing_in_it_is_taken_for_markup(ranked, index):
     block = examples(HOSTILE, ranked)[index]
-    page, text = str(html.printed(block, TOP)), markdown.printed(block)
+    page, text = str(html.printed([block], TOP)), markdown.printed(block)
     tags = Tags(page)
     assert "script" not in tags.seen
     outside_code = re.sub(r"^    .*$|`[^`]*`", "", text, flags=re.M)
