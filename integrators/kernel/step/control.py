@@ -8,7 +8,9 @@ from integrators.kernel.simd.lanes import binary_log
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
 TRUST = 0.2  # of a trend to longer steps
-CAUTION = 0.5  # part of the way to a longer step: smooth steps are not rejected and start well (logarithms)
+# Part of the way to a longer step, and how much may be missing there: smooth steps are not rejected and start
+# well (logarithms).
+CAUTION, HELD = 0.5, 0.25
 LOG_SHRINK = log(SHRINK / SAFETY)
 LOG_2 = log(2.0)
 # Fast modes at rest show neither in the error nor in the first iterations. Where the iteration failed, steps
@@ -42,7 +44,7 @@ def log_factor(aim, estimate, behind, change):
     factor = aim - estimate
     if factor < 0.0:
         return RECOIL * factor
-    factor *= CAUTION
+    factor = max(CAUTION * factor, factor - HELD)
     if behind < INFINITY:
         trend = change + behind - estimate
         factor += trend if trend < 0.0 else TRUST * trend

@@ -45,6 +45,7 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 BUSY, BUSY_FIRST = 18.0, 36.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
+MOST_UNTESTED = 12
 MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
 FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
@@ -86,10 +87,11 @@ def iterate(ctx):
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
-    rate, first = ctx.rate, binary_log(ctx.last)
+    first, known = binary_log(ctx.last), ctx.rate
+    rate = known
     change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
     while ctx.outcome == RUNNING:
-        sweep(ctx, int((LOG_TRUSTED - change) / rate) - 1)
+        sweep(ctx, min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED))
         strict = sweep_measured(ctx)
         tries = ctx.tried - tried
         if strict > ROUNDING:
@@ -105,8 +107,8 @@ def iterate(ctx):
             if strict <= TRUSTED:
                 polish(ctx, strict)
             elif tries >= TRIAL and tries + (LOG_REST - change) / rate > most:
-                ctx.outcome = DIVERGED  # in time, but a shorter step is cheaper
-    ctx.rate = rate
+                ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
+                ctx.rate = known
     return close(ctx)
 
 
