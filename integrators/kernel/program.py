@@ -32,7 +32,7 @@ TOLERANCE = 1e-16
 
 FIRST_RATE = math.log2(0.01)
 
-MARGIN = 0.82
+MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as

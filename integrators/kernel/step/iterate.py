@@ -27,7 +27,7 @@ FASTEST, SLOWEST = (
     -10.0,
     -1.0,
 )  # binary logarithms of the iteration's contraction, as far as they are believed
-MOST_EXTRA = 8
+MOST_EXTRA = 16
 
 
 @compiled
@@ -93,9 +93,9 @@ def polish(ctx, change):
     The last evaluation is at the newest stages: the field's values have the error of the
     stages that they were taken at. What is left there acts on the energy in the same direction in every step.
     """
-    evaluations = min(int((LOG_REST - binary_log(change)) / ctx.rate), MOST_EXTRA)
+    more = int((LOG_REST - binary_log(change)) / ctx.rate)
     last = ctx.last
-    sweep(ctx, evaluations)
+    sweep(ctx, min(max(more, 0), MOST_EXTRA))
     ctx.last = last
     evaluate(ctx)
     ctx.tried += 1
