@@ -1,6 +1,5 @@
 """The timing pass: one case at a time, alone and without output, round by round."""
 
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -93,9 +92,7 @@ def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timin
 
 def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        request = Request(
-            case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core, runner=os.getpid()
-        )
+        request = Request(case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core)
         ended = start(Path(scratch), request, limits)
         reply = decoded(Path(scratch) / "timing.json", TimingReply)
     if reply is None:

@@ -1,4 +1,4 @@
-"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json``.
+"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json PARENT``, or a warm one.
 
 It writes ``result.json`` (and ``series.npz`` or ``timing.json``) beside the
 request and leaves the store alone; whatever happens to it, the runner that
@@ -16,7 +16,7 @@ import traceback
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -42,6 +42,7 @@ NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
 STALE = "the sources or versions changed while the run was under way; start it again."
+Found = Literal["nothing", "libraries", "code"]
 ENVIRONMENT = {
     # one thread each, whatever does the linear algebra
     "OMP_NUM_THREADS": "1",
@@ -68,8 +69,6 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         For the timing pass.
     core : int or None
         The core to stay on.
-    runner : int
-        The process that asks: without it there is nobody to answer.
     """
 
     case: Case
@@ -77,7 +76,13 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     mode: Literal["measure", "time"] = "measure"
     plan: TimingPlan = TimingPlan()
     core: int | None = None
-    runner: int
+
+
+class _Fork(NamedTuple):
+    """The process that this one is a fork of, and what was found loaded."""
+
+    parent: int
+    found: Found
 
 
 class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
@@ -87,18 +92,31 @@ class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
 
 
-def main(path: Path) -> None:
-    """Do what the request at ``path`` asks."""
+def work(path: Path, parent: int, found: Found = "nothing") -> None:
+    """Do what a request asks, as the only thing that this process does.
+
+    Parameters
+    ----------
+    path : Path
+        Of the request.
+    parent : int
+        The process that has made this one: without it there is nobody to answer.
+    found : {"nothing", "libraries", "code"}
+        What this process has not loaded itself but found loaded, being a fork of ``parent``.
+    """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
-    _limit_and_die_with(request.runner)
+    _limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
-    work = _time if request.mode == "time" else _measure
     name = "timing.json" if request.mode == "time" else "result.json"
     try:
-        reply = work(request, path.parent)
+        reply = (
+            _time(request, path.parent)
+            if request.mode == "time"
+            else _measure(request, path.parent, _Fork(parent, found))
+        )
         with atomic(path.parent / name) as temporary:
             temporary.write_bytes(msgspec.json.encode(reply))
     except (OSError, InputError) as error:
@@ -107,7 +125,7 @@ def main(path: Path) -> None:
         raise
 
 
-def _limit_and_die_with(runner: int) -> None:
+def _limit_and_die_with(parent: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
@@ -115,11 +133,11 @@ def _limit_and_die_with(runner: int) -> None:
             Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
         pr_set_pdeathsig = 1
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
-        if os.getppid() != runner:  # it died while this process was starting
+        if os.getppid() != parent:  # it died while this process was starting
             sys.exit(1)
 
 
-def _measure(request: Request, directory: Path) -> Result:
+def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
     try:
         resolved = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
@@ -130,7 +148,9 @@ def _measure(request: Request, directory: Path) -> Result:
         grid = resolved.case.grid.times(resolved.problem)
         program = _compiled(resolved, directory)
         if resolved.case.ensemble is not None:
-            return _measure_ensemble(resolved, program, directory)
+            return _stored(
+                *ensemble.measure(resolved.problem, program, resolved.case.ensemble), directory, fork
+            )
         solution = solve(resolved.problem, resolved.method, program, grid)
     except OSError as error:
         if error.errno in DISK:
@@ -156,17 +176,15 @@ def _measure(request: Request, directory: Path) -> Result:
         drift={"t": checked.t, **checked.errors} if checked.errors else {},
         reversal=checked.reversal,
     )
-    return _stored(measured, solution.status, solution.reason, directory)
+    return _stored(measured, solution.status, solution.reason, directory, fork)
 
 
-def _measure_ensemble(resolved: Resolved, program: Program, directory: Path) -> Result:
-    asked = resolved.case.ensemble
-    assert asked is not None
-    return _stored(*ensemble.measure(resolved.problem, program, asked), directory)
-
-
-def _stored(measured: Measured, status: Status, reason: str, directory: Path) -> Result:
-    measured = replace(measured, peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+def _stored(measured: Measured, status: Status, reason: str, directory: Path, fork: _Fork) -> Result:
+    measured = replace(
+        measured,
+        peak_gib=_peak_gib(fork),
+        compile=None if fork.found == "code" else measured.compile,  # else the seconds say nothing
+    )
     with atomic(directory / "series.npz") as temporary:
         temporary.write_bytes(encode_series(measured.series()))
     return Result(
@@ -181,6 +199,18 @@ def _stored(measured: Measured, status: Status, reason: str, directory: Path) ->
         laws=measured.laws,
         trajectories=measured.trajectories,
     )
+
+
+def _peak_gib(fork: _Fork) -> float:
+    """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
+    untouched = 0 if fork.found == "nothing" else _mapped(fork.parent) - _mapped(os.getpid())
+    return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + max(untouched, 0)) / 2**20
+
+
+def _mapped(pid: int) -> int:
+    """Return how much of files is in the resident memory of a process, in KiB."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
 
 
 def _time(request: Request, directory: Path) -> TimingReply:
@@ -243,4 +273,4 @@ def _garbage(solution: Solution, grid: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    work(Path(sys.argv[1]), int(sys.argv[2]))

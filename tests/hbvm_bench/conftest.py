@@ -11,6 +11,7 @@ TOYS = (
     "Steady",
     "Waving",
     "Pinned",
+    "Counting",
     "Straying",
     "Stalling",
     "Endless",
