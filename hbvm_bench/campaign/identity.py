@@ -84,7 +84,7 @@ def resolve(case: Case) -> Resolved:
         For an unknown name or option, with the nearest names, or a value that
         the problem or the method refuses.
     """
-    problem = _problem(case.problem)
+    problem = make_problem(case.problem)
     method = make_method(case.method)
     case.grid.times(problem)
     # not repr(method), which is a third party's own
@@ -96,13 +96,8 @@ def resolve(case: Case) -> Resolved:
 
 
 @lru_cache(maxsize=64)
-def _problem(text: str) -> Problem:
-    # a campaign has the same few problems again and again, and tracing one takes a while
-    return make_problem(text)
-
-
 def make_problem(text: str) -> Problem:
-    """Make the problem that ``text`` specifies."""
+    """Make the problem that ``text`` specifies; the last ones are kept, for a campaign has them often."""
     spec = parse_spec(text)
     return problems.load(spec.name, **spec.arguments)
 
@@ -260,6 +255,7 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
     return found
 
 
+@lru_cache(maxsize=64)
 def _reference_digest(problem: Problem) -> str:
     stored = solutions.find_file(problem)
     if stored is None:

@@ -22,6 +22,7 @@ from problems.errors import InputError
 
 UNFINISHED = 1
 INTERRUPTED = 130
+PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 
 
 def run(
@@ -58,7 +59,8 @@ def run(
             ensure_writable(report_to, keep=False)
         store.prepare()
         _measure(campaign, cases, store, pool, timing, _command(name, problem, method, step))
-    terminal.print_results(store.records())
+    if len(cases) <= PRINTED:
+        terminal.print_results(store.records())
     if report_to is not None:
         from hbvm_bench.report.write import write_report
 
@@ -156,7 +158,9 @@ def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
 
 def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -> None:
     visits = timing_pass.missing_visits(cases, store, campaign.timing)
-    known = {case.id: record.seconds for case in cases if (record := store.load(case.id)) is not None}
+    if not visits:
+        return
+    known = {key: record.seconds for key in set(visits) if (record := store.load(key)) is not None}
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()

@@ -24,6 +24,7 @@ from hbvm_bench.summaries.table import Table
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
 BRIEF_CASES = 150
+DRAWN_CASES = 500  # of a larger campaign the first so many are drawn: a figure takes a second
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,10 @@ def gather(stores: Sequence[Store]) -> Content:
         for record in store.records():
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
                 furthest[record.id] = (record, store)
-    found = {number: _read(record, store) for number, (record, store) in furthest.items()}
+    found = {
+        key: _read(record, store) if number < DRAWN_CASES else (record, {})
+        for number, (key, (record, store)) in enumerate(furthest.items())
+    }
     records = [record for record, _ in found.values()]
     look = looks(records)
     tables = tasks(records)
@@ -160,6 +164,7 @@ def gather(stores: Sequence[Store]) -> Content:
     ]
     first = indices[0].campaign
     together = f"{len(runs)} runs together"
+    drawn = f"Drawn are the first {DRAWN_CASES} of {len(records)} cases; tables and data have all of them."
     return Content(
         title=runs[0].title if len(runs) == 1 else f"{together}: {'; '.join(run.title for run in runs)}",
         description=" ".join(first.description.split()) if len(runs) == 1 else "",
@@ -170,7 +175,10 @@ def gather(stores: Sequence[Store]) -> Content:
         columns=columns(records),
         looks=look,
         records=records,
-        rules=(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
+        rules=(
+            *([drawn] if len(records) > DRAWN_CASES else []),
+            *(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
+        ),
         settings=words.settings_count(records),
         peers=peers.kept(),
         excluded=words.excluded(records),

@@ -6,6 +6,7 @@ Not-a-number and infinity never enter a record: a value that does not exist is
 
 import math
 import re
+from contextlib import suppress
 from datetime import datetime
 from statistics import median, quantiles
 from typing import Any, Literal, TypeVar
@@ -33,6 +34,10 @@ def decoded(content: bytes, type_: type[T]) -> T:
     ValueError
         If it is no UTF-8, or nested too deeply.
     """
+    with suppress(ValueError):  # nearly always, and ten times as fast
+        text = content.decode()
+        if "\\u" not in text and not COMMANDS.search(text):
+            return msgspec.json.decode(text, type=type_)
     try:
         return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
     except RecursionError:
