@@ -11,6 +11,7 @@ import typer
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.commands.live import Live
+from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
 from hbvm_bench.run import executors, loop, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
@@ -60,7 +61,7 @@ def run(
         store.prepare()
         _measure(campaign, cases, store, pool, timing, _command(name, problem, method, step))
     if len(cases) <= PRINTED:
-        terminal.print_results(store.records())
+        terminal.print_results(reading.records(store))
     if report_to is not None:
         from hbvm_bench.report.write import write_report
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS, Metric
 from hbvm_bench.report import provenance, words
 from hbvm_bench.report.figures.canvas import Picture
@@ -24,7 +25,7 @@ from hbvm_bench.summaries.table import Table
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
 BRIEF_CASES = 150
-DRAWN_CASES = 500  # of a larger campaign the first so many are drawn: a figure takes a second
+DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def gather(stores: Sequence[Store]) -> Content:
     indices = [store.index() for store in stores]
     furthest: dict[str, tuple[Record, Store]] = {}
     for store in stores:
-        for record in store.records():
+        for record in reading.records(store):
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
                 furthest[record.id] = (record, store)
     found = {

@@ -15,7 +15,7 @@ import msgspec
 from hbvm_bench.campaign.file import Case, Limits
 from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.run import supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, STALE, Request
@@ -127,6 +127,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         machine=machine.describe(),
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
     )
+    record = reading.evaluated(record, decode_series(series))
     return msgspec.json.encode(Reply(record=record)), series
 
 
@@ -160,7 +161,12 @@ def start(scratch: Path, request: Request, limits: Limits, loads: tuple[str, str
     ended = None
     if loads is not None:
         with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
-            ended = supervise.watch(nest.start(path, *loads), limits, compiled)
+            child = nest.start(path, *loads)
+            ended = supervise.watch(child, limits, compiled)
+            if child.lost and ended.cause == "exit":
+                ended = None
+                compiled.unlink(missing_ok=True)
+                raise ConnectionError  # the nest is of no more use
     if ended is None:
         command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
         ended = supervise.watch(supervise.Fresh(command, ENVIRONMENT), limits, compiled)

@@ -84,7 +84,13 @@ class Nest:
 
 
 class Fork:
-    """The process of one case, a fork of a warm one; see `hbvm_bench.run.supervise.Process`."""
+    """The process of one case, a fork of a warm one; see `hbvm_bench.run.supervise.Process`.
+
+    Attributes
+    ----------
+    lost : bool
+        Whether it ended because the warm process was killed: that says nothing of the case.
+    """
 
     def __init__(
         self, asked: socket.socket, path: Path, keep: Callable[[socket.socket], None] | None = None
@@ -107,6 +113,7 @@ class Fork:
             theirs.close()
             os.close(out)
         self.pid, self._handle = int(said), handles[0]
+        self.lost = False
 
     def wait(self, seconds: float | None = None) -> int | None:
         """Return the exit code, or ``None`` where it still runs after so many seconds."""
@@ -117,6 +124,7 @@ class Fork:
             return None
         except ConnectionError:
             said = b""
+        self.lost = not said
         os.close(self._handle)
         if said == DONE and self._keep is not None:
             self._keep(self._socket)

@@ -14,6 +14,7 @@ import signal
 import sys
 import traceback
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -26,11 +27,10 @@ from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import ensemble, timing
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
-from hbvm_bench.measure.metrics import evaluate, guard_violation
 from hbvm_bench.measure.solve import solve
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, TimingRound
+from hbvm_bench.store.records import Result, TimingRound, Value
 from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import Program, Status
 from integrators.solution import Solution
@@ -147,10 +147,8 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem)
         program = _compiled(resolved, directory)
-        if resolved.case.ensemble is not None:
-            return _stored(
-                *ensemble.measure(resolved.problem, program, resolved.case.ensemble), directory, fork
-            )
+        if (asked := resolved.case.ensemble) is not None:
+            return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
         solution = solve(resolved.problem, resolved.method, program, grid)
     except OSError as error:
         if error.errno in DISK:
@@ -176,15 +174,17 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         drift={"t": checked.t, **checked.errors} if checked.errors else {},
         reversal=checked.reversal,
     )
-    return _stored(measured, solution.status, solution.reason, directory, fork)
+    return _stored(measured, solution.status, solution.reason, directory, fork, solution.warnings)
 
 
-def _stored(measured: Measured, status: Status, reason: str, directory: Path, fork: _Fork) -> Result:
-    measured = replace(
-        measured,
-        peak_gib=_peak_gib(fork),
-        compile=None if fork.found == "code" else measured.compile,  # else the seconds say nothing
-    )
+def _stored(
+    measured: Measured,
+    status: Status,
+    reason: str,
+    directory: Path,
+    fork: _Fork,
+    said: Sequence[str] = (),
+) -> Result:
     with atomic(directory / "series.npz") as temporary:
         temporary.write_bytes(encode_series(measured.series()))
     return Result(
@@ -192,13 +192,20 @@ def _stored(measured: Measured, status: Status, reason: str, directory: Path, fo
         status=status.value,
         reason=reason,
         t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
-        violation=guard_violation(measured),
         counters=measured.counters,
-        metrics=evaluate(measured),
-        compile=measured.compile,
+        compile=None if fork.found == "code" else measured.compile,  # else the seconds say nothing
         laws=measured.laws,
         trajectories=measured.trajectories,
+        warnings=list(said),
+        reversal=_value(measured.reversal),
+        peak_gib=_peak_gib(fork),
     )
+
+
+def _value(number: float | str) -> Value:
+    if isinstance(number, str):
+        return Value(why=number)
+    return Value(value=number) if np.isfinite(number) else Value(why="not finite")
 
 
 def _peak_gib(fork: _Fork) -> float:

@@ -12,6 +12,7 @@ TOYS = (
     "Waving",
     "Pinned",
     "Counting",
+    "Cautious",
     "Straying",
     "Stalling",
     "Endless",

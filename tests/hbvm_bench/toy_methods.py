@@ -119,6 +119,14 @@ class Counting(ToyBase):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Cautious(ToyBase):
+    """Warns of itself."""
+
+    def caveat(self, problem):
+        return "it is a toy."
+
+
+@dataclass(frozen=True, kw_only=True)
 class Straying(ToyBase):
     """Leaves the axis."""
 
