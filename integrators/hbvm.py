@@ -208,6 +208,11 @@ class HBVM(MethodBase):
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
+        made = self._compiled(system)
+        made.method = self
+        return made
+
+    def _compiled(self, system: System) -> Any:
         k, s, defect = self.k, self.s, None
         if k is None or s is None:
             from integrators.automatic import choose

@@ -162,4 +162,6 @@ class LineIntegral(MethodBase):
         """
         from integrators.kernel.line.program import LineProgram
 
-        return LineProgram(system, k=self.k, s=self.s, h=self.h, tol=self.tol, invariants=self.invariants)
+        made = LineProgram(system, k=self.k, s=self.s, h=self.h, tol=self.tol, invariants=self.invariants)
+        made.method = self
+        return made

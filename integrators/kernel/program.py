@@ -19,7 +19,7 @@ from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
 from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
-from integrators.protocol import Array, check_parameters, check_start, check_state
+from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
@@ -47,7 +47,7 @@ UNSEEN = 1e-12
 """Part of a block's size that the error at a kink of the field may always be."""
 
 
-class HBVMProgram:
+class HBVMProgram(Compiled):
     """HBVM(k, s) with step h, compiled for one system; satisfies `integrators.protocol.Program`.
 
     Parameters

@@ -1,7 +1,7 @@
 """Systems whose field is not traced: a numba function, or any Python function."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -76,11 +76,22 @@ class Foreign(System):
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
         super().__init__(f, dim, None, parameters, invariants, guards, name)
+        self._take(f)
+        self._trace_declared(invariants, guards)
+
+    def _take(self, f: Callable[..., Any]) -> None:
         self.f = f
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
         self.native: dict[int, tuple[int, Any]] = {}  # what the kernel makes of it, by lanes
-        self._trace_declared(invariants, guards)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the function itself, which pickle can keep and JSON cannot."""
+        return {**super().__getstate__(), "f": self.f}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        super().__setstate__(state)
+        self._take(state["f"])
 
     def __repr__(self) -> str:
         return f"Foreign({self.name}, dim={self.dim})"

@@ -16,14 +16,14 @@ from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
 from integrators.kernel.stepper import HBVMStepper
 from integrators.legendre import tables
-from integrators.protocol import Array, check_parameters, check_start, check_state
+from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
 from problems.trace.graph import T
 
 
-class LineProgram:
+class LineProgram(Compiled):
     """A line integral method with k stages and degree s, compiled for one system.
 
     Parameters
