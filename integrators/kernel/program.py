@@ -30,9 +30,9 @@ from problems.problem import System
 
 TOLERANCE = 1e-16
 
-FIRST_RATE = 0.01
+FIRST_RATE = math.log2(0.01)
 
-MARGIN = 0.82
+MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
@@ -232,6 +232,7 @@ class HBVMProgram(Compiled):
             tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
+            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
@@ -366,7 +367,6 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.longest = math.inf if self.max_step is None else self.max_step
         context.stop = context.length_limit = math.inf
-        context.log_rate = math.log(FIRST_RATE)
         return context
 
 
