@@ -116,6 +116,40 @@ def test_a_runner_that_is_killed_costs_no_finished_case(toys, tmp_path):
     assert kept.items() <= {path: path.stat().st_mtime_ns for path in folder.iterdir()}.items()
 
 
+TIMED = """
+name = "timed"
+problems = ["{problem}"]
+methods = [{{ use = "Waving(h={{h}}, wait=0.05)", sweep = {{ h = [0.1, 0.2] }} }}]
+[timing]
+rounds = 2
+samples = 1
+shortest = 1e-4
+"""
+
+
+def test_a_runner_that_is_killed_while_it_times_loses_no_round_and_takes_none_twice(toys, tmp_path):
+    file = tmp_path / "timed.toml"
+    file.write_text(TIMED.format(problem=SHORT))
+    store = Store(tmp_path / "run")
+    command = [sys.executable, "-m", "hbvm_bench.cli", "run", str(file), "--out", str(store.directory)]
+
+    def rounds():
+        return {one.id: one.timing.rounds for one in store.everything() if one.timing is not None}
+
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not rounds() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    kept = rounds()
+    assert 1 <= sum(map(len, kept.values())) < 4
+    subprocess.run(command, capture_output=True, timeout=60, check=True)
+    after = rounds()
+    assert [len(one) for one in after.values()] == [2, 2]
+    assert all(after[key][: len(one)] == one for key, one in kept.items())
+
+
 def test_a_second_run_into_one_directory_is_refused(tmp_path, capsys):
     store = store_in(tmp_path / "run")
     with store.locked():
