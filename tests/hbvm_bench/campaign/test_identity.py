@@ -29,7 +29,7 @@ print(*(name for name in sys.modules if name.partition(".")[0] in packages))
 # `import integrators` brings, since the bench takes its steps by `hbvm_bench.measure.solve`.
 NOT_ASKED = {
     *("hbvm_bench.run.worker", "integrators.kernel.native.store"),
-    *("integrators", "integrators.integrate", "integrators.registry"),
+    *("integrators", "integrators.integrate", "integrators.registry", "integrators.watch"),
 }
 
 
@@ -82,7 +82,7 @@ EDITED = {
     "hbvm_bench/run/worker.py": [False, False],
     "hbvm_bench/cli.py": [False, False],
     "hbvm_bench/summaries/rows.py": [False, False],
-    "hbvm_bench/report/sections.py": [False, False],
+    "hbvm_bench/report/problem.py": [False, False],
 }
 
 
