@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
 from hbvm_bench.report.document import Document, Note, attempt
-from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.studies.race import standings
