@@ -202,6 +202,14 @@ def new(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height))
 
 
+def say(
+    axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float] = (0, 0), **look: object
+) -> None:
+    """Write beside a point, so many points to the right and up."""
+    given = {"fontsize": 8.5, "color": INK, **look}
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **given)  # type: ignore[arg-type]
+
+
 def log_axis(
     axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
 ) -> None:

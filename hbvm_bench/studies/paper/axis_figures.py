@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.studies.paper.axis_motion import START, Growth
-from hbvm_bench.studies.paper.drawn import MOTION, SEQUENTIAL, WIDTH, picture, say, sheet
+from hbvm_bench.studies.paper.drawn import MOTION, SEQUENTIAL, WIDTH, picture, sheet
 from integrators.protocol import Array
 
 

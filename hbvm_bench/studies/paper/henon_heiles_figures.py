@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, power_label, styled
+from hbvm_bench.report.figures.canvas import Picture, log_axis, power_label, say, styled
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, say, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.henon_heiles import DIRECTIONS, GAP, GAPS, MAP_END, T_END, H, Orbit, potential
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, say, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.period_annulus import SPAN, energy
 from integrators.protocol import Array
 from problems.catalogue.period_annulus import H_STAR, P1

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, picture, say, sheet
+from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.properties import Order
 
 MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, number, picture, say, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
