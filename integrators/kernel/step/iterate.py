@@ -19,7 +19,7 @@ PATIENCE = 5
 # average fall, from a first change as large as the state to 1e-15, must promise three times that too.
 # From LOG_GOAL on, these are binary logarithms.
 GOAL = 3e-17
-LOG_GOAL, STEEP = log2(GOAL), log2(0.15)
+LOG_TRUSTED, STEEP = log2(1e-11), log2(0.15)
 LOG_PROMISE, FALL = log2(3.0 * GOAL), log2(1e15)
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
@@ -54,7 +54,7 @@ def test(ctx, strict):
         polish(ctx, ctx.tolerance)
     elif strict < ctx.best:
         ctx.best, ctx.stalled = strict, 0
-        nothing = follows and rate <= STEEP and size + rate <= LOG_GOAL
+        nothing = follows and rate <= STEEP and size <= LOG_TRUSTED
         if nothing and ctx.tried * (size - LOG_PROMISE) <= FALL:
             polish(ctx, strict)
         elif ctx.tried >= MAX_ITERATIONS:
@@ -123,7 +123,7 @@ def close(ctx):
         if ctx.predicted:
             # Two tests tell how the changes fall, or that they do not any more; more mean that the
             # first came early. It came late where nothing was left to fall.
-            late = ctx.stalled > 0 or ctx.last <= ctx.tolerance
+            late = ctx.stalled > 0 or ctx.last <= ROUNDING
             ctx.free = max(ctx.free + ctx.tests - (3 if late and ctx.tests <= 2 else 2), 0)
     else:
         ctx.length = 0.0
