@@ -130,6 +130,7 @@ def test_code_is_what_stands_between_backquotes_and_a_lone_one_is_itself():
     assert markdown.words("a `b*` c*") == "a `b*` c\\*"
     assert html.words("a `b<` c<") == "a <code>b&lt;</code> c&lt;"
     assert markdown.words("`") == "\\`"
+    assert pieces("a ``` b ``` c") == [("a ``` b ``` c", False)]  # a fence in somebody's text is none
 
 
 def test_powers_of_ten_are_set_as_powers_and_code_is_left_alone():
