@@ -16,7 +16,7 @@ from hbvm_bench.report import terminal
 from hbvm_bench.run import executors, loop, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError
+from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -121,7 +121,7 @@ def _measure(
             _run(campaign, cases, store, pool, timing)
         except (KeyboardInterrupt, InterruptedRunError):
             raise _given_up("interrupted", cases, store, INTERRUPTED) from None
-        except loop.UnfinishedRunError as error:
+        except UnfinishedRunError as error:
             raise _given_up(str(error), cases, store, UNFINISHED) from None
 
 

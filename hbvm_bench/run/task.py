@@ -56,11 +56,8 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
     limits: Limits
 
 
-class Reply(msgspec.Struct, frozen=True, kw_only=True):
-    """The record of a case, or why it could not be run here at all."""
-
-    record: Record | None = None
-    why: str = ""
+class UnfinishedRunError(Exception):
+    """Some cases could not be run at all; what finished is in the store."""
 
 
 def task_of(resolved: Resolved, limits: Limits) -> bytes:
@@ -82,8 +79,8 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
 
     Returns
     -------
-    reply : bytes
-        JSON of a `Reply`. Whatever happens to the process, it is a record with its reason.
+    record : bytes
+        JSON of a `Record`: whatever happens to the process is one, with its reason.
     series : bytes
         As `hbvm_bench.store.store.encode_series` makes them; empty where there are none.
 
@@ -91,14 +88,18 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     ------
     InterruptedRunError
         If the run was stopped meanwhile.
+    UnfinishedRunError
+        If the case could not be run here at all.
+    problems.errors.InputError
+        If the sources changed meanwhile.
     """
     asked = msgspec.json.decode(task, type=Task)
     try:
         resolved = resolve(asked.case)
     except InputError as error:
-        return _refuse(f"{platform.node()} cannot run it: {error}")
+        raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
     if resolved.id != asked.id:
-        return _refuse(_difference(asked, resolved))
+        raise UnfinishedRunError(_difference(asked, resolved))
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         core = getattr(_thread, "core", None)
         request = Request(case=resolved.case, id=resolved.id, core=core)
@@ -106,9 +107,9 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         ended = start(Path(scratch), request, asked.limits, loads)
         result, series = _result(Path(scratch), ended, asked.limits)
     if result.reason == STALE:
-        return _refuse(STALE)
+        raise InputError(STALE)
     if ended.code == NO_ROOM:
-        return _refuse(
+        raise UnfinishedRunError(
             f"there is no room for the results of a case on {platform.node()}; make some in "
             f"{tempfile.gettempdir()} and in the cache, and run the same command again"
         )
@@ -128,7 +129,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     record = reading.evaluated(record, decode_series(series))
-    return msgspec.json.encode(Reply(record=record)), series
+    return msgspec.json.encode(record), series
 
 
 def stay_on(core: int) -> None:
@@ -181,10 +182,6 @@ def decoded(path: Path, type_: type[T]) -> T | None:
         return records.decoded(path.read_bytes(), type_)
     except (FileNotFoundError, ValueError):  # msgspec's errors and bad UTF-8 are among the latter
         return None
-
-
-def _refuse(why: str) -> tuple[bytes, bytes]:
-    return msgspec.json.encode(Reply(why=why)), b""
 
 
 def _difference(asked: Task, resolved: Resolved) -> str:

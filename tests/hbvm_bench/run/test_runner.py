@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import msgspec
+import psutil
 import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
@@ -305,26 +306,37 @@ def test_a_nest_whose_process_was_killed_is_replaced(toys, store):
     assert run(store, "Steady(h=0.5)").result.outcome == "ok"
 
 
-def test_a_worker_dies_with_its_runner(toys, tmp_path):
+def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
+    warm.close()
+    before = set(psutil.Process().children())
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        future = pool.submit(loop.run_case, case("Waving(h=0.3, wait=1.0)"), str(store.directory), GENEROUS)
+        while not supervise._children:
+            time.sleep(0.01)
+        for process in set(psutil.Process().children()) - before:
+            process.kill()
+        record = future.result(timeout=30)
+    assert record.result.outcome == "ok"
+    assert record.result.compile is not None  # in a process that began with nothing
+
+
+def test_no_process_outlives_a_runner_that_is_killed(toys, tmp_path):
     code = (
         "import sys; from hbvm_bench.run import loop; from hbvm_bench.campaign.file import *;"
-        f"loop.run_case(Case(problem={SHORT!r}, method='Endless()'), {str(tmp_path)!r}, Limits())"
+        f"[loop.run_case(Case(problem={SHORT!r}, method=method), {str(tmp_path)!r}, Limits())"
+        " for method in ('Steady()', 'Endless()')]"
     )
     (tmp_path / "cases").mkdir()
     parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ)
-    child = None
-    deadline = time.monotonic() + 20
-    while child is None and time.monotonic() < deadline:
+    left = []
+    deadline = time.monotonic() + 60
+    while (
+        len(left) < 3 and time.monotonic() < deadline
+    ):  # of the libraries, of a case done, of the endless one
         time.sleep(0.05)
-        text = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text()
-        child = int(text.split()[0]) if text.split() else None
-    assert child is not None
+        left = psutil.Process(parent.pid).children(recursive=True)
     parent.kill()
     parent.wait()
-    deadline = time.monotonic() + 30  # it may still be starting
-    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
-        if "zombie" in Path(f"/proc/{child}/status").read_text():
-            break
-        time.sleep(0.05)
-    else:
-        assert not Path(f"/proc/{child}").exists()
+    assert len(left) == 3
+    _, alive = psutil.wait_procs(left, timeout=30)
+    assert [process for process in alive if process.status() != psutil.STATUS_ZOMBIE] == []
