@@ -4,10 +4,10 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 from integrators.kernel.implicit.engine import solver
-from integrators.kernel.line.engine import steps as line_steps
+from integrators.kernel.line.engine import line
 from integrators.kernel.step.engine import steps
 
-ENGINES = {"steps": steps, "implicit solvers": solver, "line integrals": line_steps}
+ENGINES = {"steps": steps, "implicit solvers": solver, "line integrals": line}
 
 
 def compile_ahead(processes: int = 1) -> dict[str, float | None]:

@@ -114,19 +114,20 @@ class Foreign(System):
     def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
         """Put the derivative at one state into ``out``; NaN where it is not defined.
 
+        NumPy warns of that, unless whoever calls, for many states at a time, silences it: ``np.errstate``.
+
         Raises
         ------
         problems.errors.InputError
             If f returns something else than dim numbers.
         """
-        arguments = [t, y, *([par] if self.takes_parameters else [])]
-        out[:] = np.nan
+        arguments = (t, y, par) if self.takes_parameters else (t, y)
         try:
-            with np.errstate(all="ignore"):
-                if self.in_place:
-                    self.f(*arguments, out)
-                    return
-                value = self.f(*arguments)
+            if self.in_place:
+                out[:] = np.nan
+                self.f(*arguments, out)
+                return
+            value = self.f(*arguments)
         except UNDEFINED:
             out[:] = np.nan
             return

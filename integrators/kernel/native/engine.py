@@ -9,7 +9,7 @@ from typing import Any
 from integrators.kernel.native import binary, store
 from integrators.kernel.native.foreign import raise_error
 
-# What the entries of `step` and, but for batches, of `line` can do; see `integrators.kernel.step.entry`.
+# What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, ADVANCE_BATCH, WALK = range(4)
 ENTRY = "what ctx side between count times targets parts first out budget"
 
