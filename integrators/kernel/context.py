@@ -285,11 +285,15 @@ def blocks(system: System) -> tuple[Integers, Integers]:
     coordinates or momenta of one body, where the system says that it has bodies, so
     that a planetoid's tiny momentum is resolved, and else every component by itself.
     """
-    dim, dof = system.dim, system.dof
-    bodies = getattr(system, "bodies", None)
-    width = bodies.dimension if bodies is not None else 1
+    dim, dof, width = system.dim, system.dof, width_of_blocks(system)
     block = np.arange(dim) // width
     group = np.zeros(dim // width, dtype=np.int64)
     if dof is not None:
         group[dof // width :] = 1
     return block, group
+
+
+def width_of_blocks(system: System) -> int:
+    """Return how many components a block has: the coordinates of a body, or one."""
+    bodies = getattr(system, "bodies", None)
+    return bodies.dimension if bodies is not None else 1

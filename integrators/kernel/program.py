@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike
 
 from integrators.caveats import sees_kinks
 from integrators.kernel import tables
-from integrators.kernel.batch import Batch, prepare_batch
+from integrators.kernel.batch import Batch, Progress, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
 from integrators.kernel.native import binary
@@ -104,6 +105,7 @@ class HBVMProgram:
             made.from_cache for made in (self.field, kernel, self.fused) if made is not None
         )
         self._linearization: Linearization | None = None
+        self._in_lanes: tuple[Lanes | None] | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
         self.compile_seconds = binary.clock() - started
@@ -145,10 +147,13 @@ class HBVMProgram:
         t0: float = 0.0,
         sample: str | None = None,
         threads: int = 1,
+        progress: Progress | None = None,
     ) -> Batch:
-        """Integrate many starts to the same times, several of them at once.
+        """Integrate many starts to the same times, one in each lane of the vector unit.
 
-        Each trajectory is bit for bit the one that ``start`` and ``advance`` give.
+        The numbers of a trajectory depend on nothing in the others, nor on their order or the
+        threads. They are those of ``start`` and ``advance`` up to rounding; bit for bit where
+        trajectories go one by one, see `integrators.kernel.batch`.
 
         Parameters
         ----------
@@ -164,19 +169,32 @@ class HBVMProgram:
             How states between steps are made; see `HBVMStepper`.
         threads : int
             Threads to share the trajectories among.
+        progress : callable, optional
+            Called with the number of trajectories that are at their end, and the number of all.
 
         Raises
         ------
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads)()
+        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads, progress)()
 
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Batch]:
         """Check and allocate all that `batch` needs; return what then does it, once."""
         return prepare_batch(self, Y0, par, times, check_start(t0))
+
+    def in_lanes(self) -> Lanes | None:
+        """Return the method on trajectories in lanes, compiled the first time; ``None``: they go one by one."""
+        if self._in_lanes is None:
+            made, seconds = None, 0.0
+            if self.lanes and not self.varying and self.solver.strategy != ALWAYS_IMPLICIT:
+                made, seconds = lanes_of(self.system, self.constants, self.second)
+            self.compile_seconds += seconds
+            self.from_cache = self.from_cache and (made is None or made.from_cache)
+            self._in_lanes = (made,)
+        return self._in_lanes[0]
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""

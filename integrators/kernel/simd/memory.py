@@ -245,3 +245,5 @@ call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
+call_steps = _caller(2)
+"""``call_steps(code, group, count)``: steps of a group of trajectories, see `integrators.kernel.ensemble`."""

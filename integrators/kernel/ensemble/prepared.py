@@ -1,0 +1,142 @@
+"""A method's coefficients for trajectories in lanes, and the memory of groups of them."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel import tables
+from integrators.kernel.context import width_of_blocks
+from integrators.kernel.ensemble.engine import run
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.steps import GOAL, MOST, Form, compile_steps
+from integrators.kernel.native import binary
+from integrators.kernel.native.memory import Numbers, aligned
+from integrators.kernel.tables import Constants
+from problems import emit
+from problems.systems.base import System
+
+LANES = 8
+STAGES = 16  # at most: their sums are written out
+ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
+
+
+class Lanes:
+    """HBVM(k, s) on trajectories in lanes, compiled for one system.
+
+    Parameters
+    ----------
+    system : System
+        What is integrated; its field can run on lanes.
+    constants : Constants
+        The method's.
+    second : bool
+        Whether in second-order form.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If parameters that differ from lane to lane keep the field from running on lanes.
+    """
+
+    def __init__(self, system: System, constants: Constants, second: bool):
+        self.system, self.second, self._constants = system, second, constants
+        self.rows = system.dof if second and system.dof is not None else system.dim
+        width = width_of_blocks(system)
+        starts = [0] if second or system.dof is None else [0, system.dof]
+        size = self.rows // len(starts)
+        groups = tuple((start, size // width, width) for start in starts)
+        self.k = constants.k
+        self._code = compile_steps(system, Form(LANES, self.k, self.rows, second, groups))
+        loop = run.code()
+        self.from_cache = self._code.from_cache and loop.from_cache
+        self._scaled: dict[float, Numbers] = {}
+
+    @staticmethod
+    def take(system: System, constants: Constants, second: bool) -> bool:
+        """Whether stages of so many components, and so many of them, are few enough."""
+        rows = system.dim // 2 if second else system.dim
+        return constants.k <= STAGES and constants.k * rows <= ROOM
+
+    @cached_property
+    def _fixed(self) -> dict[str, Numbers]:
+        """The tables that do not depend on the step."""
+        a = self._constants.arrays
+        names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
+        # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
+        falls = 3.0 * GOAL * 1e15 ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
+        extrapolation = a["beyond"] @ a["into_modes"]
+        found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
+        return {name: _aligned(values) for name, values in found.items()}
+
+    def _matrix(self, h: float) -> Numbers:
+        """Return the matrix for the step h, or for a step of 1 that is scaled later."""
+        if h not in self._scaled:
+            a = self._constants.arrays
+            high, low = tables.times(a["matrix"], a["matrix_low"], h)
+            self._scaled[h] = _aligned(tables.keep_moments(high, low, a["basis"]))
+        return self._scaled[h]
+
+    def to_parts(self, parts: Numbers, h: float) -> Numbers:
+        """Return the matrices of extrapolation from a step of h to the nodes of parts that follow it."""
+        from integrators.legendre import legendre
+
+        a, modes = self._constants.arrays, self._constants.modes
+        nodes = 1.0 + (parts / h)[:, None] * a["nodes"].reshape(-1)
+        basis = legendre(nodes.reshape(-1), modes).reshape(parts.size, self.k, modes)
+        return np.ascontiguousarray(basis @ a["into_modes"])
+
+    def velocities(self, par: Numbers) -> Numbers:
+        """Return q' = velocity * p of all trajectories, shape (n, rows); ones in first-order form."""
+        if not self.second:
+            return np.ones((len(par), self.rows))
+        there = np.zeros((self.system.dim, len(par)))
+        found = emit.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
+        return np.ascontiguousarray(found.T)
+
+    def groups(
+        self, t0: float, h: float, numbers: dict[str, int], arrays: dict[str, NDArray[np.generic]]
+    ) -> tuple[Group, Group]:
+        """Return memory for a group of trajectories with step h, and for partial steps.
+
+        Parameters
+        ----------
+        t0, h : float
+            Time of the starts, and the step.
+        numbers, arrays : dict
+            What `Group` is to know of the trajectories.
+        """
+        system = self.system
+        shape = {
+            "code": self._code.address, "lanes": LANES, "rows": self.rows, "dim": system.dim,
+            "parameters": system.n_par, "k": self.k, **numbers,
+        }  # fmt: skip
+        made = []
+        for step in (h, 1.0):
+            matrix = self._matrix(step)
+            group = Group(shape, {**self._fixed, **arrays, "matrix": matrix})
+            group.reach = float(np.abs(matrix.reshape(self.k, self.k)).sum(axis=1).max())
+            group.h[:], group.scale[:], group.t0[:] = step, 1.0, t0
+            made.append(group)
+        return made[0], made[1]
+
+
+def lanes_of(system: System, constants: Constants, second: bool) -> tuple[Lanes | None, float]:
+    """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
+    started = binary.clock()
+    found = None
+    if Lanes.take(system, constants, second):
+        try:
+            found = Lanes(system, constants, second)
+        except Exception as error:
+            from numba.core.errors import NumbaError  # has been imported to compile
+
+            if not isinstance(error, NumbaError):
+                raise
+    return found, binary.clock() - started
+
+
+def _aligned(values: Numbers) -> Numbers:
+    made = aligned(values.size)
+    made[:] = values.reshape(-1)
+    return made
