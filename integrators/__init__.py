@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from integrators import registry
 from integrators.integrate import integrate
+from integrators.many import Solutions, integrate_many
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.solution import Solution
 
@@ -20,7 +21,17 @@ if TYPE_CHECKING:
     from integrators.order import order_of as order_of
     from integrators.order import stability as stability
 
-__all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", "registry"]
+__all__ = [
+    "MethodBase",
+    "Samples",
+    "Solution",
+    "Solutions",
+    "Stats",
+    "Status",
+    "integrate",
+    "integrate_many",
+    "registry",
+]
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",

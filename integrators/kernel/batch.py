@@ -190,8 +190,8 @@ class _InLanes:
         arrays = {
             "starts": work.starts, "all_par": work.parameters,
             "all_velocity": lanes.velocities(work.parameters),
-            "times": np.ascontiguousarray(result.t), "targets": targets, "parts": parts,
-            "part_extrapolation": lanes.to_parts(parts, h), "out": result.y,
+            "times": np.ascontiguousarray(result.t), "targets": targets, "out": result.y,
+            **lanes.parts(parts, h),
             "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
         }  # fmt: skip
         made = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)

@@ -190,7 +190,7 @@ class HBVMProgram:
         if self._in_lanes is None:
             made, seconds = None, 0.0
             if self.lanes and not self.varying and self.solver.strategy != ALWAYS_IMPLICIT:
-                made, seconds = lanes_of(self.system, self.constants, self.second)
+                made, seconds = lanes_of(self.system, self.constants, self.second, self.shape.unit)
             self.compile_seconds += seconds
             self.from_cache = self.from_cache and (made is None or made.from_cache)
             self._in_lanes = (made,)

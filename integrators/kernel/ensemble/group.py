@@ -17,7 +17,7 @@ class Group(Memory):
     dim = Integer()
     parameters = Integer()
     k = Integer()
-    matrix = Array()  # values -> stages, (k, k) doubles row by row; for the step, or for a step of 1
+    matrix = Array()  # values -> stages, (k, k) doubles row by row
     extrapolation = Array()  # the last step's values -> those of the step ahead, (k, k)
     nodes = Array()
     nodes_low = Array()
@@ -28,7 +28,6 @@ class Group(Memory):
     falls = Array()  # changes that a number of sweeps must have come to; see `steps.Writer.rule`
     reach = Real()  # the largest sum of a row of the matrix, by sizes
     h = Array("lanes")
-    scale = Array("lanes")  # what the matrix lacks: 1, or the step
     par = Array("parameters", "lanes")
     velocity = Array("rows", "lanes")  # q' = velocity * p
 
@@ -62,7 +61,9 @@ class Group(Memory):
     times = Array()
     targets = Array(of=int)  # steps before each sample,
     parts = Array()  # and the part of a step that is left
-    part_extrapolation = Array()  # (samples, k, k): `extrapolation` to the nodes of these parts
+    part_matrix = Array()  # (samples, k, k): `matrix`,
+    part_extrapolation = Array()  # (samples, k, k): `extrapolation`,
+    part_reach = Array()  # (samples): and `reach` of these parts
     out = Array()  # (n, samples, dim)
     arrived = Array(of=int)  # (n): 1, or 0 for one that left
     all_sweeps = Array(of=int)  # (n)

@@ -5,7 +5,6 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import call_steps
-from integrators.kernel.simd.views import doubles
 
 group_at = view(Group)
 
@@ -72,10 +71,13 @@ def part_step(group, side, sample):
         elapsed = n * h
         side.t0[lane], lost = two_sum(group.t0[lane], elapsed)
         side.time_low[lane] = lost + fma(n, h, -elapsed)
-        side.h[lane] = side.scale[lane] = part
+        side.h[lane] = part
         side.alive[lane], side.sweeps[lane] = group.alive[lane], 0.0
     side.n = 0
-    side.extrapolation = group.part_extrapolation + group.k * group.k * sample
+    place = group.k * group.k * sample
+    side.matrix = group.part_matrix + place
+    side.extrapolation = group.part_extrapolation + place
+    side.reach = group.part_reach[sample]
     call_steps(side.code, side, 1)
     group.living = side.living
     for lane in range(lanes):

@@ -32,6 +32,8 @@ class Lanes:
         The method's.
     second : bool
         Whether in second-order form.
+    unit : bool
+        Whether the rows' factors can be in the matrix; see `integrators.kernel.tables.unit`.
 
     Raises
     ------
@@ -39,15 +41,15 @@ class Lanes:
         If parameters that differ from lane to lane keep the field from running on lanes.
     """
 
-    def __init__(self, system: System, constants: Constants, second: bool):
-        self.system, self.second, self._constants = system, second, constants
+    def __init__(self, system: System, constants: Constants, second: bool, unit: bool):
+        self.system, self.second, self.unit, self._constants = system, second, unit, constants
         self.rows = system.dof if second and system.dof is not None else system.dim
         width = width_of_blocks(system)
         starts = [0] if second or system.dof is None else [0, system.dof]
         size = self.rows // len(starts)
         groups = tuple((start, size // width, width) for start in starts)
         self.k = constants.k
-        self._code = compile_steps(system, Form(LANES, self.k, self.rows, second, groups))
+        self._code = compile_steps(system, Form(LANES, self.k, self.rows, second, unit, groups))
         loop = run.code()
         self.from_cache = self._code.from_cache and loop.from_cache
         self._scaled: dict[float, Numbers] = {}
@@ -70,21 +72,30 @@ class Lanes:
         return {name: _aligned(values) for name, values in found.items()}
 
     def _matrix(self, h: float) -> Numbers:
-        """Return the matrix for the step h, or for a step of 1 that is scaled later."""
+        """Return the matrix for the step h, shape (k, k)."""
         if h not in self._scaled:
             a = self._constants.arrays
             high, low = tables.times(a["matrix"], a["matrix_low"], h)
-            self._scaled[h] = _aligned(tables.keep_moments(high, low, a["basis"]))
+            if self.second and self.unit:
+                high, low = tables.times(high, low, h)
+            self._scaled[h] = tables.keep_moments(high, low, a["basis"])
         return self._scaled[h]
 
-    def to_parts(self, parts: Numbers, h: float) -> Numbers:
-        """Return the matrices of extrapolation from a step of h to the nodes of parts that follow it."""
+    def parts(self, parts: Numbers, h: float) -> dict[str, Numbers]:
+        """Return what `Group` has of partial steps that follow a step of h."""
         from integrators.legendre import legendre
 
         a, modes = self._constants.arrays, self._constants.modes
         nodes = 1.0 + (parts / h)[:, None] * a["nodes"].reshape(-1)
         basis = legendre(nodes.reshape(-1), modes).reshape(parts.size, self.k, modes)
-        return np.ascontiguousarray(basis @ a["into_modes"])
+        factor = parts * parts if self.second and self.unit else parts
+        matrix = factor[:, None, None] * self._matrix(1.0)
+        return {
+            "parts": parts,
+            "part_matrix": np.ascontiguousarray(matrix),
+            "part_extrapolation": np.ascontiguousarray(basis @ a["into_modes"]),
+            "part_reach": _reach(matrix),
+        }
 
     def velocities(self, par: Numbers) -> Numbers:
         """Return q' = velocity * p of all trajectories, shape (n, rows); ones in first-order form."""
@@ -111,29 +122,31 @@ class Lanes:
             "code": self._code.address, "lanes": LANES, "rows": self.rows, "dim": system.dim,
             "parameters": system.n_par, "k": self.k, **numbers,
         }  # fmt: skip
-        made = []
-        for step in (h, 1.0):
-            matrix = self._matrix(step)
-            group = Group(shape, {**self._fixed, **arrays, "matrix": matrix})
-            group.reach = float(np.abs(matrix.reshape(self.k, self.k)).sum(axis=1).max())
-            group.h[:], group.scale[:], group.t0[:] = step, 1.0, t0
-            made.append(group)
-        return made[0], made[1]
+        matrix = self._matrix(h)
+        group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
+        group.reach = float(_reach(matrix))
+        group.h[:], group.t0[:] = h, t0
+        return group, side
 
 
-def lanes_of(system: System, constants: Constants, second: bool) -> tuple[Lanes | None, float]:
+def lanes_of(system: System, constants: Constants, second: bool, unit: bool) -> tuple[Lanes | None, float]:
     """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
     started = binary.clock()
     found = None
     if Lanes.take(system, constants, second):
         try:
-            found = Lanes(system, constants, second)
+            found = Lanes(system, constants, second, unit)
         except Exception as error:
             from numba.core.errors import NumbaError  # has been imported to compile
 
             if not isinstance(error, NumbaError):
                 raise
     return found, binary.clock() - started
+
+
+def _reach(matrix: Numbers) -> Numbers:
+    """Return the largest sum of a row of a matrix, or of each of several, by sizes."""
+    return np.abs(matrix).sum(axis=-1).max(axis=-1)
 
 
 def _aligned(values: Numbers) -> Numbers:

@@ -24,9 +24,6 @@ from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
-import os
-
-BLOCK = int(os.environ.get("BLOCK", "1"))
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 
 # The stopping rule; see `Writer.rule`.
@@ -50,6 +47,8 @@ class Form:
         Trajectories side by side, stages, components of a stage.
     second : bool
         Second-order form: stages hold positions, the state is (q, p).
+    unit : bool
+        Whether the rows' factors h q' / p are in the matrix.
     groups : tuple of tuple of int
         First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
     """
@@ -58,6 +57,7 @@ class Form:
     k: int
     rows: int
     second: bool
+    unit: bool
     groups: tuple[tuple[int, int, int], ...]
 
 
@@ -72,7 +72,7 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     what = "force" if form.second else "field"
     source = emit.source(system, what, "numba")
     modules = binary.sources(*field.SOURCES, "ensemble/group", "ensemble/steps")
-    name = store.key("ensemble", source.text, repr(form), str(BLOCK), modules)
+    name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
         function, arguments = field.on_lanes(emit.numba(system, what).py_func, form.lanes, par=True)
@@ -95,7 +95,6 @@ class Writer:
         arguments = [pointer.as_pointer(), pointer.as_pointer(), self.kind, pointer, pointer, pointer]
         self.field = ir.Function(module, ir.FunctionType(ir.IntType(32), arguments), inner)
         function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 2), binary.ENTRY)
-        function.attributes.alignstack = ALIGNMENT
         self.module, self.function = module, function
         self.b: Any = ir.IRBuilder(function.append_basic_block("start"))
         self.words = self.b.inttoptr(function.args[0], INTEGER.as_pointer())
@@ -212,7 +211,7 @@ class Writer:
         kept = self.array(slots["values"])
         pointer = DOUBLE.as_pointer()
         self.result, self.exception = b.alloca(pointer), b.alloca(pointer)
-        self.h, self.scale = self.get(self.array(slots["h"])), self.get(self.array(slots["scale"]))
+        self.h = self.get(self.array(slots["h"]))
         if self.unrolled:
             self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
         alive = self.get(self.array(slots["alive"]))
@@ -235,7 +234,9 @@ class Writer:
         self.put(Value(b, b.load(self.sweeps)), self.array(slots["sweeps"]))
         b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
         b.ret_void()
-        return str(self.module)
+        # Vectors that registers do not hold are to lie within a line of the cache each.
+        head = f'define void @"{binary.ENTRY}"(i64 %".1", i64 %".2")'
+        return str(self.module).replace(head, f'{head} alignstack({ALIGNMENT}) "stackrealign"')
 
     def step(self) -> None:
         """Write one step of all lanes."""
@@ -252,11 +253,11 @@ class Writer:
         def row(d: Index) -> None:
             error = self.get(self.error, d)
             if not form.second:
-                self.put(self.scale, self.factor, d)
                 self.each(form.k, lambda i: self.put(error, self.base, self.at(i, form.rows, d)))
                 return
             kh = self.h * self.get(self.velocity, d)
-            self.put(kh * self.scale, self.factor, d)
+            if not form.unit:
+                self.put(kh, self.factor, d)
             u, u_low = self.drift(d, kh)
 
             def stage(i: Index) -> None:
@@ -317,31 +318,26 @@ class Writer:
                 inverses = [(self.one / x).where(x.compare(">", SMALLEST), LARGE) for x in (size, floor)]
                 for i in range(width):
                     d = self.at(start, 1, i)
-                    weight = self.get(self.factor, d).absolute() * reach
+                    weight = reach if form.unit else self.get(self.factor, d).absolute() * reach
                     self.put(weight * inverses[0], self.strict, d)
                     self.put(weight * inverses[1], self.floored, d)
 
             self.each(blocks, invert)
 
-    def combination(self, table: Any, i: Index) -> Callable[[Any, Index], Value]:
-        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d."""
+    def combination(self, table: Any, i: Index) -> Callable[..., Value]:
+        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, added to a start."""
         k, rows = self.form.k, self.form.rows
         factors = [self.number(table, self.at(i, k, j)) for j in range(k)]
 
-        def total(values: Any, d: Index) -> Value:
-            # The newest value comes last: all the rest need not wait for it.
-            order = [*range(i, k), *range(i)] if isinstance(i, int) else [*range(k)]
-            chains: list[Value] = []
-            for place, j in enumerate(order[:-1]):
-                value = self.get(values, self.at(j, rows, d))
-                if place < 2:
-                    chains.append(factors[j] * value)
-                else:
-                    chains[place % 2] = factors[j].fma(value, chains[place % 2])
-            newest = factors[order[-1]], self.get(values, self.at(order[-1], rows, d))
-            if not chains:
-                return newest[0] * newest[1]
-            return newest[0].fma(newest[1], chains[0] if len(chains) == 1 else chains[0] + chains[1])
+        # The newest value comes last: all the rest need not wait for it.
+        order = [*range(i, k), *range(i)] if isinstance(i, int) else [*range(k)]
+
+        def total(d: Index, start: Value | None = None) -> Value:
+            for j in order:
+                value = self.get(self.values, self.at(j, rows, d))
+                start = factors[j] * value if start is None else factors[j].fma(value, start)
+            assert start is not None
+            return start
 
         return total
 
@@ -352,7 +348,7 @@ class Writer:
 
         def stage(i: Index) -> None:
             total = self.combination(table, i)
-            self.each_row(lambda d: self.put(total(self.values, d), self.ahead, self.at(i, rows, d)))
+            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, rows, d)))
 
         self.each(k, stage)
         self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
@@ -389,7 +385,10 @@ class Writer:
 
             def displace(d: Index) -> None:
                 base = self.get(self.base, self.at(i, rows, d))
-                moved = self.get(self.factor, d).fma(total(self.values, d), base)
+                if form.unit:
+                    moved = total(d, base)
+                else:
+                    moved = self.get(self.factor, d).fma(total(d), base)
                 self.put(self.get(self.state, d) + moved, self.stage, d)
 
             self.each_row(displace)
@@ -400,13 +399,9 @@ class Writer:
                 place = self.at(i, rows, d)
                 old, new = self.get(self.values, place), self.get(self.found, d)
                 self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
-                self.put(new.where(active, old), self.ahead if BLOCK > 1 else self.values, place)
+                self.put(new.where(active, old), self.values, place)
 
             self.each_row(keep)
-            if BLOCK > 1 and (i % BLOCK == BLOCK - 1 or i == k - 1):
-                for l in range(i // BLOCK * BLOCK, i + 1):
-                    for d in range(rows):
-                        self.put(self.get(self.ahead, l * rows + d), self.values, l * rows + d)
 
         self.each(k, stage)
 
