@@ -16,7 +16,7 @@ from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
 
-LANES = 8
+LANES = 16
 STAGES = 16  # at most: their sums are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
@@ -145,7 +145,10 @@ def lanes_of(system: System, constants: Constants, second: bool, unit: bool) -> 
 
 
 def _reach(matrix: Numbers) -> Numbers:
-    """Return the largest sum of a row of a matrix, or of each of several, by sizes."""
+    """Return how far changes of the values move the stages of the next sweep, at most; or for several matrices.
+
+    There a stage meets the values of the sweep before at itself and at those after it.
+    """
     return np.abs(matrix).sum(axis=-1).max(axis=-1)
 
 

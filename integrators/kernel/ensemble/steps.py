@@ -205,9 +205,8 @@ class Writer:
             setattr(self, name, self.array(slots[name]))
         for name in ("factor", "moved", "strict", "floored", "size", "stage", "found"):
             setattr(self, name, self.room(slots[name], rows))
-        self.values, self.ahead, self.base = (
-            self.room(slots[name], k * rows) for name in ("values", "ahead", "base")
-        )
+        self.values, self.ahead = (self.room(slots[name], k * rows) for name in ("values", "ahead"))
+        self.base = self.array(slots["base"])
         kept = self.array(slots["values"])
         pointer = DOUBLE.as_pointer()
         self.result, self.exception = b.alloca(pointer), b.alloca(pointer)
