@@ -11,9 +11,10 @@ from integrators import registry
 from integrators.integrate import integrate
 from integrators.many import Solutions, integrate_many
 from integrators.protocol import MethodBase, Samples, Stats, Status
-from integrators.solution import Solution
+from integrators.solution import Solution, load
 
 if TYPE_CHECKING:
+    from integrators.advice import advise as advise
     from integrators.events import Event as Event
     from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
@@ -30,11 +31,13 @@ __all__ = [
     "Status",
     "integrate",
     "integrate_many",
+    "load",
     "registry",
 ]
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",
+    "advise": "integrators.advice",
     "order_of": "integrators.order",
     "section": "integrators.events",
     "stability": "integrators.order",

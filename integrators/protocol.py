@@ -250,6 +250,24 @@ class Program(Protocol):
         ...
 
 
+class Compiled:
+    """Base of programs: pickled, one is the method and the system that it is compiled from again.
+
+    Attributes
+    ----------
+    method : MethodBase
+        Set by its `MethodBase.compile`.
+    system : System
+        What it was compiled for.
+    """
+
+    method: Any
+    system: System
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self.method).compile, (self.method, self.system)
+
+
 class _Signature:
     """What ``help`` and ``inspect.signature`` show of a method: its options with their plain types."""
 

@@ -15,6 +15,7 @@ Role = Literal["ours", "peer"]
 
 Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
+Accuracy = dict[str, Positive]
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,13 +48,25 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     shortest : float
         A sample repeats the integration until it lasts this many seconds.
     budget : float
-        Seconds of sampling per case and round; at least one sample is taken.
+        Seconds of sampling per case and round; at least one sample is taken. Of interleaved
+        times: per case, so that slow ones take part in fewer rounds.
+    interleaved : bool
+        Whether one process takes all cases of a problem in turn, one sample of each in every
+        round, instead of a process for every visit: ratios within rounds then say more.
+    order : {"shuffled", "alternating"}
+        Of interleaved rounds: anew in each, or every other one backwards.
+    clock : {"wall", "thread"}
+        Of interleaved times: of the wall, or of the processor's time for this thread, in which
+        other work on the machine does not count.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
     samples: Annotated[int, Meta(ge=1, le=10_000)] = 2
     shortest: Positive = 0.02
     budget: Positive = 8.0
+    interleaved: bool = False
+    order: Literal["shuffled", "alternating"] = "shuffled"
+    clock: Literal["wall", "thread"] = "wall"
 
 
 class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -87,6 +100,52 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     spread: Positive = 1e-2
 
 
+class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What a campaign asks for before it is run; `hbvm_bench.summaries.goals` gives the verdict.
+
+    Either a number of ours is at most ``at``, or a peer's is at least ``ratio`` times ours: of
+    the settings of each that are accurate enough, the one that takes least is compared.
+
+    Attributes
+    ----------
+    words : str
+        In a few words; made from the rest by default.
+    only : list of str
+        Names of the problems it is about; each is a goal. All by default.
+    method : str
+        Ours: the name of a method, or one setting as it prints. All of ours by default.
+    against : str
+        The peer, likewise.
+    metric : str
+        What is compared, see `hbvm_bench.measure.metrics`.
+    at, ratio : float, optional
+        One of them.
+    within : dict of float
+        Errors, by metric, that a setting may have at most. With ``ratio`` and neither this
+        nor ``no_worse``: what the problem asks for.
+    no_worse : dict of float
+        How many times the peer's error ours may be at most, by metric.
+    alone : str
+        Why the energy is compared without the position or the phase; without a reason such a
+        goal is void.
+    """
+
+    words: str = ""
+    only: list[str] = []
+    method: str = ""
+    against: str = ""
+    metric: str = "warm_seconds"
+    at: float | None = None
+    ratio: Positive | None = None
+    within: Accuracy = {}
+    no_worse: Accuracy = {}
+    alone: str = ""
+
+    def __post_init__(self) -> None:
+        if (self.at is None) == (self.ratio is None) or (self.ratio is None) == bool(self.against):
+            raise InputError("a goal has either at=, or against= and ratio=.")
+
+
 class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """One problem of a campaign file, or a grid of them.
 
@@ -100,9 +159,19 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         Values by name; every combination is a problem.
     grid : Grid, optional
         Instead of the campaign's.
+    name : str
+        What ``only`` and the pages call it; its name in the registry by default.
+    title, note : str
+        For readers: a line, and what to know when reading the numbers.
+    within : dict of float
+        The errors, by metric, that times are compared at first; see `Goal`.
     """
 
     use: str
+    name: str = ""
+    title: str = ""
+    note: str = ""
+    within: Accuracy = {}
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None
@@ -113,9 +182,9 @@ class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     Attributes
     ----------
-    use : str
-        The method as it prints, such as ``"Taylor(tol=1e-15)"``; ``{name}`` stands for a
-        value of the sweep or of the problem, see `hbvm_bench.campaign.sweep`.
+    use : str or list of str
+        The method as it prints, such as ``"Taylor(tol=1e-15)"``, or a list of settings; ``{name}``
+        stands for a value of the sweep or of the problem, see `hbvm_bench.campaign.sweep`.
     settings : str
         Whether these are the library's defaults, what its authors recommend for
         such a problem, the settings of a published experiment, or a use that the
@@ -126,13 +195,21 @@ class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         Values by name; every combination is a setting.
     only : list of str
         Names of the problems it runs on; all by default.
+    quick : list of int
+        Which of its settings, counted from 0, a quick run takes; all by default.
     """
 
-    use: str
+    use: str | list[str]
     settings: Settings = "chosen"
     note: str = ""
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     only: list[str] = []
+    quick: list[int] = []
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts of its settings, before any sweep."""
+        return [self.use] if isinstance(self.use, str) else self.use
 
 
 class EnsembleEntry(

@@ -14,6 +14,7 @@ from hbvm_bench.campaign.entries import (
     Checks,
     Ensemble,
     EnsembleEntry,
+    Goal,
     Limits,
     MethodEntry,
     ProblemEntry,
@@ -41,20 +42,26 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Every method runs on every problem, unless the entry says ``only`` where.
     ensembles : list of EnsembleEntry
         Many trajectories at once, beside the rest.
+    goals : list of Goal
+        What is asked for, declared before the run.
     grid, limits, timing, checks
         Shared by all cases.
+    quick : bool
+        Whether only those settings are run that are marked for a quick run.
     """
 
     name: str
     problems: list[str | ProblemEntry] = []
     methods: list[MethodEntry] = []
     ensembles: list[EnsembleEntry] = []
+    goals: list[Goal] = []
     title: str = ""
     description: str = ""
     grid: Grid = Grid()
     limits: Limits = Limits()
     timing: TimingPlan = TimingPlan()
     checks: Checks = Checks()
+    quick: bool = False
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", self.name):
@@ -68,8 +75,8 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         if bool(self.problems) != bool(self.methods):
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
-        known = {_name(entry) for entry in self.entries()}
-        for name in (name for method in self.methods for name in method.only):
+        known = {name_of(entry) for entry in self.entries()}
+        for name in (name for one in (*self.methods, *self.goals) for name in one.only):
             if name not in known:
                 raise unknown("problem of the campaign", name, known)
 
@@ -100,7 +107,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             for entry in self.entries()
             for chosen in _chosen(entry)
             for method in self.methods
-            for text in _settings(method, entry, chosen)
+            for text in _settings(method, name_of(entry), chosen, self.quick)
         ]
         return made + [
             Case(
@@ -112,18 +119,22 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             )
             for entry in self.ensembles
             for method in entry.methods
-            for text in _settings(method, ProblemEntry(use=entry.problem), {})
+            for text in _settings(method, parse_spec(entry.problem).name, {}, self.quick)
         ]
 
     def _count(self) -> int:
         """Return how many cases there are, without making any."""
         runs = [
-            _combinations(entry.sweep) * _combinations(method.sweep)
+            _combinations(entry.sweep) * _combinations(method.sweep) * len(method.texts)
             for entry in self.entries()
             for method in self.methods
-            if not method.only or _name(entry) in method.only
+            if not method.only or name_of(entry) in method.only
         ]
-        many = [_combinations(method.sweep) for entry in self.ensembles for method in entry.methods]
+        many = [
+            _combinations(method.sweep) * len(method.texts)
+            for entry in self.ensembles
+            for method in entry.methods
+        ]
         return sum(runs) + sum(many)
 
 
@@ -131,26 +142,30 @@ def _combinations(sweep: Mapping[str, Sequence[object]]) -> int:
     return math.prod(len(values) for values in sweep.values())
 
 
-def _name(entry: ProblemEntry) -> str:
-    return parse_spec(PLACEHOLDER.sub("0", entry.use)).name
+def name_of(entry: ProblemEntry) -> str:
+    """Return what a campaign calls a problem."""
+    return entry.name or parse_spec(PLACEHOLDER.sub("0", entry.use)).name
 
 
 def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
-    _all_used(entry.use, entry.sweep, entry.use)
+    _all_used(entry.use, entry.sweep)
     return [entry.values | chosen for chosen in combinations(entry.sweep)]
 
 
-def _settings(method: MethodEntry, entry: ProblemEntry, values: Mapping[str, Scalar]) -> list[str]:
-    if method.only and parse_spec(fill(entry.use, values)).name not in method.only:
+def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar], quick: bool) -> list[str]:
+    if method.only and problem not in method.only:
         return []
-    _all_used(method.use, method.sweep, method.use)
-    return [fill(method.use, {**values, **chosen}) for chosen in combinations(method.sweep)]
+    for text in method.texts:
+        _all_used(text, method.sweep)
+    chosen = list(combinations(method.sweep))
+    made = [fill(text, {**values, **one}) for text in method.texts for one in chosen]
+    return [made[place] for place in method.quick] if quick and method.quick else made
 
 
-def _all_used(text: str, sweep: Mapping[str, object], where: str) -> None:
+def _all_used(text: str, sweep: Mapping[str, object]) -> None:
     for name in sweep.keys() - names(text):
         raise InputError(
-            f"{where}: the sweep gives values of {name!r}, which no placeholder {{{name}}} takes."
+            f"{text}: the sweep gives values of {name!r}, which no placeholder {{{name}}} takes."
         )
 
 
@@ -256,6 +271,7 @@ NESTED: dict[str, type[msgspec.Struct]] = {
     "problems": ProblemEntry,
     "methods": MethodEntry,
     "ensembles": EnsembleEntry,
+    "goals": Goal,
 }
 
 __all__ = [
@@ -264,6 +280,7 @@ __all__ = [
     "Checks",
     "Ensemble",
     "EnsembleEntry",
+    "Goal",
     "Grid",
     "Limits",
     "MethodEntry",

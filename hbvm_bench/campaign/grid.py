@@ -42,6 +42,15 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     first : float, optional
         Where a logarithmic grid begins, after the start, in the problem's unit of
         time; a hundredth of the span by default.
+    also : list of float
+        Further times after the start, where they lie within the span.
+    multiple_of : float, optional
+        Moves every time between the ends to the nearest multiple of this after the start, such
+        as a year, which a step may divide.
+    own_steps : bool
+        Whether samples are moved to the nearest own steps of a method with a fixed one, so
+        that they cost it nothing in quality, and the end is that of a run without samples,
+        the one that is timed.
 
     Without step and count: the problem's own grid, or else 1000 intervals.
     """
@@ -50,6 +59,9 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     count: Count | None = None
     spacing: Spacing = "equal"
     first: Positive | None = None
+    also: list[Positive] = []
+    multiple_of: Positive | None = None
+    own_steps: bool = False
 
     def __post_init__(self) -> None:
         if self.step is not None and self.count is not None:
@@ -59,14 +71,33 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         if self.first is not None and self.spacing != "log":
             raise InputError("first= belongs to a grid with spacing='log'.")
 
-    def times(self, problem: Problem) -> NDArray[np.float64]:
+    def times(self, problem: Problem, h: float | None = None) -> NDArray[np.float64]:
         """Return the sampling times from ``t0`` to ``t_end``, both included, shape (n,).
+
+        Parameters
+        ----------
+        problem : Problem
+            Has the span.
+        h : float, optional
+            The method's fixed step, which ``own_steps`` asks for.
 
         Raises
         ------
         problems.errors.InputError
             For more samples than `problems.limits` allow, or ``first`` beyond the span.
         """
+        times, span = self._shared(problem), problem.t_end - problem.t0
+        further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)
+        times = np.union1d(times, further)[:: 1 if span > 0.0 else -1] if further.size else times
+        unit = h if self.own_steps and h else self.multiple_of
+        if not unit:
+            return times
+        after = np.unique(np.rint(np.abs(times - problem.t0) / unit)) * unit
+        inside = after[after < abs(span) * (1 - 1e-12)]
+        return np.append(problem.t0 + np.copysign(inside, span), problem.t_end)
+
+    def _shared(self, problem: Problem) -> NDArray[np.float64]:
+        """Return the times that are the same for every method."""
         span = problem.t_end - problem.t0
         count = self.count or 1000
         limits.check(f"a grid with count={shown(count)}", "SAMPLES", count)

@@ -32,7 +32,8 @@ from problems.problem import Problem
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
 # What makes numbers of a solution; a worker process does nothing else with it.
 MEASURES = tuple(
-    f"hbvm_bench.measure.{name}" for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing")
+    f"hbvm_bench.measure.{name}"
+    for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing", "together")
 )
 # They say, name and keep what is run; all that a number can depend on of it is in the key.
 BOOKKEEPING = frozenset(
@@ -121,24 +122,28 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
 
     Notes and settings labels are left out: they are words about the case.
     """
-    grid = case.grid.times(problem)
-    return {
-        "problem": case.problem,
-        "field": emit.fingerprint(problem.system),
-        "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
-        "parameters": [value.hex() for value in problem.par.tolist()],
-        "method": type(method).__name__,
-        "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
-        "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
-        "versions": versions_of(method),
-        "reference": _reference_digest(problem),
-        "source": source_digest(method, case),
-    } | {
-        # a case without them keeps the id it had
-        name: msgspec.to_builtins(asked)
-        for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
-        if asked not in (None, Checks())
-    }
+    grid = case.grid.times(problem, getattr(method, "h", None))
+    return (
+        {
+            "problem": case.problem,
+            "field": emit.fingerprint(problem.system),
+            "start": [value.hex() for value in (problem.t0, problem.t_end, *problem.y0.tolist())],
+            "parameters": [value.hex() for value in problem.par.tolist()],
+            "method": type(method).__name__,
+            "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
+            "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
+            "versions": versions_of(method),
+            "reference": _reference_digest(problem),
+            "source": source_digest(method, case),
+        }
+        | {
+            # a case without them keeps the id it had
+            name: msgspec.to_builtins(asked)
+            for name, asked in (("checks", case.checks), ("ensemble", case.ensemble))
+            if asked not in (None, Checks())
+        }
+        | ({"own_steps": True} if case.grid.own_steps else {})
+    )
 
 
 def versions_of(method: MethodBase) -> dict[str, str]:

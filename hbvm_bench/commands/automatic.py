@@ -1,8 +1,7 @@
 """The command ``hbvm-bench automatic``."""
 
 import math
-import sys
-import tempfile
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +9,10 @@ import typer
 from rich.console import Console
 
 from hbvm_bench.commands import measuring
+from hbvm_bench.commands.run import carry_out
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
+from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
 from hbvm_bench.studies.general import runs as general_
@@ -21,7 +22,7 @@ from problems.errors import InputError
 
 def automatic(
     problems: Annotated[list[str] | None, typer.Argument(help="Problems; all by default.")] = None,
-    rounds: Annotated[int, typer.Option(help="Interleaved timing samples, against heyoka.")] = 25,
+    rounds: Annotated[int | None, typer.Option(help="Interleaved timing samples, against heyoka.")] = None,
     general: Annotated[
         bool, typer.Option("--general", help="General and stiff systems instead, beside SciPy's methods.")
     ] = False,
@@ -36,6 +37,7 @@ def automatic(
 ) -> None:
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
+    The cases are kept in runs/automatic, and a rerun does only what is missing there.
     With --general: van der Pol's equation, Robertson's chemistry, a driven pendulum and Arenstorf's
     orbit against their known end values, HBVM() beside Radau and DOP853; and a stiff chain
     at a step a hundred times as long as one at which the fixed-point iteration fails.
@@ -46,33 +48,19 @@ def automatic(
     if general:
         _general(console, problems or [], limit)
         return
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        result = _measured(problems or [], rounds, avx2, out, Path(scratch))
-    page = automatic_.keep(result, out) if out is not None else None
-    terminal.print_table(automatic_.sides(result.duels))
-    console.print(machine.sentence(result.machine), highlight=False)
-    if page is not None:
-        terminal.console(stderr=True).print(str(page), style="dim")
-
-
-def _measured(
-    problems: list[str], rounds: int, avx2: bool, out: Path | None, scratch: Path
-) -> automatic_.Result:
-    keys = automatic_.asked(problems, rounds)
-    environment = machine.restricted_to_avx2() if avx2 else {}
+    campaign = automatic_.campaign(problems or [], rounds)
+    os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     if out is not None:
         ensure_writable(out)
-    words = ["automatic", *problems, "--rounds", str(rounds), *(["--avx2"] if avx2 else [])]
-    command, made = measuring.command(words, out), scratch / "result.json"
-    request = automatic_.Request(problems=keys, rounds=rounds, command=command, out=str(made))
-    code = measuring.measure("hbvm_bench.studies.automatic.runs", request, environment)
-    if code == 2:  # it has said why
-        raise typer.Exit(2)
-    if code != 0:
-        print(f"hbvm-bench: the process that measures ended with exit code {code}.", file=sys.stderr)
-        raise typer.Exit(1)
-    (result,) = automatic_.load(made)
-    return result
+    words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
+    command = measuring.command([*words, *(["--avx2"] if avx2 else [])], out)
+    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
+    run = kept.of(store, automatic_.NAME)
+    page = automatic_.keep(run, out) if out is not None else None
+    terminal.print_table(automatic_.sides(automatic_.duels(run)))
+    console.print(machine.sentence(run.machine), highlight=False)
+    if page is not None:
+        terminal.console(stderr=True).print(str(page), style="dim")
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:

@@ -1,20 +1,19 @@
 """``hbvm-bench endure``."""
 
-import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 import typer
 
-from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.commands import measuring
+from hbvm_bench.commands.listing import as_json as run_as_json
+from hbvm_bench.commands.run import carry_out
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.endure import law, runs
-from hbvm_bench.studies.endure.runs import Endurance, Request
+from hbvm_bench.studies.endure.runs import Endurance
+from hbvm_bench.summaries.goals import as_data as goals_as_data
 from problems.errors import InputError
 
 LEAST_YEARS = 100.0
@@ -33,7 +32,7 @@ def endure(
         bool, typer.Option("--quick", help="10 000 years from 3 starts; under a minute.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the result and the report go; default runs/endure.")
+        Path | None, typer.Option("--out", help="Where the results and the report go; default runs/endure.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result and its laws as JSON.")] = False,
     redraw: Annotated[
@@ -43,21 +42,14 @@ def endure(
     """Follow the energy error of the outer Solar System over a million years, ours beside the peers'."""
     directory = out or Path("runs") / ("endure-quick" if quick else "endure")
     if not redraw:
-        span = years if years is not None else runs.QUICK_YEARS if quick else runs.YEARS
-        if not (math.isfinite(span) and LEAST_YEARS <= span <= MOST_YEARS and span == round(span)):
+        span = years if years is not None else runs.QUICK_YEARS if quick else None
+        if span is not None and not (LEAST_YEARS <= span <= MOST_YEARS and span == round(span)):
             raise InputError(
                 f"--years must be a whole number from {LEAST_YEARS:g} to {MOST_YEARS:g}, not {span!r}."
             )
-        request = Request(
-            years=span,
-            starts=starts or (runs.QUICK_STARTS if quick else runs.STARTS),
-            methods=[repr(make_method(text)) for text in method or runs.METHODS],
-            out=str(directory),
-            command=_command(years, starts, method, quick, directory),
-        )
-        ensure_writable(directory)
-        _run(request)
-    result = runs.load(directory)
+        asked = runs.campaign(span, starts or (runs.QUICK_STARTS if quick else None), method)
+        carry_out(asked, directory, _command(years, starts, method, quick, directory))
+    result = runs.read(directory)
     from hbvm_bench.studies.endure import report
 
     if as_json:
@@ -65,7 +57,7 @@ def endure(
     else:
         for table in report.tables(result):
             terminal.print_table(table)
-        terminal.console().print(machine.sentence(result.machine), highlight=False)
+        terminal.console().print(machine.sentence(result.run.machine), highlight=False)
     terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
 
 
@@ -73,22 +65,14 @@ def as_data(result: Endurance) -> dict[str, Any]:
     """Return the result with what is read off it, as plain data for JSON."""
     return {
         "lines": [_line(line) for line in law.lines(result)],
-        "goals": [msgspec.to_builtins(goal) for goal in law.goals(result)],
-        "result": msgspec.to_builtins(result),
+        "goals": goals_as_data(law.goals(result)),
+        "result": run_as_json(result.run.index, result.run.records),
     }
 
 
 def _line(line: law.Line) -> dict[str, Any]:
     rms = {f"{year:g}": value for year, value in line.rms.items()}
     return msgspec.to_builtins(line) | {"rms": rms}
-
-
-def _run(request: Request) -> None:
-    kept = f"the starts that had ended are kept in {request.out}"
-    code = measuring.measure("hbvm_bench.studies.endure.runs", request, kept=kept)
-    if code != 0:
-        print(f"hbvm-bench: the process that integrates ended with exit code {code}.", file=sys.stderr)
-        raise typer.Exit(1)
 
 
 def _command(

@@ -17,6 +17,7 @@ from hbvm_bench.campaign.identity import version_of_library
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
+from hbvm_bench.summaries import goals
 from integrators.protocol import MethodBase
 from problems.errors import unknown
 
@@ -66,6 +67,7 @@ def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
             key: {"label": m.label, "unit": m.unit, "better": m.better, "description": m.description}
             for key, m in METRICS.items()
         },
+        "goals": goals.as_data(goals.verdicts(index.campaign, records)),
         "cases": [_case(record) for record in records],
     }
 

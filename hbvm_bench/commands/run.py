@@ -51,19 +51,56 @@ def run(
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step)
-    cases = loop.plan(campaign)
-    store = Store(out or Path("runs") / campaign.name)
-    with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
-        if report_to is not None:
-            ensure_writable(report_to, keep=False)
-        store.prepare()
-        _measure(campaign, cases, store, pool, timing, _command(name, problem, method, step))
-    terminal.print_results(store.records())
+    if report_to is not None:
+        ensure_writable(report_to, keep=False)
+    command = _command(name, problem, method, step)
+    out = out or Path("runs") / campaign.name
+    store = carry_out(campaign, out, command, executor=executor, jobs=jobs, timing=timing)
+    records = store.records()
+    terminal.print_results(records)
+    terminal.print_goals(campaign, records)
     if report_to is not None:
         from hbvm_bench.report.write import write_report
 
         for path in write_report(store, report_to):
             print(path)
+
+
+def carry_out(
+    campaign: Campaign,
+    directory: Path,
+    command: str,
+    *,
+    executor: str = executors.LOCAL,
+    jobs: int | None = None,
+    timing: bool = True,
+) -> Store:
+    """Run what is missing of a campaign in a directory, and return its store.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        What to run.
+    directory : Path
+        Where results go.
+    command : str
+        How to run it again.
+    executor, jobs, timing
+        As of `run`.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a name or an option in the campaign is wrong, before anything is written.
+    typer.Exit
+        With 130 after Ctrl-C, and 1 if an executor lost some cases; what finished is kept.
+    """
+    cases = loop.plan(campaign)
+    store = Store(directory)
+    with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
+        store.prepare()
+        _measure(campaign, cases, store, pool, timing, command)
+    return store
 
 
 def _measure(
@@ -162,4 +199,4 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     live.visited()
 
 
-__all__ = ["run"]
+__all__ = ["carry_out", "run"]

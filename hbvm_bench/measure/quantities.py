@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.measure import drift
 from hbvm_bench.measure.measured import Measured
 
 Quantity = Callable[[Measured], float | str]
@@ -64,6 +65,39 @@ def position_max(m: Measured) -> float | str:
     if m.reference is None:
         return "no stored reference for this problem"
     return _largest(m.position, m.position_t)
+
+
+def position_mean(m: Measured) -> float | str:
+    """Return the geometric mean of the position errors at the times of the reference after the start.
+
+    At round-off a single one of them is a matter of luck.
+    """
+    if why := _no_reference_at_end(m):
+        return why
+    with np.errstate(divide="ignore"):
+        return float(np.exp(np.mean(np.log(m.position[m.position_t != m.problem.t0]))))
+
+
+def energy_rms(m: Measured) -> float | str:
+    """Return the root mean square over the starts of the energy error at the end."""
+    errors = m.drift.get("energy", np.empty((0, 0)))
+    return float(drift.rms(errors)[-1]) if errors.size else "no further starts were asked for"
+
+
+def energy_bias(m: Measured) -> float | str:
+    """Return the mean energy error over the starts, in units of what is called a drift."""
+    law = m.laws.get("energy")
+    if law is None or law.mean is None or not law.mean_error:
+        return "a mean needs several starts"
+    return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
+
+
+def energy_rate_least(m: Measured) -> float | str:
+    """Return the least drift of the energy, without sign, that its interval over the starts allows."""
+    law = m.laws.get("energy")
+    if law is None or law.rate_low is None or law.rate_high is None:
+        return "an interval needs several starts"
+    return max(law.rate_low, -law.rate_high, 0.0)
 
 
 def phase_end(m: Measured) -> float | str:

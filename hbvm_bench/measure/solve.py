@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.measure.timing import Run
 from integrators.protocol import MethodBase, Program, Status
 from integrators.solution import Solution
 from problems.problem import Problem
@@ -36,4 +37,31 @@ def solve(problem: Problem, method: MethodBase, program: Program, times: NDArray
         from_cache=program.from_cache,
         problem=problem,
         method=method,
+    )
+
+
+def solve_with_bare_end(
+    problem: Problem, method: MethodBase, program: Program, times: NDArray[np.float64]
+) -> Solution:
+    """Return the same, but for the end, which is that of a second run without samples.
+
+    This is the run that is timed, and an error at the end is to be of the very run that is.
+
+    Parameters
+    ----------
+    problem, method, program, times
+        As of `solve`; the last time is the problem's end.
+    """
+    sampled = solve(problem, method, program, times[:-1])
+    if sampled.status is not Status.FINISHED:
+        return sampled
+    _, end = Run.of(problem, method, program).seconds()
+    finished = end.status is Status.FINISHED
+    return replace(
+        sampled,
+        t=np.append(sampled.t, end.t),
+        y=np.vstack([sampled.y, end.y]),
+        status=end.status,
+        reason=end.reason,
+        t_stop=problem.t_end if finished else sampled.t_stop,
     )

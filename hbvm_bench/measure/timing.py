@@ -3,12 +3,12 @@
 import gc
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from statistics import median, quantiles
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from problems.problem import Problem
 WARM_UP = 0.01  # of the span: everything has run once
 SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
 CALIBRATION_LOOPS = 800_000
+ORDER_SEED = 2026
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +108,16 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
+Order = Literal["alternating", "shuffled", "as given"]
+
+
 def interleaved(
-    samples: Sequence[Callable[[], float]], rounds: int, *, alternate: bool = True
+    samples: Sequence[Callable[[], float]],
+    rounds: int,
+    *,
+    order: Order = "alternating",
+    turns: Sequence[Collection[int]] | None = None,
+    begin: Callable[[int], None] = lambda number: None,
 ) -> list[list[float]]:
     """Take one sample of each in every round, so that what else the machine does meets them all.
 
@@ -118,8 +127,12 @@ def interleaved(
         Each takes one sample and returns its seconds.
     rounds : int
         How many.
-    alternate : bool
-        Whether every other round goes backwards, so that none is always the first.
+    order : {"alternating", "shuffled", "as given"}
+        Every other round goes backwards; or each is in another order; or all are alike.
+    turns : sequence of collection of int, optional
+        The rounds, from 0, in which each takes part; all by default.
+    begin : callable, optional
+        Called with the number of a round before it begins.
 
     Returns
     -------
@@ -127,11 +140,24 @@ def interleaved(
         The seconds of each, round by round.
     """
     taken: list[list[float]] = [[] for _ in samples]
+    shuffle = np.random.default_rng(ORDER_SEED)
     for number in range(rounds):
-        turns = list(zip(samples, taken, strict=True))
-        for sample, seconds in reversed(turns) if alternate and number % 2 else turns:
-            seconds.append(sample())
+        begin(number)
+        places = list(range(len(samples)))
+        if order == "shuffled":
+            places = shuffle.permutation(places).tolist()
+        elif order == "alternating" and number % 2:
+            places.reverse()
+        for i in places:
+            if turns is None or number in turns[i]:
+                taken[i].append(samples[i]())
     return taken
+
+
+def spread_evenly(count: int, rounds: int) -> list[int]:
+    """Return so many of the rounds, at least one and at most all, spread evenly."""
+    count = max(1, min(rounds, count))
+    return [number * rounds // count for number in range(count)]
 
 
 @dataclass(frozen=True)

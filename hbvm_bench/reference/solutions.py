@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 TOLERANCE = "1e-28"
 CHECK_TOLERANCE = "1e-25"
 INTERVALS = 60
+LONG = "long"  # the folder of those for long spans, whose two computations agree on fewer digits
 
 
 class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -81,33 +82,31 @@ def folder() -> Path:
     return Path(str(files("hbvm_bench.reference") / "data"))
 
 
-def find(problem: Problem, where: Path | None = None) -> Reference | None:
+def find(problem: Problem) -> Reference | None:
     """Return the stored reference of a problem, or ``None``.
 
     Parameters
     ----------
     problem : Problem
-        Matched by its name, its initial state and its parameters, bit for bit.
-    where : Path, optional
-        The folder to look in; the package's own by default.
+        Matched by its name, its initial state and its parameters, bit for bit. Of several
+        references the one that has the problem's end time is returned, or else the first.
     """
-    path = _path(problem, where)
+    path = _path(problem)
     return None if path is None else _parsed(path)
 
 
-def find_file(problem: Problem, where: Path | None = None) -> ReferenceFile | None:
+def find_file(problem: Problem) -> ReferenceFile | None:
     """Return the stored reference of a problem with all its digits, or ``None``; see `find`."""
-    path = _path(problem, where)
+    path = _path(problem)
     return None if path is None else read(path)
 
 
-def _path(problem: Problem, where: Path | None) -> Path | None:
-    wanted = start(problem), hexadecimal(problem.par)
-    for path in sorted((where or folder()).glob(f"{problem.name}*.json")):
-        stored = read(path)
-        if (stored.start, stored.parameters) == wanted:
-            return path
-    return None
+def _path(problem: Problem) -> Path | None:
+    wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
+    places = (folder(), folder() / LONG)
+    paths = [path for place in places for path in sorted(place.glob(f"{problem.name}*.json"))]
+    fitting = [path for path in paths if (read(path).start, read(path).parameters) == wanted]
+    return next((path for path in fitting if end in read(path).t), fitting[0] if fitting else None)
 
 
 def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:

@@ -8,9 +8,11 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table as RichTable
 from rich.text import Text
 
+from hbvm_bench.campaign.file import Campaign
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries import goals
 from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
 from hbvm_bench.summaries.table import Table
 
@@ -65,6 +67,12 @@ def print_results(
     terminal = console()
     for table in results(records, keys, sort, terminal.width):
         terminal.print(table)
+
+
+def print_goals(campaign: Campaign, records: Sequence[Record]) -> None:
+    """Print the verdicts on what a campaign asked for; nothing where it asked for nothing."""
+    if found := goals.verdicts(campaign, records):
+        print_table(goals.table(found))
 
 
 def results(

@@ -1,9 +1,11 @@
-"""The timing pass: one case at a time, alone and without output, round by round."""
+"""The timing pass: one case at a time, alone and without output, round by round; or a problem's in turn."""
 
 import os
 import tempfile
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
@@ -14,9 +16,13 @@ from hbvm_bench.measure import measured as measure
 from hbvm_bench.measure.metrics import TIMING_KEYS, evaluate
 from hbvm_bench.reference import solutions
 from hbvm_bench.run.task import decoded, start
-from hbvm_bench.run.worker import Request, TimingReply
+from hbvm_bench.run.worker import InterleavedReply, Request, TimingReply
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
+
+T = TypeVar("T")
+Tell = Callable[[int, Resolved], None]
+OFF = "on another trajectory, so that its time has no meaning"
 
 
 def time_cases(
@@ -24,9 +30,12 @@ def time_cases(
     store: Store,
     plan: TimingPlan,
     limits: Limits,
-    tell: Callable[[int, Resolved], None] = lambda round_, resolved: None,
+    tell: Tell = lambda round_, resolved: None,
 ) -> None:
     """Take what is missing of the timing pass: one case at a time, alone, round by round.
+
+    With ``plan.interleaved`` one process takes all rounds of all cases of a problem, in turn;
+    a problem that has them of one such process is not timed again.
 
     Parameters
     ----------
@@ -37,7 +46,7 @@ def time_cases(
     plan : TimingPlan
         Rounds and samples.
     limits : Limits
-        Of each visit.
+        Of each visit; of an interleaved one, times the number of its cases.
     tell : callable, optional
         Called before each visit with the round and the case.
 
@@ -49,6 +58,10 @@ def time_cases(
     here = machine.describe(measure=True)
     failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
+        if plan.interleaved:
+            for group in _missing_together(cases, store, plan, here):
+                _visit_together(group, store, plan, limits, core, here, tell)
+            return
         for number in range(plan.rounds):
             for resolved in cases:
                 record = store.load(resolved.id)
@@ -65,8 +78,10 @@ def time_cases(
 
 def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> list[str]:
     """Return the ids that `time_cases` has to visit, each as often as it does, at most."""
-    records = [record for case in cases if (record := store.load(case.id)) and timeable(record)]
     here = machine.describe()
+    if plan.interleaved:
+        return [group[0].id for group in _missing_together(cases, store, plan, here)]
+    records = [record for case in cases if (record := store.load(case.id)) and timeable(record)]
     timings = {record.id: _timing_of(record, here) for record in records}
     return [
         key
@@ -91,23 +106,91 @@ def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timin
     return msgspec.structs.replace(record, result=result, timing=timing)
 
 
-def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+def _missing_together(
+    cases: Sequence[Resolved], store: Store, plan: TimingPlan, here: dict[str, str | int]
+) -> list[list[Resolved]]:
+    """Return the cases to be timed, problem by problem: all of those that reached their end, or none.
+
+    Rounds of different processes do not belong together, so that one missing case has all of them visited.
+    """
+    groups: dict[str, list[Resolved]] = {}
+    for resolved in cases:
+        record = store.load(resolved.id)
+        if record is not None and timeable(record) and resolved.case.ensemble is None and plan.rounds:
+            groups.setdefault(resolved.case.problem, []).append(resolved)
+    return [group for group in groups.values() if not _timed_together(group, store, plan, here)]
+
+
+def _timed_together(
+    group: Sequence[Resolved], store: Store, plan: TimingPlan, here: dict[str, str | int]
+) -> bool:
+    kept = [record.timing for one in group if (record := store.load(one.id)) is not None]
+    timings = [timing for timing in kept if timing is not None and machine.same(timing.machine, here)]
+    processes = {timing.process for timing in timings}
+    enough = any(len(timing.rounds) >= plan.rounds for timing in timings)
+    return len(timings) == len(group) and len(processes) == 1 and "" not in processes and enough
+
+
+def _visit_together(
+    group: Sequence[Resolved],
+    store: Store,
+    plan: TimingPlan,
+    limits: Limits,
+    core: int | None,
+    here: dict[str, str | int],
+    tell: Tell,
+) -> None:
+    tell(0, group[0])
+    records = {one.id: record for one in group if (record := store.load(one.id)) is not None}
+    on = [one for one in group if not records[one.id].result.violation]
+    timings = dict.fromkeys((one.id for one in group), Timing(why=OFF))
+    process = datetime.now(UTC).isoformat()
+    if on:
         request = Request(
-            case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core, runner=os.getpid()
+            case=on[0].case,
+            id=on[0].id,
+            beside={one.id: one.case for one in on[1:]},
+            mode="interleave",
+            plan=plan,
+            core=core,
+            runner=os.getpid(),
         )
-        ended = start(Path(scratch), request, limits)
-        reply = decoded(Path(scratch) / "timing.json", TimingReply)
+        together = msgspec.structs.replace(
+            limits,
+            wall_seconds=limits.wall_seconds * len(on),
+            compile_seconds=limits.compile_seconds * len(on),
+        )
+        reply, why = _asked(request, together, InterleavedReply)
+        made = [Timing(why=why)] * len(on) if reply is None else reply.timings
+        timings |= zip((one.id for one in on), made, strict=True)
+    for one in group:
+        timing = msgspec.structs.replace(timings[one.id], machine=here, process=process)
+        store.save(_with_timing(store, records[one.id], one, timing))
+
+
+def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
+    request = Request(
+        case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core, runner=os.getpid()
+    )
+    reply, why = _asked(request, limits, TimingReply)
     if reply is None:
-        words = {
-            "timeout": "the time limit",
-            "compiling": "still compiling",
-            "memory": "the memory limit",
-        }.get(ended.cause, ended.words)
-        return msgspec.structs.replace(timing, why=f"not timed: {words}")
+        return msgspec.structs.replace(timing, why=why)
     if reply.round is None:
         return msgspec.structs.replace(timing, why=reply.why)
     return Timing(rounds=[*timing.rounds, reply.round], machine=timing.machine)
+
+
+def _asked(request: Request, limits: Limits, type_: type[T]) -> tuple[T | None, str]:
+    """Return what a worker process answers, or why it does not."""
+    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
+        ended = start(Path(scratch), request, limits)
+        reply = decoded(Path(scratch) / "timing.json", type_)
+    words = {
+        "timeout": "the time limit",
+        "compiling": "still compiling",
+        "memory": "the memory limit",
+    }.get(ended.cause, ended.words)
+    return reply, f"not timed: {words}"
 
 
 def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:

@@ -14,6 +14,7 @@ import signal
 import sys
 import traceback
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -23,14 +24,15 @@ import numpy as np
 
 from hbvm_bench.campaign.file import Case, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, resolve
-from hbvm_bench.measure import ensemble, timing
+from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
 from hbvm_bench.measure.metrics import evaluate, guard_violation
-from hbvm_bench.measure.solve import solve
+from hbvm_bench.measure.solve import solve, solve_with_bare_end
+from hbvm_bench.measure.timing import Run
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, TimingRound
+from hbvm_bench.store.records import Result, Timing, TimingRound
 from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import Program, Status
 from integrators.solution import Solution
@@ -62,8 +64,10 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         The case.
     id : str
         The id that the runner gave it.
-    mode : {"measure", "time"}
-        The accuracy run, or one round of the timing pass.
+    mode : {"measure", "time", "interleave"}
+        The accuracy run, one round of the timing pass, or all of its rounds of several cases.
+    beside : dict of Case
+        The other cases of an interleaved timing, by their ids.
     plan : TimingPlan
         For the timing pass.
     core : int or None
@@ -74,7 +78,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
 
     case: Case
     id: str
-    mode: Literal["measure", "time"] = "measure"
+    mode: Literal["measure", "time", "interleave"] = "measure"
+    beside: dict[str, Case] = {}
     plan: TimingPlan = TimingPlan()
     core: int | None = None
     runner: int
@@ -87,6 +92,12 @@ class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
     why: str = ""
 
 
+class InterleavedReply(msgspec.Struct, frozen=True, kw_only=True):
+    """The timings of several cases, in the order of the request; one without rounds says why."""
+
+    timings: list[Timing]
+
+
 def main(path: Path) -> None:
     """Do what the request at ``path`` asks."""
     request = msgspec.json.decode(path.read_bytes(), type=Request)
@@ -95,10 +106,14 @@ def main(path: Path) -> None:
         os.sched_setaffinity(0, {request.core})
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
-    work = _time if request.mode == "time" else _measure
-    name = "timing.json" if request.mode == "time" else "result.json"
+    work: dict[str, Callable[[Request, Path], msgspec.Struct]] = {
+        "measure": _measure,
+        "time": _time,
+        "interleave": _interleave,
+    }
+    name = "result.json" if request.mode == "measure" else "timing.json"
     try:
-        reply = work(request, path.parent)
+        reply = work[request.mode](request, path.parent)
         with atomic(path.parent / name) as temporary:
             temporary.write_bytes(msgspec.json.encode(reply))
     except (OSError, InputError) as error:
@@ -127,11 +142,12 @@ def _measure(request: Request, directory: Path) -> Result:
         names = resolved.problem.system.invariant_names
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
-        grid = resolved.case.grid.times(resolved.problem)
+        grid = resolved.case.grid.times(resolved.problem, getattr(resolved.method, "h", None))
         program = _compiled(resolved, directory)
         if resolved.case.ensemble is not None:
             return _measure_ensemble(resolved, program, directory)
-        solution = solve(resolved.problem, resolved.method, program, grid)
+        integrate = solve_with_bare_end if resolved.case.grid.own_steps else solve
+        solution = integrate(resolved.problem, resolved.method, program, grid)
     except OSError as error:
         if error.errno in DISK:
             raise
@@ -194,6 +210,15 @@ def _time(request: Request, directory: Path) -> TimingReply:
     return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
 
 
+def _interleave(request: Request, directory: Path) -> InterleavedReply:
+    asked = {request.id: request.case, **request.beside}
+    found = [_checked(case, key) for key, case in asked.items()]
+    runs = [Run.of(one.problem, one.method) for one in found]  # compiled
+    (directory / COMPILED).touch()
+    made = together.time_together(runs, request.plan)
+    return InterleavedReply(timings=[Timing(why=one) if isinstance(one, str) else one for one in made])
+
+
 class _Telling:
     """A method that tells the runner when it has compiled."""
 
@@ -219,8 +244,12 @@ def _compiled(resolved: Resolved, directory: Path) -> Program:
 
 
 def _resolved(request: Request) -> Resolved:
-    resolved = resolve(request.case)
-    if resolved.id != request.id:
+    return _checked(request.case, request.id)
+
+
+def _checked(case: Case, key: str) -> Resolved:
+    resolved = resolve(case)
+    if resolved.id != key:
         raise InputError(STALE)
     return resolved
 

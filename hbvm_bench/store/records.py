@@ -104,6 +104,8 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
         Processor seconds per wall second while sampling: below 1 something else used the core.
     calibration : list of float
         Seconds of a fixed computation before each sample and after the last.
+    number : int or None
+        Of the interleaved round, from 0; ``None`` for a visit by itself.
     """
 
     samples: list[float]
@@ -111,6 +113,7 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     compile: Compile
     share: float = 1.0
     calibration: list[float] = []
+    number: int | None = None
 
     def __post_init__(self) -> None:
         if not self.samples or not all(0.0 < s < math.inf for s in [*self.samples, *self.calibration]):
@@ -120,6 +123,21 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     def calibrated(self) -> list[float]:
         """Return the samples in units of the fixed computation; empty where it was not taken."""
         return [sample / median(self.calibration) for sample in self.samples] if self.calibration else []
+
+
+class Load(msgspec.Struct, frozen=True, kw_only=True):
+    """What else went on while interleaved times were taken, as shares of one core's time.
+
+    Attributes
+    ----------
+    others : float
+        Other processes of this machine, over all cores.
+    stolen : float
+        Time that the machine's host kept to itself.
+    """
+
+    others: float
+    stolen: float
 
 
 class Timing(msgspec.Struct, frozen=True, kw_only=True):
@@ -133,11 +151,21 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
         Why there are none, or fewer than planned.
     machine : dict
         Where all the rounds were taken; the case may have been measured on another one.
+    process : str
+        What the cases share that one process timed in turn, whose rounds belong together.
+    call : float or None
+        Seconds of a call that goes next to nowhere (one step included): the overhead in each
+        run is at most this. Of interleaved times only, as is the next.
+    load : Load or None
+        What else the machine did; ``None`` where it does not tell.
     """
 
     rounds: list[TimingRound] = []
     why: str = ""
     machine: dict[str, str | int] = {}
+    process: str = ""
+    call: float | None = None
+    load: Load | None = None
 
     @property
     def samples(self) -> list[float]:

@@ -164,6 +164,14 @@ def format_value(metric: Metric, value: Value) -> Cell:
     return Cell(text, value.void, value.why, math.inf if value.void else number)
 
 
+def format_metric(record: Record, key: str) -> str:
+    """Format a metric of a case; in brackets where it is void, a dash where there is none."""
+    if key not in record.result.metrics:
+        return "–"
+    cell = format_value(METRICS[key], record.result.metrics[key])
+    return f"({cell.text})" if cell.void else cell.text
+
+
 def seconds(number: float) -> str:
     """Format seconds with three digits and their unit."""
     for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):

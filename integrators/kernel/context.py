@@ -23,8 +23,9 @@ Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # How a step, or an advance, ended.
-# SCATTERED: the iteration has converged, but not to the trajectory.
-RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED = range(7)
+# SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
+# integral is to keep is no invariant.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT = range(8)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -34,6 +35,9 @@ FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
+
+# What a line integral does; see `Context.line`.
+VALUES, END, ARRIVE = range(3)
 
 KINKS_KEPT = 64
 
@@ -89,11 +93,16 @@ class Context(Memory):
         Of the program.
     tables : mapping of str to ndarray
         Tables by their slot's name; not copied.
+    more : mapping of str to number, optional
+        What further slots begin with.
     """
 
     # --- what is integrated, and how ---
     field = Integer()  # address of void(times, stages, par, values) on one block of stages
     fused = Integer()  # address of whole sweeps, void(context, count, tested); 0: none, see `step.fused`
+    # address of a line integral, int64(what, context); 0: plain. It makes the VALUES at the stages from the
+    # field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
+    line = Integer()
     parameters = Integer()
     par = Array("parameters")
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
@@ -241,7 +250,7 @@ class Context(Memory):
     doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
     kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
 
-    def __init__(self, shape: Shape, tables: Mapping[str, Numbers]):
+    def __init__(self, shape: Shape, tables: Mapping[str, Numbers], more: Mapping[str, int] | None = None):
         c, rows = shape.constants, shape.rows
         groups, mode_groups = -(-(c.s + c.first) // 8), -(-c.modes // 8)
         numbers = {
@@ -253,7 +262,7 @@ class Context(Memory):
             "most_groups": max(groups, mode_groups),
             "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1,
         }  # fmt: skip
-        super().__init__(numbers, {**tables, "block": shape.block, "group": shape.group})
+        super().__init__({**numbers, **(more or {})}, {**tables, "block": shape.block, "group": shape.group})
         self.shape = shape
         self.row_factor[:] = 1.0
         self.kick_factor.reshape(-1, 8)[:, :4] = 1.0

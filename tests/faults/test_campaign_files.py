@@ -79,7 +79,7 @@ METHODS\nmethods = []                                        => campaign 'x' has
 METHODS\nmethods = ["HBVM()"]                                => Expected `object`, got `str`, at `methods[0]`
 METHODS\nmethods = [3]                                       => Expected `object`, got `int`, at `methods[0]`
 METHODS\nmethods = [{}]                                      => Object missing required field `use`, at
-METHODS\nmethods = [{use = 3}]                               => Expected `str`, got `int`, at
+METHODS\nmethods = [{use = 3}]                               => Expected `str | array`, got `int`, at
 METHODS\nmethods = [{use = ""}]                              => an empty specification; write a name or a
 METHODS\nmethods = [{use = "HBVN()"}]                        => HBVN(): unknown method 'HBVN'; did you mean
 METHODS\nmethods = [{use = "HBVM(kk=3)"}]                    => HBVM(kk=3): unknown option of HBVM 'kk'; did

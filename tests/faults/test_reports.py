@@ -8,13 +8,15 @@ import pytest
 
 from hbvm_bench import cli
 from hbvm_bench.report.markdown import code
+from hbvm_bench.store import kept
 from hbvm_bench.store.records import printable
+from hbvm_bench.store.store import Store
 from hbvm_bench.studies.automatic import runs as automatic
-from hbvm_bench.studies.endure import runs as endure
 from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
+from tests.hbvm_bench.studies.test_automatic import made as a_duel
 from tests.hbvm_bench.studies.test_endure import made as an_endurance
 
 ENSEMBLE = """
@@ -75,11 +77,17 @@ def stored_results(directory):
     }
     said |= {"command": f"{HOSTILE}\n```\n{HOSTILE}", "started": HOSTILE}
     results.save(msgspec.structs.replace(a_race(), **said), directory / "race")
-    endure.save(msgspec.structs.replace(an_endurance(years=1e4, starts=3), **said), directory / "endure")
-    ours = automatic.Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
-    duels = [automatic.Duel("kepler", 2.0, ours, ours)]
+    an_endurance(directory / "endure", years=1e4, starts=3)
+    store = Store(directory / "endure")
+    for record in store.records():
+        timing = msgspec.structs.replace(record.timing, machine=said["machine"])
+        store.save(msgspec.structs.replace(record, timing=timing, versions=said["versions"]))
+    store.write_index(msgspec.structs.replace(store.index(), command=said["command"]))
+    run = a_duel(said["machine"])
+    records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
+    index = msgspec.structs.replace(run.index, command=said["command"])
     (directory / "automatic").mkdir()
-    automatic.save([automatic.Result(duels=duels, **said)], directory / "automatic" / "one.json")
+    kept.save([kept.Kept(index=index, records=records)], directory / "automatic" / "one.json")
 
 
 @pytest.mark.parametrize(
@@ -94,7 +102,6 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
     tmp_path, monkeypatch, capsys, command, page
 ):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "endure").mkdir()
     stored_results(tmp_path)
     assert cli.main(command) == 0
     said = capsys.readouterr().out
@@ -108,7 +115,6 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
 
 
 def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
-    (tmp_path / "endure").mkdir()
     stored_results(tmp_path)
     page = automatic.markdown(automatic.by_kind(tmp_path / "automatic"))
     assert "\x1b" not in page
@@ -126,12 +132,12 @@ def test_a_race_whose_contest_is_not_its_file_is_refused(tmp_path):
 
 @pytest.mark.parametrize("content", [b"\xff", b'"\xff"', b"[" * 100_000])
 def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
-    for name in ("kepler.json", endure.FILE, "one.json"):
+    for name in ("kepler.json", "campaign.json", "one.json"):
         (tmp_path / name).write_bytes(content)
     for read in (
         lambda: results.load(tmp_path, list(CONTESTS)),
-        lambda: endure.load(tmp_path),
-        lambda: automatic.load(tmp_path / "one.json"),
+        lambda: Store(tmp_path).index(),
+        lambda: kept.load(tmp_path / "one.json", "automatic"),
     ):
-        with pytest.raises(InputError, match="is not the result of"):
+        with pytest.raises(InputError, match=r"is not the (result|index) of"):
             read()

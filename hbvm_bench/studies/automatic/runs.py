@@ -1,190 +1,97 @@
 """HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side.
 
-``python -m hbvm_bench.studies.automatic.runs REQUEST.json`` measures. Results of several kinds of
-processor lie side by side, one file each::
+Results of several kinds of processor lie side by side, one file each::
 
     DIR/<kind>.json     e.g. znver4-256bit.json, znver4-256bit-avx2.json
     DIR/README.md       all of them, one column for each kind
 """
 
-import sys
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from functools import partial
-from importlib.metadata import version
 from pathlib import Path
-from statistics import median
 
-import msgspec
-import numpy as np
+from msgspec.structs import replace
 
-from hbvm_bench.campaign.identity import make_method, make_problem
+from hbvm_bench.campaign.file import Campaign, load
+from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
-from hbvm_bench.measure.timing import Run, Spread, interleaved
-from hbvm_bench.measure.timing import ratios as per_round
+from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.markdown import code, in_markdown, plain
-from hbvm_bench.run import processes
-from hbvm_bench.store.files import atomic, ensure_writable, write_json
-from hbvm_bench.store.records import decoded
-from hbvm_bench.studies.race import truth
-from hbvm_bench.studies.race.accuracy import sample_times
-from hbvm_bench.studies.race.contests import chosen
+from hbvm_bench.store import kept
+from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.goals import Verdict, verdicts
+from hbvm_bench.summaries.rows import format_metric, status_of
 from hbvm_bench.summaries.table import Table
-from integrators.protocol import MethodBase, Status
 from problems.errors import InputError
-from problems.problem import Problem
 
-OURS = "HBVM()"
-THEIRS = "Taylor(tol=1e-15)"
-
-GOALS = {"outer_solar_system": 6.0, "sitnikov": 5.0, "kepler": 2.0, "henon_heiles": 1.5}
-"""How many times as long the Taylor method should take, declared before it was measured."""
-
-
-SCHEMA = 2
-LIBRARIES = ("hbvm-bench", "numpy", "numba", "heyoka")
-
-
-@dataclass(frozen=True)
-class Side:
-    """One method's errors and samples on one problem.
-
-    Attributes
-    ----------
-    method : str
-        As it prints.
-    energy, position : float
-        Largest relative error of the energy along the way; geometric mean of the position
-        errors (`hbvm_bench.measure.measured.POSITION`) at the ten times at which the true solution is
-        stored. At round-off a single one of them would be a matter of luck.
-    steps : int
-        Of one run.
-    seconds : list of float
-        Of processor time per run, one entry per round.
-    """
-
-    method: str
-    energy: float
-    position: float
-    steps: int
-    seconds: list[float]
+NAME = "automatic"
+METRICS = ("warm_seconds", "steps", "energy_max", "position_mean")
 
 
 @dataclass(frozen=True)
 class Duel:
-    """What came out on one problem: errors and times of both."""
-
-    problem: str
-    goal: float
-    ours: Side
-    theirs: Side
-
-    @property
-    def ratio(self) -> Spread:
-        """Their time over ours within each round."""
-        return Spread.of(per_round(self.theirs.seconds, self.ours.seconds))
-
-    @property
-    def as_accurate(self) -> bool:
-        """Whether neither of our errors is larger."""
-        return self.ours.energy <= self.theirs.energy and self.ours.position <= self.theirs.position
-
-    @property
-    def verdict(self) -> str:
-        """``reached``, ``missed``, or ``not as accurate``."""
-        return "reached" if self.reached else "missed" if self.as_accurate else "not as accurate"
-
-    @property
-    def reached(self) -> bool:
-        """Whether the goal is: fast enough, and as accurate."""
-        return self.as_accurate and self.ratio.median >= self.goal
-
-
-class Result(msgspec.Struct, frozen=True, kw_only=True):
-    """What one run of the command measured.
+    """What came out on one problem, against the goal on it.
 
     Attributes
     ----------
-    duels : list of Duel
-        One per problem.
-    machine, versions : dict
-        Where and with what.
-    command, started : str
-        How to run it again, and when it ran.
+    verdict : Verdict
+        On the goal.
+    ours, theirs : Record
+        Both cases, whether they are as accurate as was asked for or not.
     """
 
-    duels: list[Duel]
-    machine: dict[str, str | int]
-    versions: dict[str, str]
-    command: str
-    started: str
+    verdict: Verdict
+    ours: Record
+    theirs: Record
+
+    @property
+    def problem(self) -> str:
+        """Its name."""
+        return self.theirs.case.problem.partition("(")[0]
+
+    @property
+    def goal(self) -> float:
+        """How many times as long the Taylor method should take."""
+        return self.verdict.goal.ratio or 0.0
+
+    @property
+    def ratio(self) -> Spread | None:
+        """Their time over ours within each round."""
+        return standings.compare(self.ours, self.theirs).ratio
+
+    @property
+    def words(self) -> str:
+        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio."""
+        if self.ratio is None:
+            return next(
+                (status_of(one) for one in (self.ours, self.theirs) if not one.timing), "not compared"
+            )
+        accurate = self.verdict.comparison.ours is not None
+        return self.verdict.verdict if accurate else "not as accurate"
 
 
-class Kept(msgspec.Struct, frozen=True, kw_only=True):
-    """What was measured on one kind of processor: no problem twice, each with the run it came from."""
-
-    runs: list[Result]
-    schema: int = SCHEMA
-
-
-class Request(msgspec.Struct, frozen=True, kw_only=True):
-    """What the measuring process is asked to do, and where its `Result` goes."""
-
-    problems: list[str]
-    rounds: int
-    command: str
-    out: str
-
-
-def main(path: Path) -> int:
-    """Run a request; return the exit code, 2 after an error that a user can mend."""
-    described = machine.describe(measure=True)
-    processes.settle()
-    request = msgspec.json.decode(path.read_bytes(), type=Request)
-    started = datetime.now(UTC).isoformat(timespec="seconds")
-    try:
-        found = duels(request.problems, request.rounds, lambda key: print(f"running {key}", file=sys.stderr))
-    except InputError as error:
-        print(f"hbvm-bench: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    result = Result(
-        duels=found,
-        machine=described,
-        versions={name: version(name) for name in LIBRARIES},
-        command=request.command,
-        started=started,
-    )
-    save([result], Path(request.out))
-    return 0
-
-
-def save(results: Sequence[Result], path: Path) -> None:
-    """Write results of one kind of processor, all of them or nothing."""
-    write_json(path, Kept(runs=list(results)))
-
-
-def load(path: Path) -> list[Result]:
-    """Read the results of one kind of processor, in the order in which they were measured.
+def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
+    """Return the campaign, or a part of it.
 
     Raises
     ------
     problems.errors.InputError
-        If the file is something else.
+        For an unknown name, or fewer than two rounds.
     """
-    try:
-        kept = decoded(path.read_bytes(), Kept)
-    except (OSError, msgspec.MsgspecError, ValueError) as error:
-        raise InputError(f"{str(path)!r} is not the result of automatic: {error}.") from None
-    if kept.schema != SCHEMA:
-        raise InputError(f"{str(path)!r} was written by another version; run automatic again.")
-    return kept.runs
+    made = chosen(load(NAME), list(names))
+    if rounds is None:
+        return made
+    if rounds < 2:
+        raise InputError(f"rounds must be at least 2, not {rounds}.")
+    return replace(made, timing=replace(made.timing, rounds=rounds))
 
 
-def keep(result: Result, directory: Path) -> Path:
-    """Write a result beside those of other kinds of processor, and the page that shows all.
+def keep(run: Kept, directory: Path) -> Path:
+    """Write a run beside those of other kinds of processor, and the page that shows all.
 
     Problems that were not run this time are kept from the file of the same kind, with the
     machine, the versions, the command and the date that they were measured with.
@@ -195,31 +102,42 @@ def keep(result: Result, directory: Path) -> Path:
         If the directory cannot be written, or what lies there is no result.
     """
     ensure_writable(directory)
-    path = directory / f"{machine.kind(result.machine)}.json"
-    again = {duel.problem for duel in result.duels}
+    path = directory / f"{machine.kind(run.machine)}.json"
+    again = {one.case.problem for one in run.records}
     old = [
-        msgspec.structs.replace(one, duels=[duel for duel in one.duels if duel.problem not in again])
-        for one in (load(path) if path.is_file() else [])
+        replace(one, records=[record for record in one.records if record.case.problem not in again])
+        for one in (kept.load(path, NAME) if path.is_file() else [])
     ]
-    save([*(one for one in old if one.duels), result], path)
+    kept.save([*(one for one in old if one.records), run], path)
     page = directory / "README.md"
     with atomic(page) as temporary:
         temporary.write_text(markdown(by_kind(directory)), encoding="utf-8")
     return page
 
 
-def by_kind(directory: Path) -> dict[str, list[Result]]:
-    """Return the results in a directory by the kind of processor."""
-    return {path.stem: load(path) for path in sorted(directory.glob("*.json"))}
+def by_kind(directory: Path) -> dict[str, list[Kept]]:
+    """Return the runs in a directory by the kind of processor."""
+    return {path.stem: kept.load(path, NAME) for path in sorted(directory.glob("*.json"))}
 
 
-def markdown(results: Mapping[str, Sequence[Result]]) -> str:
+def duels(run: Kept) -> list[Duel]:
+    """Return what came out, problem by problem."""
+    found = []
+    for verdict in verdicts(run.index.campaign, run.records):
+        ours = standings.among(verdict.records, "")
+        theirs = standings.among(verdict.records, verdict.goal.against)
+        if ours and theirs:
+            found.append(Duel(verdict, ours[0], theirs[0]))
+    return found
+
+
+def markdown(results: Mapping[str, Sequence[Kept]]) -> str:
     """Return the page: the ratios by kind of processor, then each kind's numbers."""
     parts = [
         "# HBVM() against heyoka's Taylor method",
-        f"HBVM() chooses k, s and its steps by itself; heyoka's `{THEIRS}` likewise has no step to set. The "
-        "ratio is the Taylor method's time over ours within each round, of one core's time, alternating: the "
-        "median over the rounds.",
+        "HBVM() chooses k, s and its steps by itself; heyoka's Taylor method likewise has no step to set. "
+        "The ratio is the Taylor method's time over ours within each round, of one core's time, "
+        "alternating: the median over the rounds.",
         POSITION + " Here: the geometric mean over ten such times.",
         in_markdown(ratios(results)),
     ]
@@ -229,26 +147,24 @@ def markdown(results: Mapping[str, Sequence[Result]]) -> str:
             libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
             parts += [
                 plain(machine.sentence(run.machine)),
-                in_markdown(sides(run.duels)),
+                in_markdown(sides(duels(run))),
                 f"Measured on {plain(run.started[:10])} with {plain(libraries)}: {code(run.command)}",
             ]
     return "\n\n".join(parts) + "\n"
 
 
-def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
+def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
     """Return how many times as long the Taylor method takes, one column for each kind of processor."""
+    by_problem = {
+        kind: {duel.problem: duel for run in runs for duel in duels(run)} for kind, runs in results.items()
+    }
     rows = []
-    for key in GOALS:
-        found = [
-            next((duel for run in runs for duel in run.duels if duel.problem == key), None)
-            for runs in results.values()
-        ]
-        duels = [duel for duel in found if duel is not None]
-        if duels:
-            goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in duels)
-            settings = dict.fromkeys(duel.theirs.method for duel in duels)
-            cells = ("not run" if one is None else f"{one.ratio.median:.2f}× {one.verdict}" for one in found)
-            rows.append((key, " or ".join(settings), " or ".join(goals), *cells))
+    for key in dict.fromkeys(key for found in by_problem.values() for key in found):
+        of_kind = [found.get(key) for found in by_problem.values()]
+        known = [duel for duel in of_kind if duel is not None]
+        goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in known)
+        settings = dict.fromkeys(duel.theirs.case.method for duel in known)
+        rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
     return Table(
         "How many times as long as HBVM() the Taylor method takes",
         ("problem", "against", "goal", *results),
@@ -259,23 +175,27 @@ def ratios(results: Mapping[str, Sequence[Result]]) -> Table:
     )
 
 
+def _cell(duel: Duel | None) -> str:
+    if duel is None:
+        return "not run"
+    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}"
+
+
 def sides(found: Sequence[Duel]) -> Table:
     """Return both sides' errors and times."""
     rows = []
     for duel in found:
         ratio = duel.ratio
         for first, side in ((True, duel.ours), (False, duel.theirs)):
+            spread = ratio is not None and ratio.low is not None and f"{ratio.low:.2f} … {ratio.high:.2f}"
             rows.append(
                 (
                     duel.problem if first else "",
-                    f"≥ {duel.goal:g}" if first else duel.verdict,
-                    f"{ratio.median:.2f}" if first else "",
-                    f"{ratio.low:.2f} … {ratio.high:.2f}" if first else "",
-                    side.method,
-                    f"{1e3 * median(side.seconds):.3g} ms",
-                    str(side.steps),
-                    f"{side.energy:.1e}",
-                    f"{side.position:.1e}",
+                    f"≥ {duel.goal:g}" if first else duel.words,
+                    f"{ratio.median:.2f}" if first and ratio is not None else "",
+                    spread if first and spread else "",
+                    side.case.method,
+                    *(format_metric(side, key) for key in METRICS),
                 )
             )
     return Table(
@@ -284,94 +204,3 @@ def sides(found: Sequence[Duel]) -> Table:
         rows,
         words=(0, 4),
     )
-
-
-def asked(keys: Sequence[str], rounds: int) -> list[str]:
-    """Return the problems to run, checked; all for none.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown key, or fewer than two rounds.
-    """
-    if rounds < 2:
-        raise InputError(f"rounds must be at least 2, not {rounds}.")
-    found = [contest.key for contest in chosen(list(keys) or list(GOALS))]
-    for key in found:
-        if key not in GOALS:
-            raise InputError(f"{key!r} is not among {', '.join(GOALS)}.")
-    return found
-
-
-def duels(
-    keys: Sequence[str] = (), rounds: int = 25, tell: Callable[[str], None] = lambda key: None
-) -> list[Duel]:
-    """Run both methods on each problem, interleaved.
-
-    Parameters
-    ----------
-    keys : sequence of str
-        Of `GOALS`; all by default.
-    rounds : int
-        Timing samples of each, alternating; at least 2.
-    tell : callable
-        Called with a key before its problem runs.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For an unknown key, or if an integration does not finish.
-    problems.errors.MissingLibraryError
-        If heyoka is missing.
-    """
-    found = []
-    for contest in chosen(asked(keys, rounds)):
-        tell(contest.key)
-        problem = make_problem(contest.problem)
-        found.append(_duel(contest.key, problem, rounds))
-    return found
-
-
-def _duel(key: str, problem: Problem, rounds: int) -> Duel:
-    true = truth.known(problem)
-    methods = [make_method(text) for text in (OURS, THEIRS)]
-    runs = [Run.of(problem, method) for method in methods]
-    errors = [_errors(problem, method, run, true) for method, run in zip(methods, runs, strict=True)]
-
-    def sample(i: int) -> float:
-        spent, reached = runs[i].seconds(clock=time.thread_time)
-        if reached.status is not Status.FINISHED:
-            raise InputError(f"{methods[i]!r} did not finish: {reached.reason}")
-        return spent
-
-    theirs, ours = interleaved([partial(sample, 1), partial(sample, 0)], rounds)
-    ours, theirs = (
-        Side(repr(method), *error, seconds=samples)
-        for method, error, samples in zip(methods, errors, (ours, theirs), strict=True)
-    )
-    return Duel(key, GOALS[key], ours, theirs)
-
-
-def _errors(
-    problem: Problem, method: MethodBase, run: Run, true: truth.reference.Reference
-) -> tuple[float, float, int]:
-    """Return the errors of the energy and of the positions, and the number of steps."""
-    stepper = run.program.start(run.y0, run.par, run.t0)
-    times = np.union1d(sample_times(run.t0, run.t_end, None), true.t[1:])
-    samples = stepper.advance(times)
-    if samples.status is not Status.FINISHED:
-        raise InputError(f"{method!r} did not finish: {samples.reason}")
-    for name, values in problem.guards(samples.y, samples.t).items():
-        if np.any(values):  # its times and errors would be of another trajectory
-            raise InputError(f"{method!r} loses what a symmetry of {problem.system.name} keeps at 0: {name}.")
-    energy = float(np.max(problem.errors(samples.y, samples.t)["energy"]))
-    positions = [
-        truth.position_error(problem, true, float(t), y)
-        for t, y in zip(samples.t, samples.y, strict=True)
-        if t in true.t[1:]
-    ]
-    return energy, float(np.exp(np.mean(np.log(positions)))), stepper.stats.steps
-
-
-if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))

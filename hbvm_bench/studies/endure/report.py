@@ -16,7 +16,7 @@ from hbvm_bench.report.figures.style import INK, MUTED, Look, base_looks
 from hbvm_bench.report.markdown import code, in_markdown
 from hbvm_bench.store.files import write_all
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
-from hbvm_bench.studies.endure.runs import Endurance, of_method
+from hbvm_bench.studies.endure.runs import Endurance
 from hbvm_bench.studies.race.tables import NONE
 from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.laws import power_of
@@ -42,8 +42,8 @@ def write(result: Endurance, directory: Path) -> Path:
     look = base_looks(result.methods)
     made = over_time(result, look)
     shown = [*tables(result), *filter(None, [peers.kept()])]
-    content = {"result": result, "tables": shown, "picture": made, "figure": FIGURE}
-    content["processor"] = machine.sentence(result.machine)
+    content = {"result": result, "run": result.run, "tables": shown, "picture": made, "figure": FIGURE}
+    content["processor"] = machine.sentence(result.run.machine)
     environment = shell.environment("hbvm_bench.studies.endure", autoescape=False)
     environment.filters |= {"code": code, "table": in_markdown}
     files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}
@@ -107,11 +107,8 @@ def tables(result: Endurance) -> list[Table]:
 
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
-    t = np.array(result.t)
-    shown = [
-        (method, np.array([run.errors for run in of_method(result, method)])) for method in result.methods
-    ]
-    shown = [(method, errors) for method, errors in shown if errors.size]
+    t = result.t
+    shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
     if not shown:
         return None
     values = np.concatenate([drift.rms(errors) for _, errors in shown])
@@ -161,7 +158,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
 
 
 def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[str, Look]) -> Panel:
-    t = np.array(result.t)
+    t = result.t
     found = {line.method: line.drift for line in lines(result)}
     traces = []
     for method, errors in shown:

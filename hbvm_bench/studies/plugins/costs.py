@@ -69,7 +69,7 @@ def measure(host: str, rounds: int) -> list[Cost]:
         return time.perf_counter() - start
 
     samples = [partial(sample, run) for _, run in rows]
-    seconds = np.array(interleaved(samples, rounds, alternate=False))
+    seconds = np.array(interleaved(samples, rounds, order="as given"))
     energies = [float(problem.errors(y)["energy"].max()) for y in first]
     true = np.stack([problem.y0, reference])
     positions = [float(position_error(problem, (y[-1] - reference)[None], true)[0]) for y in first]

@@ -1,8 +1,5 @@
 """Where the trajectories of the race truly end: 128-bit solutions, stored with their provenance."""
 
-from importlib.resources import files
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,11 +9,6 @@ from problems.problem import Problem
 
 INTERVALS = 10
 """The states are kept at this many equal parts of the span; ``--quick`` ends at the first."""
-
-
-def folder() -> Path:
-    """Return where the stored solutions lie."""
-    return Path(str(files("hbvm_bench.studies.race") / "references"))
 
 
 def known(problem: Problem) -> reference.Reference:
@@ -32,7 +24,7 @@ def known(problem: Problem) -> reference.Reference:
     problems.errors.MissingLibraryError
         If it has to be computed and heyoka is missing.
     """
-    stored = reference.find(problem, folder())
+    stored = reference.find(problem)
     if stored is not None and stored.t[-1] == problem.t_end:
         return stored
     return reference.parse(reference.compute(problem, intervals=INTERVALS))

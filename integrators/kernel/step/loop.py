@@ -7,7 +7,7 @@ from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.advance import step
 from integrators.kernel.step.begin import begin, set_factors
 from integrators.kernel.step.estimate import first_length
-from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.finish import arrive, commit, finish
 from integrators.kernel.step.handover import reconsider
 from integrators.kernel.step.iterate import close, test
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
@@ -134,6 +134,7 @@ def reset(ctx, start):
     ctx.solved = UNSOLVED
     ctx.outcome = DONE
     ctx.alive = 1
+    arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)
         ctx.age = 0

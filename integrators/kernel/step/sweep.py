@@ -6,10 +6,12 @@ its size. Rows are independent and go through the same operations; the columns
 of A stay in registers while the rows pass by.
 """
 
+from integrators.kernel.context import VALUES
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import (
     call_field,
+    call_line,
     call_sweeps,
     columns,
     combine,
@@ -27,7 +29,10 @@ INFINITY = float("inf")
 
 @compiled
 def evaluate(ctx):
-    """Set the values of the field at the stages, one call per block of them."""
+    """Set the values of the field at the stages, one call per block of them, or those of a line integral."""
+    if ctx.line:
+        call_line(ctx.line, VALUES, ctx)
+        return
     field, par = ctx.field, ctx.par
     times, stages, values = ctx.times, ctx.stages, ctx.values
     lanes = ctx.lanes

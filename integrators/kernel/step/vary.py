@@ -10,6 +10,7 @@ from integrators.kernel.context import (
     DIVERGED,
     DONE,
     FIXED_POINT,
+    NOT_KEPT,
     RUNNING,
     SCATTERED,
     UNDERFLOW,
@@ -208,6 +209,8 @@ def ready(ctx):
         if implicit and ctx.implicit == 0:
             learn(ctx)
         ctx.solved = UNSOLVED
+        if outcome == NOT_KEPT:
+            return outcome
         error, defect = INFINITY, INFINITY
         if outcome == DONE:
             error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)

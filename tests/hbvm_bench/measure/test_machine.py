@@ -11,13 +11,15 @@ import pytest
 from hbvm_bench.cli import main
 from hbvm_bench.measure import machine, processor
 from hbvm_bench.run import timing_pass
+from hbvm_bench.store import kept
+from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
 from hbvm_bench.studies.automatic import runs
-from hbvm_bench.studies.automatic.runs import Duel, Result, Side
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up
+from tests.hbvm_bench.studies.test_automatic import made as of
 
 OLD = {"processor": "AMD EPYC", "cores": 2, "vector_instructions": "AVX-512"}
 ZEN5 = OLD | {"llvm_processor": "znver5"}
@@ -123,22 +125,10 @@ def test_a_processor_without_avx2_is_refused(monkeypatch, capsys):
     assert main(["automatic", "--general", "--avx2"]) == 2
 
 
-def of(kind, ratio=2.0, problem="kepler"):
-    ours = Side("HBVM()", 1e-15, 1e-12, 10, [1.0, 1.1])
-    theirs = Side("Taylor(tol=1e-15)", 2e-15, 2e-12, 90, [ratio, 1.1 * ratio])
-    return Result(
-        duels=[Duel(problem, 2.0, ours, theirs)],
-        machine=kind,
-        versions={"numpy": "2"},
-        command="hbvm-bench automatic",
-        started="2026-01-02T03:04:05+00:00",
-    )
-
-
 def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     runs.keep(of(ZEN4), tmp_path)
     runs.keep(of(ZEN5, 3.0), tmp_path)
-    page = runs.keep(of(ZEN4, 1.5, "henon_heiles"), tmp_path).read_text(encoding="utf-8")
+    page = runs.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path).read_text(encoding="utf-8")
     assert {path.name for path in tmp_path.iterdir()} == {"README.md", "znver4-256bit.json", "znver5.json"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
     assert re.search(r"kepler \| Taylor\(tol=1e-15\) \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
@@ -152,20 +142,22 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
 def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
     """Its machine, versions, command and date, when another problem is run on the same kind later."""
     first = of(ZEN4 | {"cores": 2})
-    later = msgspec.structs.replace(
-        of(ZEN4 | {"cores": 64, "clock_ghz": "2.6"}, problem="henon_heiles"),
-        versions={"numpy": "3"},
-        command="hbvm-bench automatic henon_heiles",
-        started="2027-01-02T03:04:05+00:00",
+    later = of(ZEN4 | {"cores": 64, "clock_ghz": "2.6"}, problem="henon_heiles")
+    later = Kept(
+        index=msgspec.structs.replace(later.index, command="hbvm-bench automatic henon_heiles"),
+        records=[
+            msgspec.structs.replace(one, versions={"numpy": "3"}, finished="2027-01-02T03:04:05+00:00")
+            for one in later.records
+        ],
     )
     runs.keep(first, tmp_path)
     page = runs.keep(later, tmp_path).read_text(encoding="utf-8")
-    assert runs.load(tmp_path / "znver4-256bit.json") == [first, later]
+    assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [first, later]
     assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
     assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
-    again = msgspec.structs.replace(later, duels=of(ZEN4).duels)
+    again = of(ZEN4)
     runs.keep(again, tmp_path)
-    assert runs.load(tmp_path / "znver4-256bit.json") == [later, again]
+    assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [later, again]
 
 
 def test_arithmetic_of_another_width_is_another_kind(tmp_path):

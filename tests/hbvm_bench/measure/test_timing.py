@@ -125,15 +125,15 @@ def test_a_campaign_s_round_is_of_such_runs(monkeypatch):
     assert [run.sample for run in seen] == ["land"]
 
 
-@pytest.mark.parametrize(("alternate", "order"), [(True, "abbaab"), (False, "ababab")])
-def test_no_sample_is_always_the_first_of_its_round(alternate, order):
+@pytest.mark.parametrize(("asked", "order"), [("alternating", "abbaab"), ("as given", "ababab")])
+def test_no_sample_is_always_the_first_of_its_round(asked, order):
     taken = []
 
     def sample(name):
         taken.append(name)
         return float(len(taken))
 
-    seconds = timing.interleaved([lambda: sample("a"), lambda: sample("b")], rounds=3, alternate=alternate)
+    seconds = timing.interleaved([lambda: sample("a"), lambda: sample("b")], rounds=3, order=asked)
     assert "".join(taken) == order
     assert seconds == [[i + 1.0 for i, name in enumerate(order) if name == one] for one in "ab"]
 

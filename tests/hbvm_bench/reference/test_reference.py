@@ -71,10 +71,8 @@ def test_references_of_different_problems_are_not_compared():
         solutions.difference(stored, msgspec.structs.replace(stored, t=stored.t[:-1]))
 
 
-def test_a_reference_written_elsewhere_is_found_there(tmp_path):
-    problem = problems.load("sitnikov")
-    stored = solutions.find_file(problem)
-    assert stored is not None
-    assert solutions.find(problem, tmp_path) is None
-    (tmp_path / "sitnikov-mine.json").write_text(solutions.encode(stored))
-    assert solutions.find_file(problem, tmp_path) == stored
+def test_of_several_references_the_one_that_has_the_end_time_is_found():
+    short, long = problems.load("sitnikov"), problems.load("sitnikov", t_end=6000.0)
+    assert solutions.find(short).t[-1] == 1500.0
+    assert solutions.find(long).t[-1] == 6000.0
+    assert solutions.find(problems.load("sitnikov", t_end=1.0)).t[-1] == 1500.0

@@ -39,7 +39,7 @@ def folder(request, tmp_path_factory):
     if request.param == "race":
         race.write([made_up()], target)
     elif request.param == "endure":
-        endure.write(test_endure.made(years=1e5, starts=3), target)
+        endure.write(test_endure.made(target, years=1e5, starts=3), target)
     else:
         paper.write_parts([made_up_part()], target, "hbvm-bench paper")
     return target

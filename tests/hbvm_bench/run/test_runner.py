@@ -183,6 +183,58 @@ def test_a_timing_that_fails_says_why(toys, store):
     assert timing_pass.missing_visits([one], store, once) == []
 
 
+TOGETHER = TimingPlan(rounds=3, shortest=1e-6, interleaved=True)
+
+
+def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
+    methods = ("Steady()", "Steady(h=0.2)", "Crashing()", "Straying()")
+    cases = [resolve(case(method)) for method in methods]
+    for one in cases:
+        loop.run_case(one.case, str(store.directory), GENEROUS)
+    assert timing_pass.missing_visits(cases, store, TOGETHER) == [cases[0].id]
+    visits = []
+    timing_pass.time_cases(
+        cases, store, TOGETHER, GENEROUS, lambda round_, one: visits.append(one.case.method)
+    )
+    assert visits == ["Steady()"]
+    first, second, crashed, strayed = (store.load(one.id) for one in cases)
+    assert crashed.timing is None
+    assert (strayed.timing.rounds, strayed.timing.why) == ([], timing_pass.OFF)
+    assert first.timing.process == second.timing.process != ""
+    for record in (first, second):
+        assert [one.number for one in record.timing.rounds] == [0, 1, 2]
+        assert record.timing.call > 0
+        assert record.result.metrics["warm_seconds"].value == record.timing.summary["median"]
+    # one sample of the calibration at the beginning of each round, the same for all
+    assert [one.calibration for one in first.timing.rounds] == [
+        one.calibration for one in second.timing.rounds
+    ]
+    timing_pass.time_cases(cases, store, TOGETHER, GENEROUS, lambda *visit: pytest.fail("timed again"))
+
+
+def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_rounds(toys, store):
+    """As after a kill between two records: rounds of different processes do not belong together."""
+    cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
+    for one in cases:
+        loop.run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases(cases, store, TOGETHER, GENEROUS)
+    before = store.load(cases[0].id)
+    store.save(msgspec.structs.replace(store.load(cases[1].id), timing=None))
+    assert timing_pass.missing_visits(cases, store, TOGETHER) == [cases[0].id]
+    timing_pass.time_cases(cases, store, TOGETHER, GENEROUS)
+    first, second = (store.load(one.id).timing for one in cases)
+    assert first.process == second.process != before.timing.process
+    assert len(first.rounds) == len(second.rounds) == 3
+
+
+def test_an_interleaved_timing_that_ends_at_its_limit_says_why(toys, store):
+    one = resolve(case("Steady(wait=0.5)"))
+    loop.run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases([one], store, TOGETHER, Limits(wall_seconds=0.1))
+    assert store.load(one.id).timing.why == "not timed: the time limit"
+    assert timing_pass.missing_visits([one], store, TOGETHER) == [one.id]
+
+
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
     pool = concurrent.futures.ThreadPoolExecutor(1)
     future = pool.submit(loop.run_case, case("Endless()"), str(store.directory), GENEROUS)

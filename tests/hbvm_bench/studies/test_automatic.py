@@ -1,39 +1,126 @@
 """The race of HBVM without settings."""
 
-import numpy as np
+import re
+import signal
+import subprocess
+import sys
+
+import msgspec
 import pytest
 
+from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.cli import main
+from hbvm_bench.store import kept
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.store import Index, Store
 from hbvm_bench.studies.automatic import runs
-from problems.errors import InputError
-from problems.problem import Problem
+from problems.errors import InputError, UnknownNameError
 
 
-def test_both_sides_are_measured_on_the_same_trajectory():
+def made(machine, ratio=2.0, problem="kepler", worse=1.0):
+    """Return a run of two rounds on one problem."""
+    campaign = runs.campaign([problem], 2)
+    records = []
+    cases = [resolve(case) for case in campaign.cases()]
+    for case in cases:
+        ours = is_ours(case.method)
+        times = [1.0, 1.1] if ours else [ratio, 1.1 * ratio]
+        metrics = {
+            "energy_max": Value(value=1e-15 * (worse if ours else 2.0)),
+            "position_mean": Value(value=1e-12 * (1.0 if ours else 2.0)),
+            "warm_seconds": Value(value=times[0]),
+            "steps": Value(value=10.0),
+        }
+        rounds = [
+            TimingRound(samples=[one], repeats=1, compile=Compile(seconds=0.1, cached=True), number=i)
+            for i, one in enumerate(times)
+        ]
+        records.append(
+            Record(
+                id=case.id,
+                case=case.case,
+                role="ours" if ours else "peer",
+                library=case.method.library,
+                order=None,
+                result=Result(outcome="ok", status="finished", metrics=metrics),
+                timing=Timing(rounds=rounds, machine=machine),
+                versions={"numpy": "2"},
+                finished="2026-01-02T03:04:05+00:00",
+            )
+        )
+    index = Index(
+        campaign=campaign, ids=[one.id for one in records], version="0", command="hbvm-bench automatic"
+    )
+    return Kept(index=index, records=records)
+
+
+def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing(
+    tmp_path, monkeypatch, capsys
+):
     pytest.importorskip("heyoka")
-    (duel,) = runs.duels(["henon_heiles"], rounds=2)
+    monkeypatch.chdir(tmp_path)
+    assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
+    run = kept.of(Store(tmp_path / "runs" / "automatic"), "automatic")
+    (duel,) = runs.duels(run)
     for side in (duel.ours, duel.theirs):
-        assert 0.0 < side.energy < 1e-12  # measured 1e-14 to 5e-14
-        assert 0.0 < side.position < 1e-9  # measured 2e-12 to 7e-12
-        assert len(side.seconds) == 2
-        assert min(side.seconds) > 0.0
-    assert duel.ours.steps < duel.theirs.steps / 3
+        metrics = side.result.metrics
+        assert 0.0 < metrics["energy_max"].value < 1e-12  # measured 1e-14 to 5e-14
+        assert 0.0 < metrics["position_mean"].value < 1e-9  # measured 2e-12 to 7e-12
+        assert [len(one.samples) for one in side.timing.rounds] == [1, 1]
+        assert {one.repeats for one in side.timing.rounds} == {1}
+    assert duel.ours.result.counters.steps < duel.theirs.result.counters.steps / 3
     assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
-    assert duel.reached == (duel.as_accurate and duel.ratio.median >= 1.5)
+    assert (duel.words == "reached") == (duel.ratio.median >= 1.5)
+    capsys.readouterr()
+    assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
+    said = capsys.readouterr().err
+    assert "2, 2 already there" in said
+    assert "timing, one at a time: 0 to do" in said
 
 
 def test_other_problems_and_too_few_rounds_are_refused(capsys):
-    with pytest.raises(InputError, match="'cr3bp' is not among outer_solar_system, sitnikov"):
-        runs.duels(["cr3bp"])
+    with pytest.raises(UnknownNameError, match="'cr3bp'"):
+        runs.campaign(["cr3bp"])
     with pytest.raises(InputError, match="rounds must be at least 2, not 1"):
-        runs.duels(["kepler"], rounds=1)
+        runs.campaign(["kepler"], 1)
     assert main(["automatic", "keppler"]) == 2
     assert "did you mean 'kepler'" in capsys.readouterr().err
 
 
-def test_a_peer_on_another_trajectory_is_not_compared(monkeypatch):
+def test_a_side_that_is_less_accurate_is_told():
+    ahead, behind = (runs.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
+    assert (ahead.words, behind.words) == ("reached", "not as accurate")
+    assert behind.ratio.median == 3.0
+
+
+def test_a_side_on_another_trajectory_has_no_ratio():
+    run = made({}, 3.0)
+    theirs, ours = run.records
+    result = msgspec.structs.replace(theirs.result, violation="another trajectory")
+    lost = msgspec.structs.replace(theirs, result=result, timing=Timing(machine={}, why="lost"))
+    (duel,) = runs.duels(msgspec.structs.replace(run, records=[lost, ours]))
+    assert duel.ratio is None
+    assert duel.words == "not compared"
+
+
+def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
+    """Nothing is lost, and nothing is done twice; times in one process are taken as a whole."""
     pytest.importorskip("heyoka")
-    lost = {"off_axis": np.array([0.0, 1e-3])}
-    monkeypatch.setattr(Problem, "guards", lambda self, y, t: lost)
-    with pytest.raises(InputError, match=r"loses what a symmetry .* keeps at 0: off_axis"):
-        runs.duels(["henon_heiles"], rounds=2)
+    monkeypatch.chdir(tmp_path)
+    arguments = ["automatic", "henon_heiles", "kepler", "--rounds", "2"]
+    command = [sys.executable, "-m", "hbvm_bench.cli", *arguments]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as run:
+        assert run.stderr is not None
+        for line in run.stderr:
+            if re.search(r"\[2/4\]", line):
+                break
+        run.send_signal(signal.SIGKILL)
+    cases = tmp_path / "runs" / "automatic" / "cases"
+    before = {path.name: path.stat().st_mtime_ns for path in cases.glob("*.npz")}
+    assert len(before) >= 2
+    assert main(arguments) == 0
+    assert f"4, {len(before)} already there" in capsys.readouterr().err
+    after = {path.name: path.stat().st_mtime_ns for path in cases.glob("*.npz")}
+    assert before.items() <= after.items()
+    assert len(after) == 4

@@ -39,7 +39,7 @@ def test_the_settings_print_as_they_are_read(key):
 @pytest.mark.parametrize("key", KEYS)
 def test_the_problem_has_a_stored_true_solution_at_both_ends(key):
     problem = make_problem(CONTESTS[key].problem)
-    stored = solutions.find(problem, truth.folder())
+    stored = solutions.find(problem)
     assert stored is not None
     assert stored.t[-1] == problem.t_end
     short = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
@@ -50,7 +50,7 @@ def test_the_problem_has_a_stored_true_solution_at_both_ends(key):
 @pytest.mark.parametrize("key", KEYS)
 def test_the_true_solution_starts_where_the_problem_starts(key):
     problem = make_problem(CONTESTS[key].problem)
-    stored = solutions.find(problem, truth.folder())
+    stored = solutions.find(problem)
     assert stored is not None
     assert np.array_equal(stored.high[0], problem.y0)
     assert np.max(np.abs(stored.low[0])) < 1e-30  # the 128-bit number was written in decimal

@@ -1,0 +1,65 @@
+"""Parts of a campaign: some of its problems, or a quick run of it."""
+
+import numpy as np
+from msgspec.structs import replace
+
+from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.campaign.sweep import fill
+from hbvm_bench.reference import solutions
+from problems.errors import unknown
+
+QUICK_SHARE = 0.1
+"""Of the span, in a quick run."""
+
+
+def chosen(campaign: Campaign, names: list[str]) -> Campaign:
+    """Return a campaign with these of its problems, in its order; all for none.
+
+    Raises
+    ------
+    problems.errors.UnknownNameError
+        For a name that it does not have, with the nearest ones.
+    """
+    known = [name_of(entry) for entry in campaign.entries()]
+    for name in names:
+        if name not in known:
+            raise unknown(f"problem of {campaign.name}", name, known)
+    kept = [entry for entry in campaign.entries() if not names or name_of(entry) in names]
+    here = {name_of(entry) for entry in kept}
+    return replace(
+        campaign,
+        problems=kept,
+        methods=[
+            replace(one, only=[name for name in one.only if name in here])
+            for one in campaign.methods
+            if not one.only or here & {*one.only}
+        ],
+        goals=[
+            replace(one, only=[name for name in one.only if name in here])
+            for one in campaign.goals
+            if not one.only or here & {*one.only}
+        ],
+    )
+
+
+def quick(campaign: Campaign, rounds: int) -> Campaign:
+    """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds."""
+    return replace(
+        campaign,
+        problems=[_shortened(entry) for entry in campaign.entries()],
+        quick=True,
+        timing=replace(campaign.timing, rounds=rounds),
+    )
+
+
+def _shortened(entry: ProblemEntry) -> ProblemEntry:
+    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state."""
+    text = fill(entry.use, entry.values)
+    problem, spec = make_problem(text), parse_spec(text)
+    end = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
+    known = solutions.find(problem)
+    if known is not None:
+        end = float(known.t[1 + np.argmin(np.abs(known.t[1:] - end))])
+    return replace(entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry))

@@ -1,0 +1,114 @@
+"""Who is how fast at which accuracy: read off the records of a problem, the same way for every family."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.campaign.sweep import combinations, fill
+from hbvm_bench.measure.timing import Spread
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of, number
+from hbvm_bench.summaries.rows import group_of
+
+TIME = "warm_seconds"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A peer's best setting beside our best one.
+
+    Attributes
+    ----------
+    ours, theirs : Record or None
+        Those that take least of the settings that are accurate enough; ``None`` where none is.
+    ratio : Spread or None
+        Theirs over ours; of times within each round of the timing pass.
+    """
+
+    ours: Record | None
+    theirs: Record | None
+    ratio: Spread | None = None
+
+
+def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:
+    """Return the problems of a campaign, in its order, each with the records of its cases."""
+    found = []
+    for entry in campaign.entries():
+        for chosen in combinations(entry.sweep):
+            problem = repr(make_problem(fill(entry.use, entry.values | chosen)))
+            here = [one for one in records if one.case.problem == problem and one.case.ensemble is None]
+            found.append((entry, here))
+    return found
+
+
+def title_of(entry: ProblemEntry) -> str:
+    """Return what a page calls a problem."""
+    return entry.title or name_of(entry)
+
+
+def among(records: Sequence[Record], who: str) -> list[Record]:
+    """Return the records of a family or of one setting; of ours for ``""``."""
+    if not who:
+        return [one for one in records if one.role == "ours"]
+    return [one for one in records if who in (family_of(one), one.case.method)]
+
+
+def accurate(record: Record, within: Mapping[str, float]) -> bool:
+    """Whether a case reached its end on the trajectory asked for, with errors at most these."""
+    if group_of(record) != "on":
+        return False
+    errors = [(number(record, key), bound) for key, bound in within.items()]
+    return all(error is not None and error <= bound for error, bound in errors)
+
+
+def best(records: Sequence[Record], within: Mapping[str, float], metric: str = TIME) -> Record | None:
+    """Return the case that takes least of those that are accurate enough; ``None`` if there is none."""
+    able = [one for one in records if accurate(one, within) and number(one, metric) is not None]
+    return min(able, key=lambda one: number(one, metric) or 0.0, default=None)
+
+
+def compare(ours: Record | None, theirs: Record | None, metric: str = TIME) -> Comparison:
+    """Compare two cases of one problem."""
+    if ours is None or theirs is None:
+        return Comparison(ours, theirs)
+    if metric == TIME:
+        base = by_round(ours)
+        found = [seconds / base[number] for number, seconds in by_round(theirs).items() if number in base]
+    else:
+        numbers = number(theirs, metric), number(ours, metric)
+        found = [numbers[0] / numbers[1]] if numbers[0] is not None and numbers[1] else []
+    return Comparison(ours, theirs, Spread.of(found) if found else None)
+
+
+def by_round(record: Record) -> dict[int, float]:
+    """Return the seconds of a case by the round of the timing pass, from 0, in which they were taken."""
+    rounds = record.timing.rounds if record.timing else []
+    return {
+        place if one.number is None else one.number: median(one.samples) for place, one in enumerate(rounds)
+    }
+
+
+def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Comparison:
+    """Compare a peer at its defaults with the fastest of ours that is as accurate, in these errors."""
+    defaults = [one for one in among(records, family) if one.case.settings == "default"]
+    theirs = best(defaults, dict.fromkeys(errors, math.inf))
+    if theirs is None:
+        return Comparison(None, None)
+    return compare(best(among(records, ""), no_worse(theirs, dict.fromkeys(errors, 1.0))), theirs)
+
+
+def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:
+    """Return the errors that ours may have at most where they are to be so many times a peer's."""
+    found = {key: (factor, number(theirs, key)) for key, factor in factors.items()}
+    return {key: -1.0 if error is None else factor * error for key, (factor, error) in found.items()}
+
+
+def families(records: Sequence[Record]) -> list[str]:
+    """Return the families of a problem in the order of the campaign: ours together as ``""``."""
+    return list(
+        dict.fromkeys("" if one.role == "ours" else parse_spec(one.case.method).name for one in records)
+    )

@@ -1,0 +1,162 @@
+"""What a campaign asks for, and the verdict on what was measured."""
+
+import pytest
+
+from hbvm_bench.campaign.file import Campaign, Case, Goal, MethodEntry, ProblemEntry, parse
+from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.summaries import goals, standings
+from problems.errors import InputError, UnknownNameError
+
+PROBLEM = "kepler(e=0.6)"
+TIGHT = {"energy_max": 1e-13, "position_end": 1e-10}
+
+
+def record(method, times, energy, position, role="peer", violation="", **more):
+    """Return a record timed in interleaved rounds; ``None`` for a round that it was left out of."""
+    taken = [one for one in times if one is not None]
+    rounds = [
+        TimingRound(samples=[one], repeats=1, compile=Compile(seconds=0.1, cached=True), number=i)
+        for i, one in enumerate(times)
+        if one is not None
+    ]
+    void = bool(violation)
+    metrics = {
+        "energy_max": Value(value=energy) if energy is not None else Value(why="no samples"),
+        "position_end": Value(value=position, void=void)
+        if position is not None
+        else Value(why="no reference"),
+        "warm_seconds": Value(value=sorted(taken)[len(taken) // 2], void=void)
+        if taken
+        else Value(why="not timed"),
+    }
+    return Record(
+        id=method,
+        case=Case(problem=PROBLEM, method=method, settings=more.pop("settings", "chosen")),
+        role=role,
+        library="",
+        order=None,
+        result=Result(outcome="ok", status="finished", metrics=metrics, violation=violation),
+        timing=Timing(rounds=rounds),
+    )
+
+
+RECORDS = [
+    record("Gauss(s=8, h=0.2)", [0.9, 1.0, 1.2], 2e-12, 1e-9, "ours"),
+    record("Gauss(s=8, h=0.1)", [1.8, 2.0, 2.4], 5e-14, 5e-11, "ours"),
+    record("HBVM(k=16, s=8, h=0.2)", [1.4, 1.5, 1.6], 1e-14, 1e-8, "ours"),
+    record("Taylor(tol=1e-12)", [13.0, 15.0, 17.0], 3e-11, 2e-8),
+    record("Taylor()", [27.0, 30.0, 36.0], 2e-15, 1e-12, settings="default"),
+    record("IAS15()", [5.0, 5.0, 5.0], 1e-15, 1e-12, violation="another trajectory"),
+    record("WHFast(h=0.1)", [None, 6.0, None], 5e-11, 3e-9),
+    record("DOP853()", [50.0, 50.0, 50.0], 1e-14, None),
+]
+
+
+def judged(goal, records=RECORDS, **entry):
+    campaign = Campaign(
+        name="x",
+        problems=[ProblemEntry(use=PROBLEM, within=entry.pop("within", TIGHT), **entry)],
+        methods=[MethodEntry(use=one.case.method) for one in records],
+        goals=[goal],
+    )
+    (found,) = goals.verdicts(campaign, records)
+    return found
+
+
+def test_a_ratio_is_reached_by_the_fastest_that_are_accurate_in_both():
+    found = judged(Goal(against="Taylor", ratio=14.9))
+    assert (found.verdict, found.why) == ("reached", "")
+    # faster ones of ours have too large an energy or a position error
+    assert found.comparison.ours.case.method == "Gauss(s=8, h=0.1)"
+    assert found.comparison.theirs.case.method == "Taylor()"
+    assert found.measured == "15.0× (15.0–15.0)"
+
+
+def test_a_larger_ratio_is_missed():
+    assert judged(Goal(against="Taylor", ratio=15.1)).verdict == "missed"
+
+
+def test_energy_alone_ranks_nobody():
+    found = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}))
+    assert (found.verdict, found.why) == ("void", "energy is not ranked without position")
+    said = judged(Goal(against="Taylor", ratio=1.0, within={"energy_max": 1e-10}, alone="chaos"))
+    assert said.verdict == "reached"
+
+
+def test_a_peer_on_another_trajectory_or_without_a_position_is_not_compared():
+    for peer in ("IAS15", "DOP853"):
+        found = judged(Goal(against=peer, ratio=1.0))
+        assert (found.verdict, found.why) == ("missed", "the peer has no setting as accurate")
+
+
+def test_a_goal_may_ask_ours_to_be_no_worse_than_the_peer():
+    within = {"energy_max": 1e-10}
+    found = judged(Goal(against="WHFast", ratio=5.9, within=within, no_worse={"position_end": 1.0}))
+    # HBVM(16, 8) has the better energy, but a position error above WHFast's 3e-9
+    assert found.comparison.ours.case.method == "Gauss(s=8, h=0.2)"
+    assert found.verdict == "reached"
+    assert found.measured == "6.00×"  # of the one round that both took part in
+
+
+def test_where_none_of_ours_is_as_accurate_there_is_no_ratio():
+    found = judged(Goal(against="Taylor()", ratio=1.0, no_worse={"energy_max": 1.0, "position_end": 1.0}))
+    assert (found.verdict, found.measured) == ("missed", "–")
+    assert found.why == "none of ours is as accurate"
+
+
+def test_a_number_of_ours_is_at_most_what_is_asked():
+    assert judged(Goal(metric="energy_max", at=1e-13, method="Gauss(s=8, h=0.1)")).verdict == "reached"
+    assert judged(Goal(metric="energy_max", at=1e-14, method="Gauss")).verdict == "missed"
+    absent = judged(Goal(metric="position_end", at=1.0, method="DOP853"))
+    assert (absent.verdict, absent.why) == ("missed", "no reference")
+
+
+def test_a_goal_is_about_the_problems_it_names():
+    text = """
+name = "x"
+methods = [{ use = ["Gauss(s=4, h=0.1)", "Taylor()"] }]
+[[problems]]
+use = "kepler(e=0.6)"
+name = "round"
+[[problems]]
+use = "pendulum()"
+[[goals]]
+against = "Taylor"
+ratio = 2
+only = ["{}"]
+"""
+    campaign = parse(text.replace("{}", "round"))
+    (found,) = goals.verdicts(campaign, RECORDS)
+    assert found.entry.name == "round"
+    with pytest.raises(InputError, match="did you mean 'round'"):
+        parse(text.replace("{}", "rounds"))
+    with pytest.raises(UnknownNameError, match="energy_max"):
+        judged(Goal(metric="energy_mx", at=1.0))
+
+
+@pytest.mark.parametrize(
+    "given", [{}, {"at": 1.0, "ratio": 2.0}, {"ratio": 2.0}, {"at": 1.0, "against": "Taylor"}]
+)
+def test_a_goal_has_a_number_of_its_own_or_a_ratio_to_a_peer(given):
+    with pytest.raises(InputError, match="either at=, or against= and ratio="):
+        Goal(**given)
+
+
+def test_a_ratio_lies_within_its_quartiles():
+    """Where a machine changes its speed during the rounds, the ratio of the medians does not."""
+    ours = record("Gauss(s=8, h=0.1)", [1.0, 1.0, 2.0, 2.0, 2.0], 1e-14, 1e-12, "ours")
+    theirs = record("Taylor()", [3.0, 3.0, 3.0, 6.0, 6.0], 1e-14, 1e-12)
+    ratio = standings.compare(ours, theirs).ratio
+    # of the medians 1.5; of the rounds 3, 3, 1.5, 3, 3
+    assert ratio.low <= ratio.median <= ratio.high
+    assert ratio.median == 3.0
+
+
+def test_a_default_is_compared_with_ours_at_no_larger_errors():
+    errors = ("energy_max", "position_end")
+    found = standings.untuned(RECORDS, "Taylor", errors)
+    assert found.theirs.case.method == "Taylor()"
+    assert found.ours is None  # none of ours has both errors below 2e-15 and 1e-12
+    assert standings.untuned(RECORDS, "WHFast", errors).theirs is None
+    looser = record("Taylor()", [27.0, 30.0, 36.0], 1e-13, 1e-10, settings="default")
+    assert standings.untuned([looser, *RECORDS[:3]], "Taylor", errors).ratio.median == pytest.approx(15.0)
