@@ -121,6 +121,7 @@ class Context(Memory):
     raw_matrix = Array()  # values -> stages (THROUGH: coefficients -> stages), for a step of 1
     matrix = Array(8, "matrix_size")  # the same for the step h
     extrapolation = Array()  # the previous step's values -> stages
+    extrapolation_two = Array()  # the values of the step before that one, and its own -> stages; route 8
     matrix_size = Integer()  # in vectors of 8
     projection = Array()  # values -> coefficients
     groups = Integer()  # of 8 coefficients
@@ -146,6 +147,7 @@ class Context(Memory):
     stages = Array(*STAGE)
     old_stages = Array(*STAGE)  # before the last product, where changes are measured
     values = Array(*STAGE)  # of the field
+    older_values = Array(*STAGE)  # of the step before
     base = Array(*STAGE)  # what a stage has besides the state and the forces
     sums = Array(*STAGE)
     coefficients = Array(8, "most_groups", "padded")
@@ -176,6 +178,7 @@ class Context(Memory):
     time_low = Real()  # what `t0` lacks, where steps vary
     n = Integer()  # steps since `t0`
     length = Real()  # of the step that `values` belong to; 0: none
+    older_length = Real()  # of the one that `older_values` belong to, right before that; 0: none
     solved = Integer()  # what solves the step ahead: UNSOLVED, BY_VALUES, BY_INCREMENT
     age = Integer()  # steps until sizes are taken anew
     free = Integer()  # iterations without a test
@@ -187,6 +190,7 @@ class Context(Memory):
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
     tolerance = Real()
+    rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
     untested = Integer()  # iterations left before the first test, in a batch
     alive = Integer()  # 1: takes part in a batch
@@ -235,7 +239,6 @@ class Context(Memory):
     defect_aim = Real()
     error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
     defect_decay = Real()  # the same where the defect is
-    log_rate = Real()  # logarithm of the iteration's contraction, as measured
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
     rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
     length_limit = Real()  # no step is longer, for what the iteration allows

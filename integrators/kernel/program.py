@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ from problems.problem import System
 
 TOLERANCE = 1e-16
 
-FIRST_RATE = 0.01
+FIRST_RATE = math.log2(0.01)
 
 MARGIN = 0.82
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
@@ -81,6 +82,7 @@ class HBVMProgram(Compiled):
 
     varying = False
     """Whether steps vary in length."""
+    _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
         self,
@@ -160,7 +162,7 @@ class HBVMProgram(Compiled):
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return FixedStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        return self._stepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def batch(
         self,
@@ -248,6 +250,7 @@ class HBVMProgram(Compiled):
             tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
+            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
@@ -301,6 +304,7 @@ class AdaptiveProgram(HBVMProgram):
     """
 
     varying = True
+    _stepper = AdaptiveStepper
 
     def __init__(
         self,
@@ -356,11 +360,6 @@ class AdaptiveProgram(HBVMProgram):
             f"max_steps={self.max_steps!r}{kept})"
         )
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
-        """Return a stepper at ``t0``; as `HBVMProgram.start`."""
-        values = check_parameters(par, self.system)
-        return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
-
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
         """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
         super().load(contexts, y, par, t0)
@@ -386,7 +385,6 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.longest = math.inf if self.max_step is None else self.max_step
         context.stop = context.length_limit = math.inf
-        context.log_rate = math.log(FIRST_RATE)
         return context
 
 

@@ -97,13 +97,15 @@ class HBVMStepper(ABC):
 
     # What a checkpoint holds; the values matter to the next start.
     _words: ClassVar[tuple[str, ...]] = (
-        "h", "t0", "n", "length", "solved", "age", "free", "implicit", "slow", "held", "left",
+        "h", "t0", "n", "length", "older_length", "solved", "age", "free", "rate",
+        "implicit", "slow", "held", "left",
         "time_low", "next_length", "length_after", "length_behind",
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
-        "length_limit", "log_rate", "kinks", "kink_end", "doubt_end",
+        "length_limit", "kinks", "kink_end", "doubt_end",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
-        "state", "error", "next_state", "next_error", "values", "strict", "floored", "kink_places",
+        "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",
+        "kink_places",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""

@@ -129,7 +129,7 @@ def reset(ctx, start):
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
     set_factors(ctx, ctx.h)
-    ctx.length = 0.0
+    ctx.length = ctx.older_length = 0.0
     ctx.n = ctx.age = ctx.free = ctx.made = 0
     ctx.solved = UNSOLVED
     ctx.outcome = DONE

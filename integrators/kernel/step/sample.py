@@ -142,7 +142,7 @@ def land(ctx, side, t):
     copy(side.next_state, ctx.state, vectors_of_state(ctx))
     copy(side.next_error, ctx.error, vectors_of_state(ctx))
     copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
-    ctx.length = side.h
+    ctx.length, ctx.older_length = side.h, 0.0
     set_time(ctx, t)
     ctx.solved = UNSOLVED
     arrive(ctx)

@@ -58,6 +58,18 @@ def product8(ctx, table):
 
 
 @compiled
+def product_of_two(ctx, table, older):
+    """As `product8`, of the values of two steps."""
+    before, last = columns(table, 0, 8), columns(table, 64, 8)
+    stages, values, base, state, factor = ctx.stages, ctx.values, ctx.base, ctx.row_state, ctx.row_factor
+    unit = ctx.unit
+    for d in range(ctx.rows):
+        sums = combine(last, values, 8 * d, combine_only(before, older, 8 * d))
+        moved = sums if unit else spread(factor, d) * sums
+        put(stages, 8 * d, spread(state, d) + (get(base, 8 * d) + moved))
+
+
+@compiled
 def product16(ctx, table):
     """Stages = state + (base + kh * table values), for sixteen of them, eight at a time."""
     stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state

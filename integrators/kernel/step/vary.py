@@ -3,7 +3,7 @@
 Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
 """
 
-from math import log
+from math import log, log2
 
 from integrators.kernel.context import (
     BY_VALUES,
@@ -17,7 +17,7 @@ from integrators.kernel.context import (
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.simd.lanes import binary_log, two_sum
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, set_step
 from integrators.kernel.step.control import (
     APPROACH,
@@ -33,7 +33,7 @@ from integrators.kernel.step.control import (
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import close, evaluate_at_last, settle, test
+from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.size import ROUNDING
 from integrators.kernel.step.sweep import sweep, sweep_measured
@@ -42,9 +42,9 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
 # and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
 BUSY, BUSY_FIRST = 18.0, 36.0
-GOAL = log(1e-17)  # a change that is going to be no larger is not waited for
-FIRST_RATE, LEAST_RATE, MOST_RATE = log(0.01), log(1e-4), log(0.9)
-HOPE = log(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+GOAL = log2(1e-17)  # a change that is going to be no larger is not waited for
+FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
+HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
 # MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
@@ -64,7 +64,7 @@ def attempt(ctx, h):
     """Solve the step of length h from the state; return the outcome."""
     set_step(ctx, h)
     if ctx.implicit:
-        ctx.log_rate = FIRST_RATE  # nobody knows what it will be afterwards
+        ctx.rate = FIRST_RATE  # nobody knows what it will be afterwards
         outcome = solve_implicitly(ctx, ctx, 0)
     else:
         begin(ctx)
@@ -77,28 +77,28 @@ def iterate(ctx):
     """Iterate until the step is solved or has failed; return the outcome.
 
     The first change and the rate of contraction, as it was at the last step, tell how
-    many iterations need no test. Nor does the one that will not change anything.
+    many iterations need no test.
     """
     test(ctx, sweep_measured(ctx))
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
-    first = log(ctx.last)
-    rate = ctx.log_rate
-    sweep(ctx, int((GOAL - first) / rate) - 1)
+    first, rate = binary_log(ctx.last), ctx.rate
+    sweep(ctx, int((LOG_REST - first) / rate) - 1)
     while ctx.outcome == RUNNING:
-        test(ctx, sweep_measured(ctx))
+        strict = sweep_measured(ctx)
         tries = ctx.tried - tried
-        if tries <= 0:  # started anew
-            return settle(ctx)
-        last = ctx.last
-        if last > ROUNDING:
-            rate = min(max((log(last) - first) / tries, LEAST_RATE), MOST_RATE)
-        elif last == 0.0 and tries > 1:
+        if strict > ROUNDING:
+            rate = min(max((binary_log(strict) - first) / tries, LEAST_RATE), MOST_RATE)
+        elif strict == 0.0 and tries > 1:
             rate = max(rate + HOPE, LEAST_RATE)
-        if ctx.outcome == RUNNING and log(last) + rate < GOAL:
-            evaluate_at_last(ctx)
-    ctx.log_rate = rate
+        ctx.rate = rate
+        test(ctx, strict)
+        if ctx.tried <= tried:  # started anew
+            return settle(ctx)
+        if ctx.outcome == RUNNING and binary_log(strict) + rate < GOAL:
+            polish(ctx, strict)
+    ctx.rate = rate
     return close(ctx)
 
 
