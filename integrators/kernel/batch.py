@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from integrators.kernel.ensemble.engine import run
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.prepared import LANES, Lanes
+from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
@@ -102,8 +102,8 @@ class _Work:
     def run(self, lanes: "_InLanes") -> Batch:
         """Integrate all trajectories in lanes, and those that leave one by one."""
         n, result = len(self.starts), self.result
-        groups = -(-n // LANES)
-        size = max(1, groups // (JOBS * self.threads)) * LANES
+        width = lanes.lanes.width
+        size = max(1, n // (width * JOBS * self.threads)) * width
         self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)], 0)
         stayed = lanes.arrived == 1
         result.steps[stayed] = lanes.steps

@@ -192,8 +192,6 @@ class Context(Memory):
     tolerance = Real()
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
-    untested = Integer()  # iterations left before the first test, in a batch
-    alive = Integer()  # 1: takes part in a batch
     made = Integer()  # samples
     strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
     solver = Integer()  # address of the implicit solver, int64(context, memory, started); 0: not there yet

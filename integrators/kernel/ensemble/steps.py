@@ -16,9 +16,9 @@ from typing import Any
 from llvmlite import ir
 
 from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.writer import Index, Writer
 from integrators.kernel.native import binary, field, store
-from integrators.kernel.native.memory import Slot
-from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, splat, vector
+from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.values import Value
 from problems import emit
 from problems.systems.base import System
@@ -26,15 +26,13 @@ from problems.systems.base import System
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
 
-# The stopping rule; see `Writer.rule`.
+# The stopping rule; see `Steps.rule`.
 TOLERANCE = 1e-16
 GOAL, STEEP = 3e-17, 0.15
 PATIENCE, ROUNDING, STAGNATION = 5, 1e-15, 1e-13
 FLOOR, SMALLEST, LARGE = 1e-3, 1e-200, 1e200
 AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
 MOST = 80  # sweeps after which a trajectory leaves
-
-Index = Any  # a number, or LLVM's
 
 
 @dataclass(frozen=True)
@@ -71,118 +69,43 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     """
     what = "force" if form.second else "field"
     source = emit.source(system, what, "numba")
-    modules = binary.sources(*field.SOURCES, "ensemble/group", "ensemble/steps")
+    modules = binary.sources(*field.SOURCES, "ensemble")
     name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
         function, arguments = field.on_lanes(emit.numba(system, what).py_func, form.lanes, par=True)
         return field.ON_LANES, binary.build(
-            function, arguments, around=lambda inner: Writer(inner, form).text()
+            function, arguments, around=lambda inner: Steps(inner, form).text()
         )
 
     return binary.obtain(name, make)
 
 
-class Writer:
+class Steps(Writer):
     """Writes LLVM's text of what `compile_steps` promises, around the compiled field ``inner``."""
 
+    # Where the arrays of `Group` are, by their names there.
+    nodes: Any
+    nodes_low: Any
+    weights: Any
+    weights_low: Any
+    position_weights: Any
+    position_weights_low: Any
+    state: Any
+    error: Any
+    velocity: Any
+    par: Any
+    factor: Any
+    moved: Any
+    strict: Any
+    floored: Any
+    size: Any
+    stage: Any
+    found: Any
+
     def __init__(self, inner: str, form: Form):
+        super().__init__(inner, form.lanes, unrolled=form.k * form.k * form.rows <= UNROLLED)
         self.form = form
-        self.unrolled = form.k * form.k * form.rows <= UNROLLED
-        self.kind = vector(form.lanes)
-        module = ir.Module()
-        pointer = DOUBLE.as_pointer()
-        arguments = [pointer.as_pointer(), pointer.as_pointer(), self.kind, pointer, pointer, pointer]
-        self.field = ir.Function(module, ir.FunctionType(ir.IntType(32), arguments), inner)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 2), binary.ENTRY)
-        self.module, self.function = module, function
-        self.b: Any = ir.IRBuilder(function.append_basic_block("start"))
-        self.words = self.b.inttoptr(function.args[0], INTEGER.as_pointer())
-
-    # --- memory, loops ---
-
-    def word(self, slot: Slot, kind: Any = INTEGER) -> Any:
-        """Return where a slot is."""
-        place = self.b.gep(self.words, [ir.Constant(INTEGER, slot.place)])
-        return self.b.bitcast(place, kind.as_pointer())
-
-    def array(self, slot: Slot) -> Any:
-        """Return the address in a slot."""
-        return self.b.inttoptr(self.b.load(self.word(slot)), DOUBLE.as_pointer())
-
-    def table(self, slot: Slot) -> Any:
-        """Return the address in a slot of a table, whose numbers are not kept in registers from sweep to sweep."""
-        address = self.b.load_atomic(self.word(slot), "monotonic", 8)
-        return self.b.inttoptr(address, DOUBLE.as_pointer())
-
-    def room(self, slot: Slot, count: int) -> Any:
-        """Return where ``count`` rows are kept during steps: in registers if possible, or in the slot's memory."""
-        if not self.unrolled:
-            return self.array(slot)
-        made = self.b.alloca(ir.ArrayType(self.kind, count))
-        made.align = ALIGNMENT
-        return self.b.bitcast(made, DOUBLE.as_pointer())
-
-    def variable(self, kind: Any, value: Any) -> Any:
-        """Return where a variable is."""
-        with self.b.goto_entry_block():
-            made = self.b.alloca(kind)
-        self.b.store(value, made)
-        return made
-
-    def place(self, base: Any, index: Index, kind: Any) -> Any:
-        """Return the address of item ``index`` of an array of ``kind``."""
-        index = ir.Constant(INTEGER, index) if isinstance(index, int) else index
-        return self.b.gep(self.b.bitcast(base, kind.as_pointer()), [index])
-
-    def get(self, base: Any, index: Index = 0) -> Value:
-        """Load a row."""
-        return Value(self.b, self.b.load(self.place(base, index, self.kind), align=ALIGNMENT))
-
-    def put(self, value: Value, base: Any, index: Index = 0) -> None:
-        """Store a row."""
-        self.b.store(value.value, self.place(base, index, self.kind), align=ALIGNMENT)
-
-    def number(self, base: Any, index: Index) -> Value:
-        """Return a double of memory in all lanes."""
-        return Value(self.b, splat(self.b, self.b.load(self.place(base, index, DOUBLE)), self.form.lanes))
-
-    def at(self, i: Index, width: int, d: Index = 0) -> Index:
-        """Return ``i * width + d``."""
-        if isinstance(i, int) and isinstance(d, int):
-            return i * width + d
-        i, d = (ir.Constant(INTEGER, x) if isinstance(x, int) else x for x in (i, d))
-        return self.b.add(self.b.mul(i, ir.Constant(INTEGER, width)), d)
-
-    def each(self, count: int, body: Callable[[Any], None]) -> None:
-        """Write ``body(i)`` for so many i, one after another or as a loop."""
-        if self.unrolled or count == 1:
-            for i in range(count):
-                body(i)
-            return
-        before = self.b.block
-        loop = self.function.append_basic_block("loop")
-        self.b.branch(loop)
-        self.b.position_at_end(loop)
-        i = self.b.phi(INTEGER)
-        i.add_incoming(ir.Constant(INTEGER, 0), before)
-        body(i)
-        following = self.b.add(i, ir.Constant(INTEGER, 1))
-        i.add_incoming(following, self.b.block)
-        end = self.function.append_basic_block("end")
-        self.b.cbranch(self.b.icmp_signed("<", following, ir.Constant(INTEGER, count)), loop, end)
-        self.b.position_at_end(end)
-
-    def each_row(self, body: Callable[[Any], None]) -> None:
-        """Write ``body(d)`` for every component of a stage."""
-        self.each(self.form.rows, body)
-
-    def any(self, mask: Any) -> Any:
-        """Return whether a mask holds in any lane."""
-        bits = self.b.bitcast(mask, ir.IntType(self.form.lanes))
-        return self.b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-
-    # --- steps ---
 
     def text(self) -> str:
         """Return the module."""
@@ -214,7 +137,7 @@ class Writer:
         if self.unrolled:
             self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
         alive = self.get(self.array(slots["alive"]))
-        self.alive = self.variable(vector_of_bits(form.lanes), alive.compare("!=", 0.0))
+        self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
         self.sweeps = self.variable(self.kind, self.get(self.array(slots["sweeps"])).value)
         taken = self.variable(INTEGER, ir.Constant(INTEGER, 0))
         loop, end = self.function.append_basic_block("step"), self.function.append_basic_block("done")
@@ -233,9 +156,7 @@ class Writer:
         self.put(Value(b, b.load(self.sweeps)), self.array(slots["sweeps"]))
         b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
         b.ret_void()
-        # Vectors that registers do not hold are to lie within a line of the cache each.
-        head = f'define void @"{binary.ENTRY}"(i64 %".1", i64 %".2")'
-        return str(self.module).replace(head, f'{head} alignstack({ALIGNMENT}) "stackrealign"')
+        return text_of(self.module)
 
     def step(self) -> None:
         """Write one step of all lanes."""
@@ -245,8 +166,12 @@ class Writer:
         self.iterate()
         self.finish()
 
+    def each_row(self, body: Callable[[Any], None]) -> None:
+        """Write ``body(d)`` for every component of a stage."""
+        self.each(self.form.rows, body)
+
     def begin(self) -> None:
-        """What stages have besides the state and the values, and their times."""
+        """Set what stages have besides the state and the values, and the time of the step."""
         b, form = self.b, self.form
 
         def row(d: Index) -> None:
@@ -282,7 +207,7 @@ class Writer:
         return u, kh.fma(error, kh.fma(p, -u))
 
     def sizes(self) -> None:
-        """What a change of the values is beside the rows' blocks: the change of the stages that follows from it.
+        """Set what a change of the values is: that of the stages which follows from it, beside their block.
 
         The size of a block is the largest at the start of the step and, about, at its end.
         """
@@ -356,12 +281,11 @@ class Writer:
         """Sweep until every lane is solved, or has left."""
         b, form = self.b, self.form
         infinite = self.zero.of(INFINITY).value
-        bits = vector_of_bits(form.lanes)
-        none = ir.Constant(bits, [0] * form.lanes)
+        none = ir.Constant(self.bits, [0] * form.lanes)
         self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
         self.stalled = self.variable(self.kind, self.zero.value)
-        self.final, self.again = self.variable(bits, none), self.variable(bits, none)
-        self.active = self.variable(bits, b.load(self.alive))
+        self.final, self.again = self.variable(self.bits, none), self.variable(self.bits, none)
+        self.active = self.variable(self.bits, b.load(self.alive))
         self.tried = self.variable(INTEGER, ir.Constant(INTEGER, 0))
         loop, end = self.function.append_basic_block("sweep"), self.function.append_basic_block("solved")
         b.branch(loop)
@@ -372,7 +296,7 @@ class Writer:
         b.position_at_end(end)
 
     def sweep(self) -> None:
-        """New values at all stages, one after another, and how much they have changed."""
+        """Set new values at all stages, one after another, and how much they have changed."""
         b, form = self.b, self.form
         k, rows = form.k, form.rows
         active = b.load(self.active)
@@ -384,10 +308,7 @@ class Writer:
 
             def displace(d: Index) -> None:
                 base = self.get(self.base, self.at(i, rows, d))
-                if form.unit:
-                    moved = total(d, base)
-                else:
-                    moved = self.get(self.factor, d).fma(total(d), base)
+                moved = total(d, base) if form.unit else self.get(self.factor, d).fma(total(d), base)
                 self.put(self.get(self.state, d) + moved, self.stage, d)
 
             self.each_row(displace)
@@ -405,7 +326,7 @@ class Writer:
         self.each(k, stage)
 
     def rule(self) -> None:
-        """The stopping rule, in every lane for itself.
+        """Apply the stopping rule, in every lane by itself.
 
         What is judged is the change that the next sweep would make of the stages, beside
         their block: bounded by that of the values. As in `integrators.kernel.step.iterate`,
@@ -477,9 +398,9 @@ class Writer:
         b.store(b.and_(b.load(self.alive), b.not_(leaves)), self.alive)
 
     def finish(self) -> None:
-        """The state at the end, as a sum of two doubles; the displacement is formed first."""
+        """Set the state at the end, as a sum of two doubles; the displacement is formed first."""
         b, form = self.b, self.form
-        alive = self.variable(vector_of_bits(form.lanes), b.load(self.alive))
+        alive = self.variable(self.bits, b.load(self.alive))
 
         def mean(d: Index, high: Any, low: Any) -> Value:
             total = None
@@ -513,8 +434,3 @@ class Writer:
             add(momentum, p, impulse + p_error)
 
         self.each_row(row)
-
-
-def vector_of_bits(lanes: int) -> Any:
-    """Return LLVM's type of a condition in every lane."""
-    return ir.VectorType(ir.IntType(1), lanes)

@@ -136,7 +136,7 @@ class TaylorProgram(ProgramBase):
         *,
         times: ArrayLike,
         t0: float = 0.0,
-        threads: int = 1,  # noqa: ARG002 -- as other batches have it
+        threads: int = 1,
         progress: Callable[[int, int], None] | None = None,
     ) -> Trajectories:
         """Integrate many starts to the same times by heyoka's batch integrator.
