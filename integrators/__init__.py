@@ -12,6 +12,7 @@ from integrators.integrate import integrate
 from integrators.many import Solutions, integrate_many
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.solution import Solution, load
+from integrators.watch import Progress
 
 if TYPE_CHECKING:
     from integrators.advice import advise as advise
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "MethodBase",
+    "Progress",
     "Samples",
     "Solution",
     "Solutions",

@@ -1,7 +1,8 @@
 """Integrate one problem from many starts, or with many values of its parameters."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -21,12 +22,13 @@ from integrators.protocol import (
     check_problem,
     check_times,
 )
+from integrators.watch import SOON, Bar, Progress, Report
 from problems.checks import NOTHING, Named, checked
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.systems.base import System
 
-Progress = Callable[[int, int], None]
+FIRST = 64  # trajectories for each thread, of the first piece
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +73,15 @@ def integrate_many(
     parameters: Named[ArrayLike] = NOTHING,
     times: ArrayLike | None = None,
     threads: int = 1,
-    progress: Progress | None = None,
+    progress: bool | Report = False,
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
     Trajectories of HBVM and Gauss with a fixed step and up to 16 stages go one in each lane of
     the vector unit; those of heyoka go through its batch integrator; all others one by one. What
     comes out for a trajectory depends neither on the others nor on their order or the number of
-    threads; it is what `integrate` gives, up to rounding.
+    threads; it is what `integrate` gives, up to rounding. Ctrl-C ends the integration: what was
+    reached is returned, and the trajectories that are missing have the status ``INTERRUPTED``.
 
     Parameters
     ----------
@@ -94,9 +97,9 @@ def integrate_many(
         Strictly monotone times, from the problem's ``t0`` on (or back). The end of its span by default.
     threads : int
         Threads to share the work among. Other methods than HBVM and Gauss use one.
-    progress : callable, optional
-        Called now and then, in this thread, with the number of trajectories that are at their
-        end, and of all: ``progress(done, n)``.
+    progress : bool or callable
+        Whether to show a bar on a terminal; or what is called now and then, in this thread, with an
+        `integrators.watch.Progress`: the part of the trajectories that are at their end, and their steps.
 
     Returns
     -------
@@ -108,8 +111,6 @@ def integrate_many(
     problems.errors.InputError
         If the method does not accept the problem, or for starts, parameters, times or threads that cannot
         be used.
-    KeyboardInterrupt
-        At Ctrl-C, within a fraction of a second.
 
     Examples
     --------
@@ -123,6 +124,8 @@ def integrate_many(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
+    if not callable(progress) and not isinstance(progress, bool):
+        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system
     threads = checked("integrate_many", "threads", threads, Count)
     given = checked("integrate_many", "parameters", parameters, Named[ArrayLike])
@@ -142,15 +145,48 @@ def integrate_many(
         par[:, np.asarray(places[name], dtype=int)] = value
     check_batch(rows, par, grid, system)
     program = method.compile(system)
+    made = Solutions(
+        t=grid,
+        y=np.full((n, grid.size, system.dim), np.nan),
+        status=[Status.INTERRUPTED] * n,
+        reason=["Ctrl-C was pressed before it was at its end."] * n,
+        t_stop=np.full(n, problem.t0),
+        steps=np.zeros(n, dtype=np.int64),
+        starts=rows,
+        par=par,
+        compile_seconds=program.compile_seconds,
+        from_cache=program.from_cache,
+        problem=problem,
+        method=method,
+    )
+    with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
+        _integrate(program, made, threads, report)
+    return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
+
+
+def _integrate(program: Program, made: Solutions, threads: int, report: Report | None) -> None:
+    """Integrate piece by piece, each of which takes about `SOON`."""
     batch: Any = getattr(program, "batch", None)
-    if batch is None:
-        made = _one_by_one(program, rows, par, grid, problem.t0, progress)
-    else:
-        made = batch(rows, par, times=grid, t0=problem.t0, threads=threads, progress=progress)
-    return Solutions(
-        made.t, made.y, made.status, made.reason, made.t_stop, made.steps, rows, par,
-        program.compile_seconds, program.from_cache, problem, method,
-    )  # fmt: skip
+    options = {"times": made.t, "t0": made.problem.t0}
+    if getattr(program, "threaded", False):
+        options["threads"] = threads
+    first, size, began, n = 0, 1 if batch is None else FIRST * threads, perf_counter(), len(made)
+    while first < n:
+        before = perf_counter()
+        here = slice(first, first + size)
+        starts, par = made.starts[here], made.par[here]
+        piece = (
+            _one(program, starts[0], par[0], **options) if batch is None else batch(starts, par, **options)
+        )
+        for name in ("y", "status", "reason", "t_stop", "steps"):
+            getattr(made, name)[here] = getattr(piece, name)
+        first = min(first + size, n)
+        now = perf_counter()
+        if batch is not None and now - before < SOON / 2.0:
+            size *= 2
+        if report is not None:
+            steps, seconds = int(made.steps.sum()), now - began
+            report(Progress(float(made.t[-1]), first / n, steps, seconds, seconds * (n - first) / first))
 
 
 def _values(system: System, parameters: Any) -> dict[str, Array]:
@@ -182,26 +218,15 @@ def _number(starts: ArrayLike | None, values: dict[str, Array]) -> tuple[str, in
     return f"parameter {name!r}", counts[name]
 
 
-def _one_by_one(
-    program: Program, starts: Array, par: Array, times: Array, t0: float, progress: Progress | None
-) -> Trajectories:
-    """Integrate one trajectory after the other, by a method that has no better way."""
-    n = len(starts)
-    y = np.full((n, times.size, starts.shape[1]), np.nan)
-    status, reason, t_stop = [Status.FINISHED] * n, [""] * n, np.full(n, times[-1])
-    steps = np.zeros(n, dtype=np.int64)
-    for i in range(n):
-        try:
-            stepper = program.start(starts[i], par[i], t0)
-        except UserError as raised:
-            status[i], t_stop[i] = Status.USER_ERROR, t0
-            reason[i] = f"{raised} at the start, t = {t0!r}."
-        else:
-            samples = stepper.advance(times)
-            y[i, : samples.t.size] = samples.y
-            status[i], reason[i], steps[i] = samples.status, samples.reason, stepper.stats.steps
-            if status[i] is not Status.FINISHED:
-                t_stop[i] = stepper.t
-        if progress is not None:
-            progress(i + 1, n)
-    return Trajectories(times, y, status, reason, t_stop, steps)
+def _one(program: Program, start: Array, par: Array, times: Array, t0: float) -> Trajectories:
+    """Integrate one trajectory, by a method that has no better way."""
+    y, steps = np.full((1, times.size, start.size), np.nan), np.zeros(1, dtype=np.int64)
+    try:
+        stepper = program.start(start, par, t0)
+    except UserError as raised:
+        reason = f"{raised} at the start, t = {t0!r}."
+        return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps)
+    samples = stepper.advance(times)
+    y[0, : samples.t.size], steps[0] = samples.y, stepper.stats.steps
+    stop = times[-1] if samples.status is Status.FINISHED else stepper.t
+    return Trajectories(times, y, [samples.status], [samples.reason], np.array([stop]), steps)

@@ -67,6 +67,7 @@ class Status(StrEnum):
     NOT_INVARIANT = "not_invariant"
     MAX_STEPS = "max_steps"
     USER_ERROR = "user_error"
+    INTERRUPTED = "interrupted"
 
     @property
     def failed(self) -> bool:

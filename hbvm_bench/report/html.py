@@ -1,56 +1,140 @@
-"""The report as one self-contained page: no request leaves it."""
+"""A document as one self-contained page: no request leaves it."""
 
+import base64
+import hashlib
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
 
-from markupsafe import Markup
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+from plotly.offline import get_plotlyjs
 
 from hbvm_bench.measure.metrics import Metric
-from hbvm_bench.report import pack, shell
-from hbvm_bench.report.content import Content
+from hbvm_bench.report import pack
+from hbvm_bench.report.document import VERDICTS, Block, Document, Section, is_call, pieces
+from hbvm_bench.report.figures.canvas import Picture, inline_svg
+from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.summaries.rows import Cell, Row, seconds
 
-FEW = 3  # problems whose summaries all stand at the top
+HERE = "hbvm_bench.report"
+SCRIPTS = ("script.js", "table.js", "motion.js", "explore.js")
+INLINE = 1_000_000  # characters of drawings in a page; what is more would make it slow to open
 FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch
 MINOR = ("compile_seconds", "z_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
+ENLARGED = 1.72  # pixels per point: a figure of a whole line fills the page's column
+LEAST = 1.3  # pixels per point below which a drawing is scrolled rather than made smaller
+
+# Paths of the markers in a box of 12 by 12, as the figures draw them.
+MARKERS = {
+    "o": '<circle cx="6" cy="6" r="4.2"/>',
+    "d": '<path d="M6 1 9.2 6 6 11 2.8 6z"/>',
+    "8": '<path d="M4.1 1.4h3.8l2.7 2.7v3.8l-2.7 2.7H4.1L1.4 7.9V4.1z"/>',
+    "D": '<path d="M6 1 11 6 6 11 1 6z"/>',
+    "s": '<path d="M2 2h8v8H2z"/>',
+    "^": '<path d="M6 1.5 10.8 10H1.2z"/>',
+    "v": '<path d="M6 10.5 10.8 2H1.2z"/>',
+    "P": '<path d="M4.3 1h3.4v3.3H11v3.4H7.7V11H4.3V7.7H1V4.3h3.3z"/>',
+    "X": '<path d="M3.2 1 6 3.8 8.8 1 11 3.2 8.2 6 11 8.8 8.8 11 6 8.2 3.2 11 1 8.8 3.8 6 1 3.2z"/>',
+    "<": '<path d="M1.5 6 10 1.2v9.6z"/>',
+    ">": '<path d="M10.5 6 2 1.2v9.6z"/>',
+    "p": '<path d="M6 1 11 4.8 9 10.6H3L1 4.8z"/>',
+    "h": '<path d="M6 .8 10.5 3.4v5.2L6 11.2 1.5 8.6V3.4z"/>',
+    "H": '<path d="M3.4 1.5h5.2L11.2 6 8.6 10.5H3.4L.8 6z"/>',
+    "*": '<path d="M6 .8 7.4 4.4 11.2 4.6 8.2 7 9.3 10.8 6 8.6 2.7 10.8 3.8 7 .8 4.6 4.6 4.4z"/>',
+}
+
+POWER = re.compile(r"(?<![\w.=])(-?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]*\w)")
+MINUS = re.compile(r"(?<![\w.=(])-(?=\d)")
 
 
-def page(content: Content) -> str:
-    """Return the report as an HTML document."""
-    environment = shell.environment(shell.HERE, autoescape=True)
-    environment.globals |= {
-        "chip": shell.chip,
-        "call": call,
-        "bar": bar,
-        "spread": spread,
-        "sort_key": sort_key,
-    }
-    libraries = list(dict.fromkeys(record.library for record in content.records))
-    return environment.get_template("report.html.j2").render(
-        c=content,
-        few=len(content.sections) <= FEW,
-        minor=minor(content.columns),
-        libraries=libraries,
-        **shell.values(
-            content.pictures,
-            list({look.number: look for look in content.looks.values()}.values()),
-            data=pack.raw(content),
-            scripts=("table.js", "motion.js"),
-        ),
+@dataclass(frozen=True)
+class Place:
+    """Where in a page a block stands.
+
+    Attributes
+    ----------
+    level : int
+        Of the next heading.
+    colours : mapping of str to str
+        From the colour of a case to the name of the page's variable.
+    inlined : collection of str
+        Keys of the figures that stand in the page itself; the others are beside it.
+    """
+
+    level: int
+    colours: Mapping[str, str]
+    inlined: Collection[str]
+
+    @property
+    def below(self) -> "Place":
+        """The same under a heading."""
+        return replace(self, level=self.level + 1)
+
+
+def page(document: Document) -> str:
+    """Return a document as HTML that asks nothing of the network and runs no script but its own."""
+    looks = document.looks
+    script = "".join(text(name) for name in SCRIPTS)
+    top = Place(2, {look.light: f"--m{look.number}" for look in looks}, _within(document.pictures))
+    return (
+        templates()
+        .get_template("base.html.j2")
+        .render(
+            document=document,
+            nav=[block for block in document.walk() if isinstance(block, Section) and block.nav],
+            main=printed(document.blocks, top),
+            css=Markup(text("style.css")),
+            script=Markup(script),
+            scripts=Markup(f"{_source(script)} {_source(get_plotlyjs())}"),
+            data=Markup(pack.data(document)),
+            library=Markup(pack.library()),
+            light=variables({v: k for k, v in NEUTRALS.items()}, {f"--m{x.number}": x.light for x in looks}),
+            dark=variables(DARK_NEUTRALS, {f"--m{x.number}": x.dark for x in looks}),
+            keys=[(look.number, key(look)) for look in looks],
+            symbols=symbols(looks),
+        )
     )
 
 
-def minor(columns: Sequence[Metric]) -> set[str]:
+def printed(blocks: Sequence[Block], at: Place) -> Markup:
+    """Return blocks as HTML; the macro of each is called as its class is."""
+    macros = templates().get_template("blocks.html.j2").module
+    return Markup("\n").join(getattr(macros, type(block).__name__)(block, at) for block in blocks)
+
+
+@cache
+def templates() -> Environment:
+    """Return the templates, with what they call."""
+    made = Environment(
+        loader=PackageLoader(HERE),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    functions = (printed, words, cell, drawing, chip, call, bar, spread, sort_key, minor_columns)
+    made.globals |= {function.__name__: function for function in functions} | {"verdicts": VERDICTS}
+    return made
+
+
+def cell(text: str) -> Markup:
+    """Return a cell of a table; calls are code."""
+    return Markup("<code>{}</code>").format(call(text)) if is_call(text) else words(text)
+
+
+def minor_columns(columns: Sequence[Metric]) -> set[str]:
     """Return the keys of the columns that the page shows on demand only."""
     return {metric.key for metric in columns} & set(MINOR) if len(columns) > FITTING else set()
 
 
 def call(text: str) -> Markup:
     """Return a method's text so that lines break between its arguments only."""
-    pieces = [Markup('<span class="arg">{}</span>').format(piece) for piece in text.split(", ")]
-    return Markup(", ").join(pieces)
+    return Markup(", ").join(Markup('<span class="arg">{}</span>').format(one) for one in text.split(", "))
 
 
 def bar(metric: Metric, cell: Cell, row: Row) -> int | None:
@@ -82,3 +166,86 @@ def sort_key(cell: Cell | None) -> Markup:
     if cell is None or math.isinf(cell.sort) or re.fullmatch(r"[\d.e+-]+", cell.text):
         return Markup("")
     return Markup(' data-v="{}"').format(repr(cell.sort))
+
+
+def words(text: object) -> Markup:
+    """Escape a text; what stands between backquotes becomes code, ``3.4e-15`` a power of ten."""
+    return Markup("").join(
+        Markup("<code>{}</code>").format(piece) if is_code else typeset(piece)
+        for piece, is_code in pieces(text)
+    )
+
+
+def typeset(text: str) -> Markup:
+    """Escape a text and set ``3.4e-15`` as a power of ten."""
+    return Markup(MINUS.sub("−", POWER.sub(_power, str(escape(text)))))
+
+
+def _power(match: re.Match[str]) -> str:
+    if float(match[1]) == 0.0:
+        return "0"
+    mantissa, exponent = match[1].replace("-", "−"), str(int(match[2])).replace("-", "−")
+    front = mantissa.removesuffix("1") if mantissa in ("1", "−1") else f"{mantissa}·"
+    return f'<span class="power">{front}10<sup>{exponent}</sup></span>'
+
+
+def drawing(picture: Picture, colours: Mapping[str, str]) -> Markup:
+    """Return the SVG of a figure for the page, at sizes at which its text can be read."""
+    width = float(re.findall(r'viewBox="0 0 ([\d.]+)', picture.svg)[0])
+    size = f"max-width:{width * ENLARGED:.0f}px;min-width:{width * LEAST:.0f}px"
+    return Markup(inline_svg(picture, colours).replace("<svg ", f'<svg style="{size}" ', 1))
+
+
+def chip(look: Look) -> Markup:
+    """Return the marker of a case in its colour."""
+    use = f'<use href="#k{_marker(look)}"/>'
+    return Markup(f'<svg class="chip k{look.number}" aria-hidden="true">{use}</svg>')
+
+
+def key(look: Look) -> Markup:
+    """Return the line and marker of a case, for the legend of an interactive figure."""
+    dashes = f' stroke-dasharray="{" ".join(f"{length:g}" for length in look.dash)}"' if look.dash else ""
+    return Markup(
+        f'<svg class="line k{look.number}" viewBox="0 0 40 12" width="40" height="12" aria-hidden="true">'
+        f'<path d="M0 6h40" fill="none" stroke="currentColor" stroke-width="2"{dashes}/>'
+        f'<use href="#k{_marker(look)}" x="14" width="12" height="12"/></svg>'
+    )
+
+
+def symbols(looks: Sequence[Look]) -> Markup:
+    """Return the markers once, for all rows, and the colours of the cases."""
+    shapes = "".join(
+        f'<symbol id="k{number}" viewBox="0 0 12 12">{shape}</symbol>'
+        for number, shape in enumerate(MARKERS.values())
+    )
+    colours = "".join(f".k{look.number}{{color:var(--m{look.number})}}" for look in looks)
+    return Markup(f'<style>{colours}</style><svg class="symbols" aria-hidden="true">{shapes}</svg>')
+
+
+def variables(*groups: Mapping[str, str]) -> Markup:
+    """Return the colours of a theme as variables of the page."""
+    return Markup("".join(f"{name}:{value};" for group in groups for name, value in group.items()))
+
+
+def text(name: str) -> str:
+    """Return one of the files that every page carries."""
+    return (files(HERE) / "templates" / name).read_text(encoding="utf-8")
+
+
+def _source(script: str) -> str:
+    """Return what lets a browser run exactly this script; no other that stands in the page runs."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+
+
+def _within(pictures: Sequence[Picture]) -> set[str]:
+    """Return the keys of the figures that stand in the page itself; the others are beside it."""
+    room, kept = INLINE, set()
+    for picture in pictures:
+        if len(picture.svg) <= room:
+            room -= len(picture.svg)
+            kept.add(picture.key)
+    return kept
+
+
+def _marker(look: Look) -> int:
+    return list(MARKERS).index(look.marker)

@@ -7,7 +7,7 @@ not solve leaves its lane and goes by itself, from its start.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
@@ -29,9 +29,8 @@ from problems.errors import unknown
 from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
-JOBS = 32  # for each thread, at least, where there are so many groups: for progress, and for even loads
+JOBS = 8  # for each thread, at least, where there are so many groups: for even loads
 SAMPLINGS = ("side", "land", "dense")
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,6 @@ def prepare_batch(
     t0: float,
     sample: str | None = None,
     threads: int = 1,
-    progress: Progress | None = None,
 ) -> Callable[[], Batch]:
     """Check and allocate; return what integrates every start to all times. See `HBVMProgram.batch`."""
     if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
@@ -80,7 +78,7 @@ def prepare_batch(
         grid, np.full((n, grid.size, dim), np.nan),
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
-    work = _Work(program, result, starts, parameters, t0, sample or "side", threads, progress)
+    work = _Work(program, result, starts, parameters, t0, sample or "side", threads)
     lanes = program.in_lanes() if work.sample == "side" else None
     return work.all_alone if lanes is None else partial(work.run, _InLanes.of(lanes, work))
 
@@ -96,7 +94,6 @@ class _Work:
     t0: float
     sample: str
     threads: int
-    progress: Progress | None
     stop: Event = field(default_factory=Event)
 
     def run(self, lanes: "_InLanes") -> Batch:
@@ -104,51 +101,35 @@ class _Work:
         n, result = len(self.starts), self.result
         width = lanes.lanes.width
         size = max(1, n // (width * JOBS * self.threads)) * width
-        self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)], 0)
+        self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)])
         stayed = lanes.arrived == 1
         result.steps[stayed] = lanes.steps
         result.iterations[stayed] = lanes.sweeps[stayed]
         result.evaluations[stayed] = lanes.lanes.k * lanes.sweeps[stayed]
-        left = np.flatnonzero(~stayed).tolist()
-        self.share(self._alone, [range(i, i + 1) for i in left], n - len(left))
+        self.share(self.alone, np.flatnonzero(~stayed).tolist())
         return result
 
     def all_alone(self) -> Batch:
         """Integrate all trajectories one by one."""
-        self.share(self._alone, [range(i, i + 1) for i in range(len(self.starts))], 0)
+        self.share(self.alone, list(range(len(self.starts))))
         return self.result
 
-    def share(self, do: Callable[[range], int], jobs: list[range], done: int) -> None:
-        """Do all jobs, on several threads or in this one; Ctrl-C stops the threads' work too.
-
-        A job returns how many trajectories are at their end with it, of which ``done`` are already.
-        """
-        n = len(self.starts)
+    def share(self, do: Callable[[Any], None], jobs: list[Any]) -> None:
+        """Do all jobs, on several threads or in this one; Ctrl-C stops the threads' work too."""
         if self.threads == 1:
             for job in jobs:
-                done += do(job)
-                self._tell(done, n)
+                do(job)
             return
         with ThreadPoolExecutor(self.threads) as pool:
             waiting = [pool.submit(do, job) for job in jobs]
             try:
-                for made in as_completed(waiting):
-                    done += made.result()
-                    self._tell(done, n)
+                for made in waiting:
+                    made.result()
             except BaseException:
                 self.stop.set()
                 for made in waiting:
                     made.cancel()
                 raise
-
-    def _tell(self, done: int, n: int) -> None:
-        if self.progress is not None:
-            self.progress(done, n)
-
-    def _alone(self, job: range) -> int:
-        for i in job:
-            self.alone(i)
-        return len(job)
 
     def alone(self, i: int) -> None:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
@@ -216,8 +197,8 @@ class _InLanes:
         """Sweeps in which each took part."""
         return self.arrays["all_sweeps"]
 
-    def run(self, members: range) -> int:
-        """Integrate some trajectories, group by group; return how many arrived."""
+    def run(self, members: range) -> None:
+        """Integrate some trajectories, group by group."""
         try:
             memory = self.spare.pop()
         except IndexError:  # another thread has it
@@ -230,4 +211,3 @@ class _InLanes:
             with pace:
                 done = run(group.address, side.address, pace.steps) == 1
         self.spare.append(memory)
-        return int(self.arrived[members.start : members.stop].sum())

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from integrators.caveats import sees_kinks
 from integrators.kernel import tables
-from integrators.kernel.batch import Batch, Progress, prepare_batch
+from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.fixed import FixedStepper
@@ -33,7 +33,7 @@ TOLERANCE = 1e-16
 
 FIRST_RATE = math.log2(0.01)
 
-MARGIN = 0.82
+MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
@@ -82,6 +82,8 @@ class HBVMProgram(Compiled):
 
     varying = False
     """Whether steps vary in length."""
+    threaded = True
+    """Whether `batch` takes threads."""
     _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
@@ -173,7 +175,6 @@ class HBVMProgram(Compiled):
         t0: float = 0.0,
         sample: str | None = None,
         threads: int = 1,
-        progress: Progress | None = None,
     ) -> Batch:
         """Integrate many starts to the same times, one in each lane of the vector unit.
 
@@ -195,15 +196,13 @@ class HBVMProgram(Compiled):
             How states between steps are made; see `HBVMStepper`.
         threads : int
             Threads to share the trajectories among.
-        progress : callable, optional
-            Called with the number of trajectories that are at their end, and the number of all.
 
         Raises
         ------
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads, progress)()
+        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads)()
 
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0

@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 # Routes of a product that are not a number of columns: a larger matrix, and by way of coefficients.
 WIDE, THROUGH = 0, 1
 
-MODES = 13  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
+# Coefficients that are extrapolated. P_j(2) grows like 5.8^j: with more, that amplifies rounding more than
+# it helps. Steps of varying length are long, and what they leave out is larger than that.
+MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 
@@ -109,11 +111,11 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     for part, (rows, columns) in zip(NAMES, shapes, strict=True):
         arrays[part] = np.frombuffer(kept, "<f8", rows * columns, start).reshape(rows, columns)
         start += 8 * rows * columns
-    return Constants(k, s, lanes, second, route, min(k, MODES), arrays)
+    return Constants(k, s, lanes, second, route, min(k, MODES_VARYING), arrays)
 
 
 def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
-    modes = min(k, MODES)
+    modes = min(k, MODES_VARYING)
     inner = s if route == THROUGH else k
     extrapolations = [(modes, k), (k, modes), (k, 2 * k)]
     return [(k, 1)] * 6 + [(k, inner)] * 2 + [(s, k), *extrapolations, (k, min(MOMENTS, k))]
@@ -123,7 +125,7 @@ def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
     import integrators.legendre as legendre
 
     t = legendre.tables(k, s)
-    modes = min(k, MODES)
+    modes = min(k, MODES_VARYING)
     integrals = t.double_integrals if second else t.integrals
     matrix = (integrals.hi, integrals.lo)
     if route != THROUGH:
@@ -227,17 +229,18 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
     high, low = times(a["matrix"], a["matrix_low"], h)
     if squared:
         high, low = times(high, low, h)
-    projection = a["projection"]
+    projection, modes = a["projection"], slice(MODES)
+    beyond = a["beyond"][:, modes]
     if constants.route == THROUGH:
         # What rounding takes from the first columns goes into columns of its own, before
         # the others, so that a chain of products holds it before it is rounded.
         first = constants.first
         matrix = np.hstack([low[:, :first], high])
-        extrapolation = high @ projection @ a["beyond"]
+        extrapolation = high @ projection @ beyond
         projection = np.vstack([projection[:first], projection])
     else:
         matrix = keep_moments(high, low, a["basis"])
-        extrapolation = high @ a["beyond"] @ a["into_modes"]
+        extrapolation = high @ beyond @ a["into_modes"][modes]
     columns = constants.route if constants.route > 1 else None
     more = {}
     if constants.route == 8:

@@ -245,6 +245,7 @@ integrate_many(P1, M1, starts=[[0, nan]])                    | the initial state
 integrate_many(P1, M1, starts=[[0, 1]], times='a')           | times must be numbers, not 'a'
 integrate_many(P1, M1, starts=[[0, 1]], times=[1, 0])        | times must be strictly monotone and ahead of
 integrate_many(P1, M1, starts=[[0, 1]], threads=0)           | threads=0 of integrate_many must be a whole
+integrate_many(P1, M1, starts=[[0, 1]], progress=3)          | progress=3 must be True, False or a function
 integrate_many(P1, M1, starts=[[0, 1]], threads=1.5)         | threads=1.5 of integrate_many must be a whole
 integrate_many(P1, M1, starts=[[0, 1]], parameters={'b': 1}) | unknown parameter of
 integrate_many(P1, M1, starts=[[0, 1]], parameters=[1])      | parameters=[1] of integrate_many must be

@@ -106,9 +106,28 @@ def test_a_field_of_foreign_code_goes_one_by_one_and_its_errors_are_told():
 @pytest.mark.parametrize("method", [Gauss(s=4, h=0.1), HBVM(k=8, s=4, tol=1e-8)], ids=str)
 def test_progress_is_told(method):
     told = []
-    integrate_many(morse(), method, starts=np.tile([0.1, 0.1], (70, 1)), progress=lambda *at: told.append(at))
-    assert told[-1] == (70, 70)
-    assert told == sorted(told)
+    made = integrate_many(morse(), method, starts=np.tile([0.1, 0.1], (200, 1)), progress=told.append)
+    assert [one.fraction for one in told] == sorted(one.fraction for one in told)
+    assert len(told) > 1
+    assert told[-1].fraction == 1.0
+    assert told[-1].left == 0.0
+    assert told[-1].steps == made.steps.sum()
+
+
+@pytest.mark.parametrize("method", [Gauss(s=4, h=0.1), HBVM(k=8, s=4, tol=1e-8)], ids=str)
+def test_ctrl_c_returns_what_was_reached(method):
+    def press(at):
+        if at.fraction > 0.5:
+            raise KeyboardInterrupt
+
+    made = integrate_many(morse(), method, starts=np.tile([0.1, 0.1], (1000, 1)), progress=press)
+    reached = made.arrived.sum()
+    assert 500 < reached < 1000
+    assert np.isfinite(made.y[:reached]).all()
+    assert made.status[reached:] == [Status.INTERRUPTED] * (1000 - reached)
+    assert np.isnan(made.y[reached:]).all()
+    assert "Ctrl-C" in made.reason[-1]
+    assert made.t_stop[-1] == 0.0
 
 
 def test_without_a_method_it_is_the_one_that_chooses_for_itself():

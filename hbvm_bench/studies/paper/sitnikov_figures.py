@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 
@@ -69,12 +69,7 @@ def trajectories(
             left.plot(x, y, color=INK, linewidth=0.9)
             far = int(np.argmax(np.hypot(x, y)))
             left.annotate(
-                str(number),
-                (1.11 * x[far], 1.11 * y[far]),
-                ha="center",
-                va="center",
-                fontsize=8,
-                color=INK,
+                str(number), (1.11 * x[far], 1.11 * y[far]), ha="center", va="center", fontsize=8, color=INK
             )
         left.set_xlim(-reach, reach)
         left.set_ylim(-reach, reach)

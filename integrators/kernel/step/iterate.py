@@ -6,7 +6,7 @@ from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RU
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
-from integrators.kernel.step.size import ROUNDING, change, is_rounding, take_sizes
+from integrators.kernel.step.size import ROUNDING, STAGNATION, change, is_rounding, take_sizes
 from integrators.kernel.step.sweep import evaluate, sweep, sweep_measured
 
 MAX_ITERATIONS = 200
@@ -27,7 +27,7 @@ FASTEST, SLOWEST = (
     -10.0,
     -1.0,
 )  # binary logarithms of the iteration's contraction, as far as they are believed
-MOST_EXTRA = 8
+MOST_EXTRA = 16
 
 
 @compiled
@@ -72,7 +72,10 @@ def test(ctx, strict):
     else:
         ctx.stalled += 1
         if is_rounding(change(ctx, ctx.floored), ctx.stalled >= PATIENCE):
-            polish(ctx, ctx.best)
+            if ctx.best <= STAGNATION:
+                polish(ctx, ctx.best)
+            else:  # a block that is nothing beside the others, and may be growing
+                ctx.outcome = DONE
         elif ctx.tried >= MAX_ITERATIONS:
             restart(ctx, DIVERGED)
 
@@ -93,9 +96,9 @@ def polish(ctx, change):
     The last evaluation is at the newest stages: the field's values have the error of the
     stages that they were taken at. What is left there acts on the energy in the same direction in every step.
     """
-    evaluations = min(int((LOG_REST - binary_log(change)) / ctx.rate), MOST_EXTRA)
+    more = int((LOG_REST - binary_log(change)) / ctx.rate)
     last = ctx.last
-    sweep(ctx, evaluations)
+    sweep(ctx, min(max(more, 0), MOST_EXTRA))
     ctx.last = last
     evaluate(ctx)
     ctx.tried += 1

@@ -29,6 +29,8 @@ from integrators.kernel.step.control import (
     TINY,
     bounded,
     log_factor,
+    log_ratio,
+    log_size,
 )
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
@@ -42,7 +44,10 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
 # and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
 BUSY, BUSY_FIRST = 18.0, 36.0
-GOAL = log2(1e-17)  # a change that is going to be no larger is not waited for
+# Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
+LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
+MOST_UNTESTED = 12
+MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
 FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
@@ -76,29 +81,35 @@ def attempt(ctx, h):
 def iterate(ctx):
     """Iterate until the step is solved or has failed; return the outcome.
 
-    The first change and the rate of contraction, as it was at the last step, tell how
-    many iterations need no test.
+    The first change and the rate of contraction, as it was at the last step, tell how many
+    iterations need no test; how many remain then, the rate of this step.
     """
     test(ctx, sweep_measured(ctx))
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
-    first, rate = binary_log(ctx.last), ctx.rate
-    sweep(ctx, int((LOG_REST - first) / rate) - 1)
+    first, known = binary_log(ctx.last), ctx.rate
+    rate = known
+    change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
     while ctx.outcome == RUNNING:
+        sweep(ctx, min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED))
         strict = sweep_measured(ctx)
         tries = ctx.tried - tried
         if strict > ROUNDING:
-            rate = min(max((binary_log(strict) - first) / tries, LEAST_RATE), MOST_RATE)
+            change = binary_log(strict)
+            rate = min(max((change - first) / tries, LEAST_RATE), MOST_RATE)
         elif strict == 0.0 and tries > 1:
             rate = max(rate + HOPE, LEAST_RATE)
         ctx.rate = rate
         test(ctx, strict)
         if ctx.tried <= tried:  # started anew
             return settle(ctx)
-        if ctx.outcome == RUNNING and binary_log(strict) + rate < GOAL:
-            polish(ctx, strict)
-    ctx.rate = rate
+        if ctx.outcome == RUNNING:
+            if strict <= TRUSTED:
+                polish(ctx, strict)
+            elif tries >= TRIAL and tries + (LOG_REST - change) / rate > most:
+                ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
+                ctx.rate = known
     return close(ctx)
 
 
@@ -109,15 +120,15 @@ def longer(ctx, error, defect, grow):
         return SHRINK
     h = ctx.h
     behind = ctx.length_behind
-    change = log(abs(h / behind)) if behind != 0.0 else 0.0
+    change = log_ratio(h / behind) if behind != 0.0 else 0.0
     power = 1.0 / (2.0 * ctx.error_degree + 1.0)
-    here = power * log(max(error, TINY))
+    here = power * log_size(max(error, TINY))
     before = ctx.error_behind if behind != 0.0 else INFINITY
     factor = log_factor(ctx.error_aim, here, before, change)
     ctx.error_ahead = here
     if ctx.allowed_defect < INFINITY:
         power = 1.0 / (2.0 * ctx.k - 1.0)
-        here = power * log(max(defect, TINY))
+        here = power * log_size(max(defect, TINY))
         before = ctx.defect_behind if behind != 0.0 else INFINITY
         factor = min(factor, log_factor(ctx.defect_aim, here, before, change))
         ctx.defect_ahead = here

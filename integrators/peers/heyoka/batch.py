@@ -41,12 +41,7 @@ class Lanes:
         self.compile_seconds = perf_counter() - started
 
     def prepare(
-        self,
-        starts: ArrayLike,
-        par: ArrayLike | None,
-        times: ArrayLike,
-        t0: float,
-        progress: Callable[[int, int], None] | None = None,
+        self, starts: ArrayLike, par: ArrayLike | None, times: ArrayLike, t0: float
     ) -> Callable[[], Trajectories]:
         """Check and allocate; return what integrates every start to all times.
 
@@ -68,16 +63,9 @@ class Lanes:
         states, values = (
             np.ascontiguousarray(rows[members].transpose(0, 2, 1)) for rows in (given, parameters)
         )
-        return partial(self._run, result, states, values, t0, progress)
+        return partial(self._run, result, states, values, t0)
 
-    def _run(
-        self,
-        result: Trajectories,
-        states: Array,
-        values: Array,
-        t0: float,
-        progress: Callable[[int, int], None] | None,
-    ) -> Trajectories:
+    def _run(self, result: Trajectories, states: Array, values: Array, t0: float) -> Trajectories:
         """Integrate group by group; states and values have the shape (groups, components, lanes).
 
         Between heyoka's calls is only what cannot wait: a group of a small system takes 0.1 ms.
@@ -99,8 +87,6 @@ class Lanes:
                         break
                     ended.append((first, ta.propagate_res))
                 y[first : first + size, place] = state.T[: n - first]
-            if progress is not None:
-                progress(min(first + size, n), n)
         for first, lanes in ended:
             result.steps[first : first + size] += [one[3] for one in lanes][: n - first]
         broken = np.logical_not(np.isfinite(y).all(axis=2))

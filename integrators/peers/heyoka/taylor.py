@@ -136,8 +136,6 @@ class TaylorProgram(ProgramBase):
         *,
         times: ArrayLike,
         t0: float = 0.0,
-        threads: int = 1,
-        progress: Callable[[int, int], None] | None = None,
     ) -> Trajectories:
         """Integrate many starts to the same times by heyoka's batch integrator.
 
@@ -155,27 +153,17 @@ class TaylorProgram(ProgramBase):
             Times asked for, strictly monotone from ``t0``.
         t0 : float
             Time of the starts.
-        threads : int
-            Not used: this runs in one.
-        progress : callable, optional
-            Called with the number of trajectories that are at their end, and the number of all.
         """
-        return self.prepare_batch(Y0, par, times=times, t0=t0, progress=progress)()
+        return self.prepare_batch(Y0, par, times=times, t0=t0)()
 
     def prepare_batch(
-        self,
-        Y0: ArrayLike,
-        par: ArrayLike | None = None,
-        *,
-        times: ArrayLike,
-        t0: float = 0.0,
-        progress: Callable[[int, int], None] | None = None,
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Trajectories]:
         """Compile, check and allocate all that `batch` needs; return what then does it, once."""
         if self._lanes is None:
             self._lanes = Lanes(self.system, self._options)
             self.compile_seconds += self._lanes.compile_seconds
-        return self._lanes.prepare(Y0, par, times, t0, progress)
+        return self._lanes.prepare(Y0, par, times, t0)
 
     def stepper(self, y: Array, par: Array, t: float) -> "TaylorStepper":
         """Return a trajectory."""

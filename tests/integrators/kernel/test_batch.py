@@ -135,24 +135,6 @@ def test_the_order_is_that_of_the_method():
     assert 14.0 < coarse / fine < 18.0  # order 4: measured 16.0
 
 
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_progress_is_told_in_the_thread_that_asked(threads):
-    problem = problems.load("henon_heiles")
-    program = HBVMProgram(problem.system, k=8, s=4, h=0.5)
-    starts = problem.y0 * (1 + 0.01 * rng.normal(size=(70, 4)))
-    told, names = [], set()
-
-    def progress(done, n):
-        told.append((done, n))
-        names.add(current_thread().name)
-
-    program.batch(starts, times=[10.0], threads=threads, progress=progress)
-    assert told[-1] == (70, 70)
-    assert told == sorted(told)
-    assert len(told) > 3
-    assert names == {current_thread().name}
-
-
 def test_one_failure_leaves_the_others_alone():
     def H(q, p, m):
         return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
