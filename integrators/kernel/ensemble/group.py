@@ -61,9 +61,10 @@ class Group(Memory):
     times = Array()
     targets = Array(of=int)  # steps before each sample,
     parts = Array()  # and the part of a step that is left
-    part_matrix = Array()  # (samples, k, k): `matrix`,
-    part_extrapolation = Array()  # (samples, k, k): `extrapolation`,
-    part_reach = Array()  # (samples): and `reach` of these parts
+    part_places = Array(of=int)  # where among all lengths of parts that is; for each length
+    part_matrix = Array()  # (k, k): `matrix`,
+    part_extrapolation = Array()  # (k, k): `extrapolation`,
+    part_reach = Array()  # and `reach`
     out = Array()  # (n, samples, dim)
     arrived = Array(of=int)  # (n): 1, or 0 for one that left
     all_sweeps = Array(of=int)  # (n)

@@ -74,10 +74,11 @@ def part_step(group, side, sample):
         side.h[lane] = part
         side.alive[lane], side.sweeps[lane] = group.alive[lane], 0.0
     side.n = 0
-    place = group.k * group.k * sample
+    length = group.part_places[sample]
+    place = group.k * group.k * length
     side.matrix = group.part_matrix + place
     side.extrapolation = group.part_extrapolation + place
-    side.reach = group.part_reach[sample]
+    side.reach = group.part_reach[length]
     call_steps(side.code, side, 1)
     group.living = side.living
     for lane in range(lanes):

@@ -1,6 +1,7 @@
 """A method's coefficients for trajectories in lanes, and the memory of groups of them."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ class Lanes:
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
         falls = 3.0 * GOAL * 1e15 ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
-        extrapolation = a["beyond"] @ a["into_modes"]
+        extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
         found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
         return {name: _aligned(values) for name, values in found.items()}
 
@@ -84,19 +85,21 @@ class Lanes:
             self._scaled[h] = tables.keep_moments(high, low, a["basis"])
         return self._scaled[h]
 
-    def parts(self, parts: Numbers, h: float) -> dict[str, Numbers]:
+    def parts(self, parts: Numbers, h: float) -> dict[str, NDArray[Any]]:
         """Return what `Group` has of partial steps that follow a step of h."""
         from integrators.legendre import legendre
 
-        a, modes = self._constants.arrays, self._constants.modes
-        nodes = 1.0 + (parts / h)[:, None] * a["nodes"].reshape(-1)
-        basis = legendre(nodes.reshape(-1), modes).reshape(parts.size, self.k, modes)
-        factor = parts * parts if self.second and self.unit else parts
+        a, modes = self._constants.arrays, min(self.k, tables.MODES)
+        lengths, places = np.unique(parts, return_inverse=True)
+        nodes = 1.0 + (lengths / h)[:, None] * a["nodes"].reshape(-1)
+        basis = legendre(nodes.reshape(-1), modes).reshape(lengths.size, self.k, modes)
+        factor = lengths * lengths if self.second and self.unit else lengths
         matrix = factor[:, None, None] * self._matrix(1.0)
         return {
             "parts": parts,
+            "part_places": places.astype(np.int64),
             "part_matrix": np.ascontiguousarray(matrix),
-            "part_extrapolation": np.ascontiguousarray(basis @ a["into_modes"]),
+            "part_extrapolation": np.ascontiguousarray(basis @ a["into_modes"][:modes]),
             "part_reach": _reach(matrix),
         }
 
