@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
 from hbvm_bench.report.document import Document, Note, attempt
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look, looks
+from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance
@@ -45,9 +45,7 @@ def document(result: Endurance) -> Document:
         [
             Note(machine.sentence(run.machine)),
             *attempt(
-                ("the tables", lambda: tables(result)),
-                PEERS,
-                ("the figure", lambda: over_time(result, look)),
+                ("the tables", lambda: tables(result)), PEERS, ("the figure", lambda: over_time(result, look))
             ),
             Note(METHOD),
             again("endure", run.command, run.started[:10], run.machine, run.versions),
@@ -104,6 +102,7 @@ def tables(result: Endurance) -> list[Table]:
     return made
 
 
+@styled
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
     t = result.t
@@ -114,33 +113,31 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     positive = values[values > 0.0]
     low = math.floor(math.log10(positive.min())) if positive.size else -17
     high = math.ceil(math.log10(positive.max())) if positive.size else -14
-    with drawing():
-        figure = new(8.4, 5.0)
-        axes = figure.subplots()
-        figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
-        log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
-        log_axis(axes, "y", low, max(high, low + 1))
-        for method, errors in shown:
-            colour, dash = look[method].light, look[method].dash
-            for row in np.abs(errors):
-                axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
-            axes.plot(
-                t,
-                drift.rms(errors),
-                color=colour,
-                dashes=dash or (None, None),
-                marker=look[method].marker,
-                markevery=24,
-                markersize=5,
-                linewidth=1.6,
-                label=method,
-            )
-        guide = t[t >= t[-1] / 1e3]
-        axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
-        axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
-        axes.set_xlabel("years")
-        axes.set_title("relative energy error, root mean square over the starts", color=INK)
-        axes.legend(loc="upper left", handlelength=4.5)
+    figure = new(8.4, 5.0)
+    axes = figure.subplots()
+    figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
+    log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
+    log_axis(axes, "y", low, max(high, low + 1))
+    for method, errors in shown:
+        colour, dash = look[method].light, look[method].dash
+        for row in np.abs(errors):
+            axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
+        axes.plot(
+            t,
+            drift.rms(errors),
+            color=colour,
+            dashes=dash or (None, None),
+            marker=look[method].marker,
+            markevery=24,
+            markersize=5,
+            linewidth=1.6,
+            label=method,
+        )
+    guide = t[t >= t[-1] / 1e3]
+    axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
+    axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
+    axes.set(xlabel="years", title="relative energy error, root mean square over the starts")
+    axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
         for line in lines(result)

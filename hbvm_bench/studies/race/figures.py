@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look
+from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.studies.race import standings
 from hbvm_bench.studies.race.results import Outcome, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
@@ -20,6 +20,7 @@ FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn her
 TOP = 1
 
 
+@styled
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     """Draw errors against time; ``None`` without a setting that may be compared.
 
@@ -33,30 +34,26 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     shown = [outcome for outcome in race.outcomes if outcome.counts]
     if not shown:
         return None
-    with drawing():
-        figure = new(10.4, 4.6)
-        left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
-        times = [outcome.median or 1.0 for outcome in shown]
-        low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
-        levels = asked(race)
-        panels: list[Panel] = []
-        figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
-        for axes, title, level, key in (
-            (left, "energy error", levels[0], "energy"),
-            (right, "position error at the end", levels[1], "position"),
-        ):
-            log_axis(axes, "x", low, max(high, low + 1))
-            worst = max(_height(outcome, key) for outcome in shown)
-            log_axis(
-                axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9
-            )
-            axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-            for family in standings.present(race):
-                _draw(axes, [o for o in shown if o.setting.family == family], key, look)
-            axes.set_xlabel("seconds for the whole span (median)")
-            axes.set_title(f"{title}, relative", color=INK)
-            panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
-        _legend(side, [f for f in standings.present(race) if any(o.setting.family == f for o in shown)], look)
+    figure = new(10.4, 4.6)
+    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
+    times = [outcome.median or 1.0 for outcome in shown]
+    low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
+    levels = asked(race)
+    panels: list[Panel] = []
+    figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
+    for axes, title, level, key in (
+        (left, "energy error", levels[0], "energy"),
+        (right, "position error at the end", levels[1], "position"),
+    ):
+        log_axis(axes, "x", low, max(high, low + 1))
+        worst = max(_height(outcome, key) for outcome in shown)
+        log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
+        axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
+        for family in standings.present(race):
+            _draw(axes, [o for o in shown if o.setting.family == family], key, look)
+        axes.set(xlabel="seconds for the whole span (median)", title=f"{title}, relative")
+        panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
+    _legend(side, [f for f in standings.present(race) if any(o.setting.family == f for o in shown)], look)
     energy, position = (power(level) for level in levels)
     return picture(
         figure,
