@@ -19,7 +19,7 @@ from problems.systems.base import System
 from problems.trace.graph import reachable
 
 LANES = 8  # of a register
-WAITED_FOR = ("div", "sqrt", "pow", "sin", "cos", "tan", "exp", "log")
+SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
 STAGES = 16  # at most: their sums are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
 
@@ -143,7 +143,7 @@ def width_for(system: System, second: bool, rows: int) -> int:
     exponential of one component twice as fast with 32).
     """
     nodes = reachable(system.function("force" if second else "field").roots)
-    if rows > 4 or not any(node.op in WAITED_FOR for node in nodes):
+    if rows > 4 or all(node.op in SOON for node in nodes):
         return LANES
     return 4 * LANES if rows == 1 else 2 * LANES
 
