@@ -34,6 +34,9 @@ def automatic(
         Path | None,
         typer.Option("--out", help="Keep the result there, as <kind of processor>.json, with a page of all."),
     ] = None,
+    redraw: Annotated[
+        bool, typer.Option("--redraw", help="Draw the report of --out again; run nothing.")
+    ] = False,
 ) -> None:
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
@@ -48,6 +51,11 @@ def automatic(
     if general:
         _general(console, problems or [], limit)
         return
+    from hbvm_bench.studies.automatic import report
+
+    if redraw:
+        _publish(out or Path("reports/automatic"))
+        return
     campaign = automatic_.campaign(problems or [], rounds)
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     if out is not None:
@@ -56,11 +64,21 @@ def automatic(
     command = measuring.command([*words, *(["--avx2"] if avx2 else [])], out)
     store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
     run = kept.of(store, automatic_.NAME)
-    page = automatic_.keep(run, out) if out is not None else None
-    terminal.print_table(automatic_.sides(automatic_.duels(run)))
+    terminal.print_table(report.sides(automatic_.duels(run)))
     console.print(machine.sentence(run.machine), highlight=False)
-    if page is not None:
-        terminal.console(stderr=True).print(str(page), style="dim")
+    if out is not None:
+        automatic_.keep(run, out)
+        _publish(out)
+
+
+def _publish(directory: Path) -> None:
+    from hbvm_bench.commands.publishing import publish
+    from hbvm_bench.studies.automatic import report
+
+    found = automatic_.by_kind(directory)
+    if not found:
+        raise InputError(f"there is no result of automatic in {str(directory)!r}; run it with --out first.")
+    publish(report.document(found), directory)
 
 
 def _general(console: Console, names: list[str], limit: float) -> None:

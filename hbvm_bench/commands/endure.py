@@ -50,6 +50,7 @@ def endure(
         asked = runs.campaign(span, starts or (runs.QUICK_STARTS if quick else None), method)
         carry_out(asked, directory, _command(years, starts, method, quick, directory))
     result = runs.read(directory)
+    from hbvm_bench.commands.publishing import publish
     from hbvm_bench.studies.endure import report
 
     if as_json:
@@ -58,7 +59,7 @@ def endure(
         for table in report.tables(result):
             terminal.print_table(table)
         terminal.console().print(machine.sentence(result.run.machine), highlight=False)
-    terminal.console(stderr=True).print(str(report.write(result, directory)), style="dim")
+    publish(report.document(result), directory)
 
 
 def as_data(result: Endurance) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.measure import machine
-from hbvm_bench.report.markdown import in_markdown, plain
-from hbvm_bench.studies.automatic import runs as automatic
+from hbvm_bench.report.markdown import plain, printed
+from hbvm_bench.studies.automatic import report as automatic
+from hbvm_bench.studies.automatic.runs import by_kind
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
@@ -22,18 +23,18 @@ def headline(
     that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.
     """
     races = results.by_kind(reports / "race", list(CONTESTS))
-    duels = automatic.by_kind(reports / "automatic")
+    duels = by_kind(reports / "automatic")
     if not races and not duels:
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
     parts = []
     for kind, found in races.items():
         parts += [f"**{plain(kind)}**", *map(plain, machine.sentences(race.machine for race in found))]
         shown = [tables.headline(found), tables.goals(found), tables.behind(found)]
-        parts += [in_markdown(table) for table in shown if table.rows]
+        parts += [printed(table) for table in shown if table.rows]
         parts += dict.fromkeys(plain(said) for race in found for said in report.earlier_definition(race))
-    parts += [in_markdown(tables.kinds(races))] if len(races) > 1 else []
+    parts += [printed(tables.kinds(races))] if len(races) > 1 else []
     if duels:
-        parts += [in_markdown(automatic.ratios(duels))]
+        parts += [printed(automatic.ratios(duels))]
         for kind, runs in duels.items():
             parts += [plain(f"{kind}: {said}") for said in machine.sentences(run.machine for run in runs)]
     print("\n\n".join(parts))

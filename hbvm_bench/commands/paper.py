@@ -1,21 +1,14 @@
 """``hbvm-bench paper``: run the paper's experiments and write the report."""
 
-import os
-import time
 from pathlib import Path
-from types import ModuleType
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable, write_all
+from hbvm_bench.store.files import ensure_writable
 from problems.errors import unknown
-
-if TYPE_CHECKING:  # what computes costs seconds to import
-    from collections.abc import Sequence
-
-    from hbvm_bench.studies.paper.document import Part
 
 PARTS = ("sitnikov", "henon-heiles", "period-annulus", "claims")
 DEFAULT = Path("reports/paper")
@@ -27,80 +20,34 @@ def paper(
         Path | None, typer.Option("--out", help="Default: reports/paper, or runs/paper-PART for one part.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    redraw: Annotated[
+        bool, typer.Option("--redraw", help="Draw the report of --out again; run nothing.")
+    ] = False,
 ) -> None:
-    """Run the seed paper's experiments again and write the report: claim, paper, here."""
+    """Run the seed paper's experiments again and write the report: claim, paper, here.
+
+    What every computation returns is kept beside the report as soon as it has ended. A run that
+    was interrupted goes on where it was, as long as the code is the same.
+    """
     if part is not None and part not in PARTS:
         raise unknown("part of the paper", part, PARTS)
+    from hbvm_bench.commands.publishing import publish  # what computes and draws costs seconds to import
+    from hbvm_bench.studies.paper import report, results
+
     directory = out or (DEFAULT if part is None else Path("runs") / f"paper-{part}")
-    ensure_writable(directory / "figures")
-    command = "hbvm-bench paper" + (f" {part}" if part else "")
-    seconds = write_report(
-        PARTS if part is None else (part,), directory, jobs or len(os.sched_getaffinity(0)), command
-    )
-    terminal.console(stderr=True).print(f"{directory / 'index.html'} written in {seconds:.0f} s")
+    names = PARTS if part is None else (part,)
+    if redraw:
+        kept = results.load(directory)
+    else:
+        ensure_writable((directory / results.NAME).parent)
+        tasks = report.tasks(names)
+        console, count = terminal.console(stderr=True), 0
 
+        def done(key: str, said: str) -> None:
+            nonlocal count
+            count += 1
+            console.print(f"  {count}/{len(tasks)} {key}: {said}")
 
-def write_report(names: tuple[str, ...], directory: Path, jobs: int, command: str) -> float:
-    """Compute the named parts and write ``report.md``, ``index.html``, ``figures/`` and ``data/``.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Among `PARTS`.
-    directory : Path
-        Made if missing.
-    jobs : int
-        Processes.
-    command : str
-        What to print as the way to get it again.
-
-    Returns
-    -------
-    float
-        Seconds that it took.
-    """
-    from hbvm_bench.studies.paper.tasks import run_all
-
-    started = time.perf_counter()
-    modules = [_module(name) for name in names]
-    tasks = [task for module in modules for task in module.tasks()]
-    console = terminal.console(stderr=True)
-    count = 0
-
-    def done(key: str, seconds: float) -> None:
-        nonlocal count
-        count += 1
-        console.print(f"  {count}/{len(tasks)} {key}: {seconds:.1f} s", markup=False)
-
-    results = run_all(tasks, jobs, done)
-    write_parts([module.part(results) for module in modules], directory, command)
-    return time.perf_counter() - started
-
-
-def write_parts(parts: "Sequence[Part]", directory: Path, command: str) -> None:
-    """Write the documents, figures and data of parts that are computed already."""
-    from hbvm_bench.report.figures import canvas
-    from hbvm_bench.studies.paper.page import as_csv, claims_csv, markdown, page
-
-    files: dict[str, bytes] = {
-        "report.md": markdown(parts, command).encode(),
-        "index.html": page(parts, command).encode(),
-        "data/claims.csv": claims_csv(parts).encode(),
-    }
-    for part in parts:
-        files |= canvas.files(part.pictures)
-        for table in part.tables:
-            files[f"data/{table.key}.csv"] = as_csv([table.flat_head, *table.rows]).encode()
-    write_all({directory / name: data for name, data in files.items()})
-
-
-def _module(name: str) -> ModuleType:
-    from hbvm_bench.studies.paper import (
-        henon_heiles_part,
-        period_annulus_part,
-        properties_part,
-        sitnikov_part,
-    )
-
-    modules = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
-    return modules[PARTS.index(name)]
+        command = "hbvm-bench paper" + (f" {part}" if part else "")
+        kept = results.run_all(tasks, jobs or len(machine.cores()), command, directory, done)
+    publish(report.document(kept, names), directory)

@@ -72,12 +72,13 @@ def race(
         terminal.print_json(as_data(races))
     else:
         _show([one for one in races if one.contest.key in {contest.key for contest in contests}])
+    from hbvm_bench.commands.publishing import publish
     from hbvm_bench.studies.race import report
 
-    for path in report.write(races, directory):
-        terminal.console(stderr=True).print(str(path), style="dim")
     if failed:
         print(f"hbvm-bench: these did not end and have no result: {', '.join(failed)}.", file=sys.stderr)
+    publish(report.document(races, results.by_kind(directory, list(CONTESTS))), directory)
+    if failed:
         raise typer.Exit(1)
 
 

@@ -29,16 +29,15 @@ def report(
     if not runs and index is None:
         raise InputError("give at least one run, as in runs/sitnikov, or --index DIR.")
     if runs:
-        from hbvm_bench.report.write import write_report
+        from hbvm_bench.commands.publishing import publish
+        from hbvm_bench.report.campaign import document
 
         stores = [Store(directory) for directory in runs]
         for store in stores:
             store.index()
         target = out or runs[0] / "report"
         ensure_writable(target, keep=False)
-        written = write_report(stores, target)
-        for path in written:
-            print(path)
+        publish(document(stores), target, stderr=False)
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
     if index is not None:

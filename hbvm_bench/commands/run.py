@@ -60,10 +60,10 @@ def run(
     terminal.print_results(records)
     terminal.print_goals(campaign, records)
     if report_to is not None:
-        from hbvm_bench.report.write import write_report
+        from hbvm_bench.commands.publishing import publish
+        from hbvm_bench.report.campaign import document
 
-        for path in write_report(store, report_to):
-            print(path)
+        publish(document(store), report_to, stderr=False)
 
 
 def carry_out(

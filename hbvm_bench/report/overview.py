@@ -1,12 +1,12 @@
 """What a run says over all its problems: needs, performance profiles, outcomes, laws."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.ticker import PercentFormatter
 
 from hbvm_bench.measure.metrics import find
+from hbvm_bench.report.document import Block, Details, Items
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.over_time import WIDTH
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
@@ -22,27 +22,68 @@ NEVER = 6.0  # decades: the end of the axis where a family is not within any fac
 SIGNS = {"ok": "●", "off": "◐", "ended": "○", "refused": "–", "absent": ""}
 
 
-@dataclass(frozen=True)
-class Overview:
-    """What stands before the problems.
-
-    Attributes
-    ----------
-    tables : list of Table
-        With words.
-    reasons : list of str
-        Why families failed on problems.
-    pictures : list of Picture
-        Over all problems.
-    """
-
-    tables: list[Table]
-    reasons: list[str]
-    pictures: list[Picture]
+def needed(records: Sequence[Record]) -> Table | None:
+    """Return which integrator answers which need."""
+    answers = needs.answers(records)
+    if not answers:
+        return None
+    return Table(
+        "Which integrator for which need",
+        ("need", "first choices", "problems"),
+        [(answer.title, answer.text, str(answer.problems)) for answer in answers],
+        "In brackets: on how many problems it is near the best, and its median factor behind it.",
+        words=(0, 1),
+    )
 
 
-def overview(records: Sequence[Record], numbers: dict[str, int]) -> Overview:
-    """Gather the overview of a run.
+def outcome(records: Sequence[Record]) -> list[Block]:
+    """Return which integrator reached the end of which problem, and why not; nothing for one problem."""
+    families, matrix = outcomes.matrix(records)
+    if len(matrix) < 2:
+        return []
+    rows: list[tuple[str, ...]] = []
+    reasons: list[str] = []
+    for problem, found in matrix.items():
+        signs = (
+            _sign(found[family].state, found[family].reached, found[family].settings) for family in families
+        )
+        rows.append((problem, *signs))
+        reasons += [
+            f"{problem}, {family}: {reason}"
+            for family in families
+            for reason in found[family].reasons
+            if reason
+        ]
+    table = Table(
+        "Which integrator on which problem",
+        ("problem", *families),
+        rows,
+        "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
+        "Numbers: how many of its settings reached the end, where not all did.",
+    )
+    return [table, *([Details(f"Why not: {len(reasons)} reasons", [Items(reasons)])] if reasons else [])]
+
+
+def drifting(records: Sequence[Record]) -> Table | None:
+    """Return how many cases of each method follow which law."""
+    counted = laws.counts(records)
+    if not counted:
+        return None
+    kinds = [*laws.SHORT, "none"]
+    return Table(
+        "The law of the energy's drift",
+        ("method", *(laws.SHORT.get(kind, "not clear") for kind in kinds)),
+        [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
+        "How many cases of each method follow which law.",
+    )
+
+
+def _sign(state: str, reached: int, settings: int) -> str:
+    return SIGNS[state] + (f" {reached}/{settings}" if state == "ok" and reached < settings else "")
+
+
+def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | None:
+    """Draw the performance profiles; ``None`` for too few problems.
 
     Parameters
     ----------
@@ -51,66 +92,11 @@ def overview(records: Sequence[Record], numbers: dict[str, int]) -> Overview:
     numbers : dict of int
         By family, the number of its first case: its colour in the page.
     """
-    tables: list[Table] = []
-    answers = needs.answers(records)
-    if answers:
-        tables.append(
-            Table(
-                "Which integrator for which need",
-                ("need", "first choices", "problems"),
-                [(answer.title, answer.text, str(answer.problems)) for answer in answers],
-                "In brackets: on how many problems it is near the best, and its median factor behind it.",
-                words=(0, 1),
-            )
-        )
-    families, matrix = outcomes.matrix(records)
-    reasons: list[str] = []
-    if len(matrix) > 1:
-        rows = []
-        for problem, found in matrix.items():
-            rows.append(
-                (problem, *(_sign(found[family].state, found[family].reached, found[family].settings)
-                            for family in families))
-            )  # fmt: skip
-            reasons += [
-                f"{problem}, {family}: {reason}"
-                for family in families
-                for reason in found[family].reasons
-                if reason
-            ]
-        tables.append(
-            Table(
-                "Which integrator on which problem",
-                ("problem", *families),
-                rows,
-                "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
-                "Numbers: how many of its settings reached the end, where not all did.",
-            )
-        )
-    counted = laws.counts(records)
-    if counted:
-        kinds = [*laws.SHORT, "none"]
-        tables.append(
-            Table(
-                "The law of the energy's drift",
-                ("method", *(laws.SHORT.get(kind, "not clear") for kind in kinds)),
-                [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
-                "How many cases of each method follow which law.",
-            )
-        )
-    return Overview(tables, reasons, _profiles(records, numbers))
-
-
-def _sign(state: str, reached: int, settings: int) -> str:
-    return SIGNS[state] + (f" {reached}/{settings}" if state == "ok" and reached < settings else "")
-
-
-def _profiles(records: Sequence[Record], numbers: dict[str, int]) -> list[Picture]:
     work = work_of(records)
     found = [profile(records, goal, work) for goal in GOALS]
     found = [one for one in found if len(one.problems) >= FEWEST_PROBLEMS]
     if not found:
-        return []
+        return None
     label = find(work).label
     with drawing():
         figure = new(WIDTH, 4.2)
@@ -165,7 +151,7 @@ def _profiles(records: Sequence[Record], numbers: dict[str, int]) -> list[Pictur
             + "."
             for one in found
         )
-        made = picture(
+        return picture(
             figure,
             "profiles",
             "Performance profiles",
@@ -175,7 +161,6 @@ def _profiles(records: Sequence[Record], numbers: dict[str, int]) -> list[Pictur
             said,
             Plot(panels),
         )
-    return [made]
 
 
 def _worst(one: Profile) -> float:

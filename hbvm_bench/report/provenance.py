@@ -1,10 +1,13 @@
 """What was measured with: days, versions, machines, and what the machine code is built for."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
+from hbvm_bench.report.document import Commands, Maker, Section
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries import peers
+from hbvm_bench.summaries.table import Table
 
 # Machine code of the libraries: what the times were made with.
 BUILT = {
@@ -14,6 +17,8 @@ BUILT = {
     "rebound": "generic wheel",
     "scipy": "generic wheel; vector field compiled on this machine by numba",
 }
+
+PEERS: Maker = ("what the bench costs the peers", peers.kept)
 
 
 def days(records: Sequence[Record]) -> str:
@@ -49,3 +54,35 @@ def machines(records: Sequence[Record]) -> list[tuple[str, str]]:
             if str(value) not in values:
                 values.append(str(value))
     return [(name, " | ".join(sorted(values))) for name, values in sorted(found.items())]
+
+
+def again(
+    study: str, command: str, measured: str, machine: Mapping[str, object], versions: Mapping[str, object]
+) -> Section:
+    """Return how a study is run again, where it was measured, and with what."""
+    return Section(
+        "Run it again",
+        [
+            Commands(command),
+            f"`hbvm-bench {study} --redraw --out DIRECTORY` draws this report again without running "
+            f"anything. Measured on {measured}.",
+            *facts(machine, versions),
+        ],
+        key="again",
+        nav="Run it again",
+    )
+
+
+def facts(machine: Mapping[str, object], versions: Mapping[str, object]) -> list[Table]:
+    """Return the tables of what is known of the machine and of the libraries."""
+    found = (("machine", machine), ("library", versions))
+    return [
+        Table(
+            "",
+            (name, "" if name == "machine" else "version"),
+            [(k, str(v)) for k, v in of.items()],
+            words=(0, 1),
+        )
+        for name, of in found
+        if of
+    ]

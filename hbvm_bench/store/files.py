@@ -1,9 +1,11 @@
 """Files that are complete or not there, and directories that can be written."""
 
+import csv
+import io
 import os
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -37,6 +39,13 @@ def atomic(path: Path) -> Iterator[Path]:
 def json_of(value: Any) -> bytes:
     """Return a value as JSON for people: indented, and ended by a line end."""
     return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+
+
+def csv_of(rows: Iterable[Iterable[object]]) -> bytes:
+    """Return rows as comma-separated text."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue().encode()
 
 
 def write_json(path: Path, value: Any) -> None:

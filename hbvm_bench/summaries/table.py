@@ -3,6 +3,8 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+NONE = "–"  # in a cell: there is no such number
+
 
 @dataclass(frozen=True)
 class Table:

@@ -7,10 +7,11 @@ import msgspec
 import pytest
 
 from hbvm_bench import cli
-from hbvm_bench.report.markdown import code
+from hbvm_bench.report.markdown import code, markdown
 from hbvm_bench.store import kept
 from hbvm_bench.store.records import printable
 from hbvm_bench.store.store import Store
+from hbvm_bench.studies.automatic import report
 from hbvm_bench.studies.automatic import runs as automatic
 from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.contests import CONTESTS
@@ -116,7 +117,7 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
 
 def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
     stored_results(tmp_path)
-    page = automatic.markdown(automatic.by_kind(tmp_path / "automatic"))
+    page = markdown(report.document(automatic.by_kind(tmp_path / "automatic")))
     assert "\x1b" not in page
     assert not re.search(r"(?<!\\)<script", page.replace(code(printable(f"{HOSTILE} ``` {HOSTILE}")), ""))
 

@@ -2,25 +2,23 @@
 
 import io
 import re
+from dataclasses import dataclass
 from functools import partial
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 
 from hbvm_bench.cli import main
-from hbvm_bench.commands import paper as command
-from hbvm_bench.report.figures.canvas import picture
 from hbvm_bench.report.figures.png import small
-from hbvm_bench.studies.paper import others, page, tasks
+from hbvm_bench.studies.paper import others, report, results
 from hbvm_bench.studies.paper.departure import departure
-from hbvm_bench.studies.paper.document import Claim, Part, number, sheet
+from hbvm_bench.studies.paper.drawn import number, sheet
 from hbvm_bench.studies.paper.henon_heiles_figures import fates
-from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
-from integrators.protocol import Samples, Status
+from integrators.protocol import Array, Samples, Status
 from problems import Hamiltonian
-
-HOSTILE = 'a <script>alert("x")</script> | `code` & 3.4e-15\nnext'
+from problems.errors import InputError
 
 
 @pytest.fixture
@@ -57,12 +55,72 @@ def test_a_failure_is_a_departure():
     assert departure(Failing(), 10.0, lambda y: y[:, 0] > 0, stretch=1.0) == 1.5  # type: ignore[arg-type]
 
 
-def test_tasks_give_the_same_results_here_and_in_processes():
-    work = [tasks.Task(f"{i}", partial(pow, i, 2), cost=i) for i in range(4)]
-    seen: list[str] = []
-    here = tasks.run_all(work, 1, lambda key, _: seen.append(key))
-    assert here == tasks.run_all(work, 2, lambda *_: None) == {"0": 0, "1": 1, "2": 4, "3": 9}
-    assert seen == ["3", "2", "1", "0"]
+def square(i: int) -> int:
+    if i == 3:
+        raise ValueError("three is too many")
+    return i**2
+
+
+def work(count: int) -> list[results.Task]:
+    return [results.Task(f"{i}", partial(square, i), cost=i) for i in range(count)]
+
+
+def ran(tasks, directory, jobs=1):
+    """Run tasks and return what is kept, and their keys in the order in which they ended."""
+    (directory / "data").mkdir(exist_ok=True)
+    said: dict[str, str] = {}
+    kept = results.run_all(tasks, jobs, "hbvm-bench paper", directory, said.__setitem__)
+    return kept, said
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_tasks_give_the_same_results_here_and_in_processes(tmp_path, jobs):
+    kept, said = ran(work(3), tmp_path, jobs)
+    found = results.Found(work(3), results.load(tmp_path))
+    assert dict(found) == {"0": 0, "1": 1, "2": 4}
+    assert results.load(tmp_path) == kept
+    if jobs == 1:
+        assert list(said) == ["2", "1", "0"]  # the long ones first
+
+
+def test_a_computation_that_fails_loses_no_other_and_says_why(tmp_path):
+    ran(work(4), tmp_path)
+    found = results.Found(work(4), results.load(tmp_path))
+    assert found["2"] == 4
+    with pytest.raises(InputError, match=r"'3' failed with ValueError: three is too many \(test_paper_rep"):
+        found["3"]
+
+
+def test_a_run_that_was_interrupted_goes_on_and_a_whole_one_starts_anew(tmp_path):
+    ran(work(2), tmp_path)
+    said = ran(work(3), tmp_path)[1]
+    assert [key for key, what in said.items() if what.startswith("kept")] == ["1", "0"]
+    assert not any(what.startswith("kept") for what in ran(work(3), tmp_path)[1].values())
+
+
+@dataclass(frozen=True)
+class Mixed:
+    values: Array
+    rows: list[tuple[str, float | None]]
+
+
+def mixed() -> dict[str, Mixed]:
+    values = np.array([[1e-300, np.nan, -0.0], [np.inf, 0.1, 3.0]])
+    return {"one": Mixed(values, [("a", None), ("b", np.float64(np.nan))])}
+
+
+def test_what_is_kept_comes_back_to_the_last_bit():
+    back = results.unpacked(results.packed(mixed()), mixed)["one"]
+    assert back.values.tobytes() == mixed()["one"].values.tobytes()
+    assert back.values.shape == (2, 3)
+    assert back.rows[0] == ("a", None)
+    assert np.isnan(back.rows[1][1])
+
+
+def test_every_result_of_the_paper_can_be_kept():
+    """Its function says what it returns; else it could not be read again."""
+    for task in report.tasks():
+        assert get_type_hints(results.function_of(task.run))["return"]
 
 
 @pytest.mark.parametrize(
@@ -71,25 +129,6 @@ def test_tasks_give_the_same_results_here_and_in_processes():
 )
 def test_numbers_are_short(value, text):
     assert number(value) == text
-
-
-def test_hostile_words_cannot_break_the_documents():
-    table = Table(HOSTILE, (HOSTILE, "n"), [(HOSTILE, "1e-3")], HOSTILE, key="hostile")
-    part = Part("hostile", HOSTILE, [HOSTILE], [Claim(HOSTILE, HOSTILE, HOSTILE, "holds")], [HOSTILE, table])
-    html = page.page([part], HOSTILE)
-    assert html.count("<script>") == 1
-    assert "alert(" in html
-    markdown = page.markdown([part], "hbvm-bench paper")
-    row = next(line for line in markdown.splitlines() if line.endswith("| confirmed |"))
-    assert len(re.findall(r"(?<!\\)\|", row)) == 5
-    assert "<script>" not in re.sub(r"`[^`]*`", "", markdown).replace("\\<script", "")
-
-
-def test_powers_of_ten_are_set_as_powers_and_code_is_left_alone():
-    assert "3.4·10<sup>−15</sup>" in page.html_cell("at 3.4e-15")
-    assert ">10<sup>4</sup>" in page.html_cell("1e4")
-    assert "tol=1e-15" in page.html_prose("`Taylor(tol=1e-15)`")
-    assert page.html_cell("-0.015") == "−0.015"
 
 
 def test_the_same_figure_gives_the_same_bytes():
@@ -113,30 +152,46 @@ def test_pictures_are_kept_small_without_a_visible_difference():
     assert np.abs(before - after).mean() < 0.5  # 0.02 of 255
 
 
-def test_a_figure_s_size_in_the_page_follows_its_width():
-    drawn = page.drawing(picture(sheet(5.0, 1.0), "empty", "t", "c", "s"))
-    assert f"max-width:{360 * page.ENLARGED:.0f}px" in drawn
-
-
 def test_an_unknown_part_is_refused_with_the_nearest_name(capsys):
     assert main(["paper", "sitnikof"]) == 2
     assert "sitnikov" in capsys.readouterr().err
 
 
-def test_a_part_is_written_whole_and_twice_the_same(tmp_path):
-    files = []
-    for name in ("first", "second"):
-        command.write_report(("claims",), tmp_path / name, 1, "hbvm-bench paper claims")
-        found = {p.relative_to(tmp_path / name): p for p in (tmp_path / name).rglob("*") if p.is_file()}
-        files.append({str(key): path.read_bytes() for key, path in found.items()})
-    assert files[0] == files[1]
-    html, markdown = files[0]["index.html"].decode(), files[0]["report.md"].decode()
+def test_a_part_is_written_whole_drawn_again_and_loses_little_where_a_result_is_missing(tmp_path, capsys):
+    assert main(["paper", "claims", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    files = {
+        str(path.relative_to(tmp_path)): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()
+    }
+    html, markdown = files["index.html"].decode(), files["report.md"].decode()
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     for link in re.findall(r"\]\(((?:figures|data)/[^)]+)\)", markdown) + re.findall(
         r'href="((?:figures|data)/[^"]+)"', html
     ):
-        assert link in files[0], link
+        assert link in files, link
     assert "**8** confirmed · **0** confirmed in part · **0** not found" in markdown
+
+    for path in ("index.html", "report.md"):
+        (tmp_path / path).unlink()
+    assert main(["paper", "claims", "--redraw", "--out", str(tmp_path)]) == 0
+    for name, content in files.items():
+        assert (tmp_path / name).read_bytes() == content, name
+
+    kept = results.load(tmp_path)
+    del kept.results["claims/orders"]
+    results.save(kept, tmp_path)
+    assert main(["paper", "claims", "--redraw", "--out", str(tmp_path)]) == 1
+    assert (
+        "not made: the order: InputError: the computation 'claims/orders' was not run."
+        in capsys.readouterr().err
+    )
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    assert "**Not made: the order**" in text
+    assert "Conservation from k ≥ νs/2" in text
+
+
+def test_what_is_not_there_cannot_be_drawn_again(tmp_path, capsys):
+    assert main(["paper", "--redraw", "--out", str(tmp_path)]) == 2
+    assert "run hbvm-bench paper first" in capsys.readouterr().err
 
 
 def test_a_library_that_refuses_is_a_row_with_its_reason():

@@ -74,6 +74,10 @@ class Picture:
         The same picture.
     plot : Plot or None
         What it shows, as numbers.
+    motion : dict or None
+        What the page's moving view of it is made of.
+    values : bool
+        Whether its colours mean values, so that no theme may brighten them.
     """
 
     key: str
@@ -83,10 +87,18 @@ class Picture:
     svg: str
     png: bytes
     plot: Plot | None = None
+    motion: dict[str, Any] | None = None
+    values: bool = False
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[\w-]+", self.key):
             raise ValueError(f"{self.key!r} can be no anchor and no file name")
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Its drawing, its image and its numbers, by their path beside a report."""
+        made = {f"figures/{self.key}.svg": self.svg.encode(), f"figures/{self.key}.png": self.png}
+        return made if self.plot is None else made | {f"data/{self.key}.csv": as_csv(self.plot)}
 
 
 def drawing() -> AbstractContextManager[None]:
@@ -94,19 +106,15 @@ def drawing() -> AbstractContextManager[None]:
     return mpl.rc_context(SETTINGS)
 
 
-def files(pictures: Iterable[Picture]) -> dict[str, bytes]:
-    """Return the drawings, images and numbers of figures by their path beside a report."""
-    made: dict[str, bytes] = {}
-    for one in pictures:
-        made[f"figures/{one.key}.svg"] = one.svg.encode()
-        made[f"figures/{one.key}.png"] = one.png
-        if one.plot is not None:
-            made[f"data/{one.key}.csv"] = as_csv(one.plot).encode()
-    return made
-
-
 def picture(
-    figure: Figure, key: str, title: str, caption: str, summary: str, plot: Plot | None = None
+    figure: Figure,
+    key: str,
+    title: str,
+    caption: str,
+    summary: str,
+    plot: Plot | None = None,
+    *,
+    values: bool = False,
 ) -> Picture:
     """Render a figure; the same figure gives the same bytes."""
     svg, png = io.StringIO(), io.BytesIO()
@@ -117,9 +125,8 @@ def picture(
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    return Picture(
-        key, title, caption, summary, compact(with_small_images(text)), small(png.getvalue()), plot
-    )
+    svg_, png_ = compact(with_small_images(text)), small(png.getvalue())
+    return Picture(key, title, caption, summary, svg_, png_, plot, values=values)
 
 
 def compact(svg: str) -> str:

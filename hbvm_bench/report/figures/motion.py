@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,22 +26,6 @@ REVOLUTION = 21.46
 YAW, PITCH = 0.6, 0.42  # of the camera, in radians
 REACH = 4.2
 NUMBERS = 90  # places in time of the table and the curves
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What the page's moving view is made of.
-
-    Attributes
-    ----------
-    key : str
-        Of its figure.
-    panes : list of list of Drawn
-        The cases of each pane; the first is shown.
-    """
-
-    key: str
-    panes: list[list[Drawn]]
 
 
 def chosen(cases: Sequence[Drawn]) -> list[list[Drawn]]:
@@ -80,7 +64,7 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
         for pane in panes
         for case in pane
     )
-    return picture(
+    made = picture(
         figure,
         "motion",
         title,
@@ -90,16 +74,17 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
         f"Where the planetoid is at the end. {said}.",
         Plot([Panel("", Axis("time"), Axis("z of the planetoid"), traces)]),
     )
+    return replace(made, motion=as_json(panes))
 
 
-def as_json(motion: Motion) -> dict[str, Any]:
+def as_json(panes: Sequence[Sequence[Drawn]]) -> dict[str, Any]:
     """Return what the page needs to move it: positions as differences of whole multiples of 1/`GRAIN`."""
     return {
         "grain": GRAIN,
         "revolution": REVOLUTION,
         "camera": [YAW, PITCH],
         "reach": REACH,
-        "panes": [[_case(case) for case in pane] for pane in motion.panes],
+        "panes": [[_case(case) for case in pane] for pane in panes],
     }
 
 

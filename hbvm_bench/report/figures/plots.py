@@ -1,7 +1,5 @@
 """What a figure shows, as numbers: for interaction in the page, for its table and for its CSV file."""
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -9,6 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hbvm_bench.store.files import csv_of
 
 Array = NDArray[np.float64]
 
@@ -125,17 +125,21 @@ def as_json(plot: Plot) -> dict[str, Any]:
     }
 
 
-def as_csv(plot: Plot) -> str:
+def as_csv(plot: Plot) -> bytes:
     """Return a plot as text: one line per point."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["panel", "case", "name", "kind", "x", "y"])
-    for panel in plot.panels:
-        for trace in panel.traces:
-            for x, y in zip(trace.x.tolist(), trace.y.tolist(), strict=True):
-                values = ["" if (v := short(value)) is None else repr(v) for value in (x, y)]
-                writer.writerow([panel.title, trace.case or "", trace.name, trace.role, *values])
-    return stream.getvalue()
+    rows = [
+        (
+            panel.title,
+            trace.case or "",
+            trace.name,
+            trace.role,
+            *("" if v is None else repr(v) for v in point),
+        )
+        for panel in plot.panels
+        for trace in panel.traces
+        for point in zip(map(short, trace.x.tolist()), map(short, trace.y.tolist()), strict=True)
+    ]
+    return csv_of([("panel", "case", "name", "kind", "x", "y"), *rows])
 
 
 def numbers(plot: Plot) -> Numbers:

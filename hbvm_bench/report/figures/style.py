@@ -7,13 +7,11 @@ nothing rests on colour alone.
 
 import colorsys
 import hashlib
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import numbers
 
 # Base colour of each method: light theme, dark theme.
 FAMILIES = {
@@ -31,6 +29,7 @@ FAMILIES = {
     "Dopri8": ("#6b4bb8", "#b79cff"),
     "DOP853": ("#55606b", "#b4bfca"),
     "Radau": ("#55606b", "#b4bfca"),
+    "Motion": ("#a8324a", "#ff8a9e"),  # what is a property of the motion, not of a method
 }
 OTHERS = (("#a8324a", "#ff8a9e"), ("#3d6b1f", "#a5d677"), ("#7a4a1e", "#e0a46a"))
 
@@ -99,38 +98,29 @@ class Look:
     marker: str
 
 
-def looks(records: Sequence[Record]) -> dict[str, Look]:
-    """Return the look of every case by its id; a method looks the same on every problem."""
+def looks(methods: Iterable[str]) -> dict[str, Look]:
+    """Return the look of every method by its text; it is the same on every problem.
+
+    Parameters
+    ----------
+    methods : iterable of str
+        As they print, or only their names, in the order of declaration; they are counted from 1.
+    """
     seen: dict[str, int] = {}
     taken: set[str] = set()
-    number = numbers(records)
-    by_method: dict[str, Look] = {}
-    for record in records:
-        if record.case.method in by_method:
-            continue
-        name = method_name(record)
+    made: dict[str, Look] = {}
+    for number, method in enumerate(dict.fromkeys(methods), 1):
+        name = parse_spec(method).name
         light, dark = base_colours(name)
         # settings of one colour are told apart by shade and dash, whatever their method's name
         index = seen[light] = seen.get(light, -1) + 1
-        by_method[record.case.method] = Look(
-            number=number[record.id],
+        made[method] = Look(
+            number=number,
             light=_unique(_shade(light, index, towards=0.0), taken),
             dark=_shade(dark, index, towards=1.0),
             dash=DASHES[index % len(DASHES)],
             marker=MARKERS.get(name, UNKNOWN_MARKER),
         )
-    return {record.id: by_method[record.case.method] for record in records}
-
-
-def base_looks(methods: Iterable[str]) -> dict[str, Look]:
-    """Return the look of every method by its text: its name's base colour, dashes tell settings apart."""
-    made: dict[str, Look] = {}
-    settings: Counter[str] = Counter()
-    for number, method in enumerate(dict.fromkeys(methods), 1):
-        name = parse_spec(method).name
-        dash = DASHES[settings[name] % len(DASHES)]
-        settings[name] += 1
-        made[method] = Look(number, *base_colours(name), dash=dash, marker=MARKERS.get(name, UNKNOWN_MARKER))
     return made
 
 

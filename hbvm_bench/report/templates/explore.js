@@ -295,8 +295,7 @@
       if (what === "svg") save(name, await svgOf(figure), "image/svg+xml");
       else if (what === "png") save(name, await pngOf(figure), "image/png");
       else if (what === "numbers") save(name, csvOf(data.plots[figure.dataset.plot]), "text/csv");
-      else if (what === "csv") save(name, data.csv, "text/csv");
-      else save(name, JSON.stringify(data.json, null, 1), "application/json");
+      else save(name, data.files[link.getAttribute("href")], what === "csv" ? "text/csv" : "application/json");
     });
     document.addEventListener("theme", redraw);
     root.dataset.data = "ready";

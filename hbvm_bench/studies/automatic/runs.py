@@ -3,10 +3,10 @@
 Results of several kinds of processor lie side by side, one file each::
 
     DIR/<kind>.json     e.g. znver4-256bit.json, znver4-256bit-avx2.json
-    DIR/README.md       all of them, one column for each kind
+    DIR/README.md       all of them, one column for each kind, and index.html the same
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,21 +15,17 @@ from msgspec.structs import replace
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.measure import machine
-from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.report.markdown import code, in_markdown, plain
 from hbvm_bench.store import kept
-from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
-from hbvm_bench.summaries.rows import format_metric, status_of
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.rows import status_of
 from problems.errors import InputError
 
 NAME = "automatic"
-METRICS = ("warm_seconds", "steps", "energy_max", "position_mean")
 
 
 @dataclass(frozen=True)
@@ -90,8 +86,8 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
     return replace(made, timing=replace(made.timing, rounds=rounds))
 
 
-def keep(run: Kept, directory: Path) -> Path:
-    """Write a run beside those of other kinds of processor, and the page that shows all.
+def keep(run: Kept, directory: Path) -> None:
+    """Write a run beside those of other kinds of processor.
 
     Problems that were not run this time are kept from the file of the same kind, with the
     machine, the versions, the command and the date that they were measured with.
@@ -109,10 +105,6 @@ def keep(run: Kept, directory: Path) -> Path:
         for one in (kept.load(path, NAME) if path.is_file() else [])
     ]
     kept.save([*(one for one in old if one.records), run], path)
-    page = directory / "README.md"
-    with atomic(page) as temporary:
-        temporary.write_text(markdown(by_kind(directory)), encoding="utf-8")
-    return page
 
 
 def by_kind(directory: Path) -> dict[str, list[Kept]]:
@@ -129,78 +121,3 @@ def duels(run: Kept) -> list[Duel]:
         if ours and theirs:
             found.append(Duel(verdict, ours[0], theirs[0]))
     return found
-
-
-def markdown(results: Mapping[str, Sequence[Kept]]) -> str:
-    """Return the page: the ratios by kind of processor, then each kind's numbers."""
-    parts = [
-        "# HBVM() against heyoka's Taylor method",
-        "HBVM() chooses k, s and its steps by itself; heyoka's Taylor method likewise has no step to set. "
-        "The ratio is the Taylor method's time over ours within each round, of one core's time, "
-        "alternating: the median over the rounds.",
-        POSITION + " Here: the geometric mean over ten such times.",
-        in_markdown(ratios(results)),
-    ]
-    for kind, runs in results.items():
-        parts += [f"## {plain(kind)}"]
-        for run in runs:
-            libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
-            parts += [
-                plain(machine.sentence(run.machine)),
-                in_markdown(sides(duels(run))),
-                f"Measured on {plain(run.started[:10])} with {plain(libraries)}: {code(run.command)}",
-            ]
-    return "\n\n".join(parts) + "\n"
-
-
-def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
-    """Return how many times as long the Taylor method takes, one column for each kind of processor."""
-    by_problem = {
-        kind: {duel.problem: duel for run in runs for duel in duels(run)} for kind, runs in results.items()
-    }
-    rows = []
-    for key in dict.fromkeys(key for found in by_problem.values() for key in found):
-        of_kind = [found.get(key) for found in by_problem.values()]
-        known = [duel for duel in of_kind if duel is not None]
-        goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in known)
-        settings = dict.fromkeys(duel.theirs.case.method for duel in known)
-        rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
-    return Table(
-        "How many times as long as HBVM() the Taylor method takes",
-        ("problem", "against", "goal", *results),
-        rows,
-        "The median of the ratio within each round, and whether it reaches the goal declared before; not as "
-        "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
-        words=(0, 1),
-    )
-
-
-def _cell(duel: Duel | None) -> str:
-    if duel is None:
-        return "not run"
-    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}"
-
-
-def sides(found: Sequence[Duel]) -> Table:
-    """Return both sides' errors and times."""
-    rows = []
-    for duel in found:
-        ratio = duel.ratio
-        for first, side in ((True, duel.ours), (False, duel.theirs)):
-            spread = ratio is not None and ratio.low is not None and f"{ratio.low:.2f} … {ratio.high:.2f}"
-            rows.append(
-                (
-                    duel.problem if first else "",
-                    f"≥ {duel.goal:g}" if first else duel.words,
-                    f"{ratio.median:.2f}" if first and ratio is not None else "",
-                    spread if first and spread else "",
-                    side.case.method,
-                    *(format_metric(side, key) for key in METRICS),
-                )
-            )
-    return Table(
-        "Errors and times",
-        ("problem", "goal", "Taylor / HBVM", "quartiles", "method", "time", "steps", "energy", "position"),
-        rows,
-        words=(0, 4),
-    )

@@ -1,60 +1,69 @@
-"""The report of `endure`: ``README.md``, ``index.html`` and one figure, from the stored result alone."""
+"""The report of `endure`, from the stored result alone."""
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
-from hbvm_bench.report import shell
-from hbvm_bench.report.figures import canvas
+from hbvm_bench.report.document import Document, Note, Section, attempt
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv
-from hbvm_bench.report.figures.style import INK, MUTED, Look, base_looks
-from hbvm_bench.report.markdown import code, in_markdown
-from hbvm_bench.store.files import write_all
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, MUTED, Look, looks
+from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance
-from hbvm_bench.studies.race.tables import NONE
-from hbvm_bench.summaries import peers
+from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 Array = NDArray[np.float64]
 
-FIGURE = "figures/endure.svg"
-TITLE = "Endurance: the energy of the outer Solar System"
 LAW_POINTS = 40
 FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
+METHOD = """
+Every method runs in a process of its own. The energy is evaluated in double-double arithmetic at whole
+years, log-spaced, at the methods' own steps or by means that cost them nothing. Times are of the problem's
+own start without samples and without compilation, all methods in turn in one process on one core. Laws: a
+floor and a growth are fitted together to the logarithm of the rms over windows of time
+(`hbvm_bench.measure.drift`).
+"""
 
 
-def write(result: Endurance, directory: Path) -> Path:
-    """Write the report and return its path.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory cannot be written.
-    """
-    look = base_looks(result.methods)
-    made = over_time(result, look)
-    shown = [*tables(result), *filter(None, [peers.kept()])]
-    content = {"result": result, "run": result.run, "tables": shown, "picture": made, "figure": FIGURE}
-    content["processor"] = machine.sentence(result.run.machine)
-    environment = shell.environment("hbvm_bench.studies.endure", autoescape=False)
-    environment.filters |= {"code": code, "table": in_markdown}
-    files = {"README.md": environment.get_template("endure.md.j2").render(**content).encode()}
-    pictures = [made] if made is not None else []
-    page = shell.environment("hbvm_bench.studies.endure", autoescape=True).get_template("endure.html.j2")
-    data = {"csv": as_csv(made.plot)} if made is not None and made.plot is not None else {}
-    more = shell.values(pictures, list(look.values()), data=data)
-    files["index.html"] = page.render(title=TITLE, **content, **more).encode()
-    files |= canvas.files(pictures)
-    write_all({directory / name: text for name, text in files.items()})
-    return directory / "README.md"
+def document(result: Endurance) -> Document:
+    """Return the report."""
+    look, run = looks(result.methods), result.run
+    return Document(
+        "Endurance: the energy of the outer Solar System",
+        [
+            "How the energy error grows with time, ours beside the peers', in one run.",
+            f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
+            f"position and momentum is changed by up to {result.perturbation} of itself "
+            "(`hbvm_bench.measure.starts`).",
+        ],
+        [
+            Note(machine.sentence(result.run.machine)),
+            *attempt(
+                ("the tables", lambda: tables(result)),
+                PEERS,
+                ("the figure", lambda: over_time(result, look)),
+            ),
+            Note(METHOD),
+            Section(
+                "Raw data",
+                [
+                    "Every start with every sample is in the store of the run: "
+                    "`hbvm-bench export DIRECTORY --table series` writes it as a table."
+                ],
+                "data-files",
+                nav="Data",
+            ),
+            again("endure", run.command, run.started[:10], run.machine, run.versions),
+        ],
+        list(look.values()),
+    )
 
 
 def tables(result: Endurance) -> list[Table]:
@@ -92,16 +101,8 @@ def tables(result: Endurance) -> list[Table]:
             words=(0, 2 + len(heads)),
         )
     ]
-    asked = goals(result)
-    if asked:
-        made.append(
-            Table(
-                "Goals declared before the run",
-                ("goal", "measured", "verdict"),
-                [(goal.words, goal.measured, "reached" if goal.reached else "missed") for goal in asked],
-                words=(0, 1, 2),
-            )
-        )
+    if asked := goals(result):
+        made.append(goals_table(asked))
     return made
 
 

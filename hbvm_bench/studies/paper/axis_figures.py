@@ -8,7 +8,7 @@ import numpy as np
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.studies.paper.axis_motion import START, Growth
-from hbvm_bench.studies.paper.document import MOTION, SEQUENTIAL, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import MOTION, SEQUENTIAL, WIDTH, picture, sheet
 from integrators.protocol import Array
 
 
@@ -137,4 +137,5 @@ def territory(
             "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
             "end of regular motion; the paper's run lies inside it.",
             f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
+            values=True,
         )

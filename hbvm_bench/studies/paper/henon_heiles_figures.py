@@ -10,8 +10,8 @@ from matplotlib.ticker import FixedLocator
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, power_label
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, sheet
-from hbvm_bench.studies.paper.henon_heiles import GAP, T_END, H, Orbit, potential
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, sheet
+from hbvm_bench.studies.paper.henon_heiles import DIRECTIONS, GAP, GAPS, MAP_END, T_END, H, Orbit, potential
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
@@ -175,11 +175,10 @@ def fates(times: Mapping[str, Sequence[float | None]], printed: float) -> Pictur
         )
 
 
-def maps(
-    gauss: Array, hbvm: Array, gaps: Sequence[float], directions: Sequence[float], t_end: float
-) -> Picture:
+def maps(found: Mapping[str, Array]) -> Picture:
     """Escape times over starts and energies, both methods."""
-    degrees = np.degrees(directions)
+    gauss, hbvm, gaps, t_end = found["gauss"], found["hbvm"], GAPS, MAP_END
+    degrees = np.degrees(DIRECTIONS)
     with drawing():
         figure = sheet(WIDTH, 3.6)
         panels = figure.subplots(1, 2, sharey=True)
@@ -230,6 +229,7 @@ def maps(
             f"Under Gauss {int(np.count_nonzero(~np.isnan(gauss)))} of {gauss.size} orbits leave, "
             f"{int(np.count_nonzero(~np.isnan(inside)))} of {inside.size} of those with 1/6 − H₀ ≥ 4e-3; "
             f"under HBVM {int(np.count_nonzero(~np.isnan(hbvm)))}.",
+            values=True,
         )
 
 

@@ -5,16 +5,18 @@ from functools import partial
 
 import numpy as np
 
+from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.studies.paper import henon_heiles as experiment
 from hbvm_bench.studies.paper import henon_heiles_figures as figures
 from hbvm_bench.studies.paper import others
-from hbvm_bench.studies.paper.document import Claim, Part, number
+from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
-from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.studies.paper.results import Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
+KEY, TITLE = "henon-heiles", "The Hénon–Heiles problem"
 PRINTED = 7000.0  # the paper's escape time, "t ≃ 7000"
 CHUNKS = 4
 FAMILIES = {"gauss": GAUSS, "hbvm": HBVM_4}
@@ -57,60 +59,79 @@ def gauss_orbit() -> tuple[int, Orbit]:
     return nearest, experiment.orbit(GAUSS, offset=nearest)
 
 
-def part(results: Results) -> Part:
-    """Return this part of the report."""
-    offset, gauss = results["henon-heiles/gauss"]
-    hbvm: Orbit = results["henon-heiles/hbvm"]
-    times = {
-        family: [time for i in range(CHUNKS) for time in results[f"henon-heiles/escapes {family} {i}"]]
-        for family in FAMILIES
-    }
-    maps = {
-        family: np.vstack([results[f"henon-heiles/map {family} {i}"] for i in range(CHUNKS)])
-        for family in FAMILIES
-    }
-    steps: Steps = {family: results[f"henon-heiles/steps {family}"] for family in FAMILIES}
-    q1, q2, angle = experiment.START
-    return Part(
-        key="henon-heiles",
-        title="The Hénon–Heiles problem",
-        lead=[
+def blocks(results: Results) -> list[Maker]:
+    """Return what makes each block of the section."""
+
+    def problem() -> str:
+        q1, q2, angle = experiment.START
+        return (
             "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” "
             f"1/6; it does not say which. Here: (q₁, q₂) = ({q1:g}, {q2:g}), momentum at an angle of "
             f"{angle:g} rad, H₀ = 1/6 − {experiment.GAP:g}. The motion is chaotic, so the last bit of the "
             f"start decides when Gauss loses the orbit: {experiment.NEIGHBOURS} starts were tried that "
-            f"differ in the last bits of one momentum, and the one drawn (number {offset}) is the one that "
-            "escapes nearest to the paper's time.",
-        ],
-        claims=_claims(gauss, hbvm, times, maps, steps),
-        blocks=[
-            figures.level_curves(results["henon-heiles/truth"]),
-            figures.plane(
-                gauss, "gauss", 2,
+            f"differ in the last bits of one momentum, and the one drawn (number {_gauss(results)[0]}) is "
+            "the one that escapes nearest to the paper's time."
+        )
+
+    return [
+        ("the problem", problem),
+        ("Figure 1", lambda: figures.level_curves(results["henon-heiles/truth"])),
+        (
+            "Figure 2",
+            lambda: figures.plane(
+                _gauss(results)[1], "gauss", 2,
                 "Every step until the orbit leaves; circles: the last steps, as in the paper.",
             ),
-            figures.plane(
-                hbvm, "hbvm", 3,
-                "All 50,000 steps from the first of the starts.",
+        ),
+        (
+            "Figure 3",
+            lambda: figures.plane(
+                _hbvm(results), "hbvm", 3, "All 50,000 steps from the first of the starts."
             ),
-            figures.hamiltonian(gauss, hbvm),
-            figures.fates({repr(method): times[family] for family, method in FAMILIES.items()}, PRINTED),
-            figures.maps(
-                maps["gauss"], maps["hbvm"], experiment.GAPS, experiment.DIRECTIONS, experiment.MAP_END
+        ),
+        ("Figure 4", lambda: figures.hamiltonian(_gauss(results)[1], _hbvm(results))),
+        (
+            "the escape times",
+            lambda: figures.fates(
+                {repr(FAMILIES[family]): found for family, found in _times(results).items()}, PRINTED
             ),
-            _step_table(steps),
-            _others(results),
-        ],
-    )  # fmt: skip
+        ),
+        ("who escapes from where", lambda: figures.maps(_maps(results))),
+        ("the table of steps", lambda: _step_table(_steps(results))),
+        ("the other integrators", lambda: _others(results)),
+    ]  # fmt: skip
 
 
-def _claims(
-    gauss: Orbit,
-    hbvm: Orbit,
-    times: Mapping[str, list[float | None]],
-    maps: Mapping[str, Array],
-    steps: Steps,
-) -> list[Claim]:
+def _gauss(results: Results) -> tuple[int, Orbit]:
+    return results["henon-heiles/gauss"]
+
+
+def _hbvm(results: Results) -> Orbit:
+    return results["henon-heiles/hbvm"]
+
+
+def _times(results: Results) -> dict[str, list[float | None]]:
+    return {
+        family: [time for i in range(CHUNKS) for time in results[f"henon-heiles/escapes {family} {i}"]]
+        for family in FAMILIES
+    }
+
+
+def _maps(results: Results) -> dict[str, Array]:
+    return {
+        family: np.vstack([results[f"henon-heiles/map {family} {i}"] for i in range(CHUNKS)])
+        for family in FAMILIES
+    }
+
+
+def _steps(results: Results) -> Steps:
+    return {family: results[f"henon-heiles/steps {family}"] for family in FAMILIES}
+
+
+def claims(results: Results) -> list[Claim]:
+    """Return the claims of the paper's section."""
+    gauss, hbvm = _gauss(results)[1], _hbvm(results)
+    times, maps, steps = _times(results), _maps(results), _steps(results)
     gone = {family: sorted(time for time in found if time is not None) for family, found in times.items()}
     starts = len(times["gauss"])
     middle = float(np.median([np.inf if time is None else time for time in times["gauss"]]))

@@ -6,7 +6,7 @@ import numpy as np
 
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.period_annulus import SPAN, energy
 from integrators.protocol import Array
 from problems.catalogue.period_annulus import H_STAR, P1

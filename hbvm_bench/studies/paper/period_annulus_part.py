@@ -2,15 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from hbvm_bench.report.document import Claim, Maker
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper import period_annulus as experiment
 from hbvm_bench.studies.paper import period_annulus_figures as figures
-from hbvm_bench.studies.paper.document import Claim, Part, number
+from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.period_annulus import DEGREES, NODES, PRINTED, STEPS, Edge
-from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.studies.paper.results import Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -18,6 +21,26 @@ from problems import emit
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 C_STAR_DIGITS = "0.37570559292634522367"
+KEY, TITLE = "period-annulus", "The edge of a period annulus"
+PROBLEM = (
+    "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop "
+    "through the saddle P₁. The paper looks for the edge by bisection on the segment from the "
+    "origin to Q = (0, 1), judging each start by the fate of its numerical orbit over 2500 units "
+    "of time, down to an interval of 2⁻⁵². (The printed step 2 lets the segment end in P₁; it has "
+    "to be Q.) A start departs when |q| or |p| exceeds 1. The exact edge is at c* = "
+    f"{C_STAR_DIGITS}."
+)
+LONG_SPAN = (
+    "Why the HBVM entries are a few units in the last place off over the span of 2500, and exact "
+    "over a span of 100: an orbit within 1e-15 of the loop needs about 33 units of time for a "
+    "revolution, most of it at the saddle, and every revolution adds its round-off to H. Once H has "
+    "risen above H*, the orbit departs. The paper's own footnote says that HBVM needs no long span."
+)
+DIGITS = (
+    "Why the Gauss entries agree with the paper within a factor and not in their digits: under "
+    "Gauss there is no edge but a layer, see the figure of fates below; the bisection ends at one "
+    "of its many boundaries, and the last bit of the arithmetic decides at which."
+)
 FATE_METHODS = (Gauss(s=2, h=1.0), Gauss(s=2, h=0.5), Gauss(s=4, h=0.5), HBVM(k=5, s=2, h=1.0))
 FATE_GAPS = tuple((10.0 ** np.linspace(-8.0, -1.0, 141)).tolist())
 PERIOD_GAPS = tuple((10.0 ** -np.arange(0.5, 15.0, 0.5)).tolist())
@@ -66,46 +89,41 @@ def drawn() -> dict[str, figures.Path]:
     }
 
 
-def part(results: Results) -> Part:
-    """Return this part of the report."""
-    cells: Cells = {(h, s): results[f"period-annulus/cell {h} {s}"] for h in STEPS for s in DEGREES}
-    spreads: Spreads = {(h, s): results[f"period-annulus/spread {h} {s}"] for h in STEPS for s in DEGREES}
-    limits: Limits = {(h, s): results[f"period-annulus/limit {h} {s}"] for h in STEPS for s in DEGREES}
-    periods = results["period-annulus/periods"]
-    rate = experiment.saddle_rate()
-    orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
-    return Part(
-        key="period-annulus",
-        title="The edge of a period annulus",
-        lead=[
-            "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop "
-            "through the saddle P₁. The paper looks for the edge by bisection on the segment from the "
-            "origin to Q = (0, 1), judging each start by the fate of its numerical orbit over 2500 units "
-            "of time, down to an interval of 2⁻⁵². (The printed step 2 lets the segment end in P₁; it has "
-            "to be Q.) A start departs when |q| or |p| exceeds 1. The exact edge is at c* = "
-            f"{C_STAR_DIGITS}.",
-        ],
-        claims=_claims(cells, spreads, periods, rate, orbits),
-        blocks=[
-            _table(cells),
-            "Why the HBVM entries are a few units in the last place off over the span of 2500, and exact "
-            "over a span of 100: an orbit within 1e-15 of the loop needs about 33 units of time for a "
-            "revolution, most of it at the saddle, and every revolution adds its round-off to H. Once H has "
-            "risen above H*, the orbit departs. The paper's own footnote says that HBVM needs no long span.",
-            _limit_table(cells, limits),
-            "Why the Gauss entries agree with the paper within a factor and not in their digits: under "
-            "Gauss there is no edge but a layer, see the figure of fates below; the bisection ends at one "
-            "of its many boundaries, and the last bit of the arithmetic decides at which.",
-            _spread_table(spreads),
-            figures.level_curves(),
-            figures.closeup(orbits["gauss"], orbits["hbvm"], (repr(DRAWN["gauss"]), repr(DRAWN["hbvm"]))),
-            figures.periods(periods, rate),
-            figures.fates(
-                {repr(method): results[f"period-annulus/fates {method}"] for method in FATE_METHODS}
-            ),
-            _others(results),
-        ],
-    )
+def blocks(results: Results) -> list[Maker]:
+    """Return what makes each block of the section."""
+
+    def closeup() -> Picture:
+        orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
+        return figures.closeup(orbits["gauss"], orbits["hbvm"], (repr(DRAWN["gauss"]), repr(DRAWN["hbvm"])))
+
+    def fates() -> Picture:
+        found = {repr(method): results[f"period-annulus/fates {method}"] for method in FATE_METHODS}
+        return figures.fates(found)
+
+    return [
+        ("the problem", lambda: PROBLEM),
+        ("Table 1", lambda: _table(_by_entry(results, "cell"))),
+        ("the long span", lambda: LONG_SPAN),
+        (
+            "what limits the long span",
+            lambda: _limit_table(_by_entry(results, "cell"), _by_entry(results, "limit")),
+        ),
+        ("the digits", lambda: DIGITS),
+        ("how much is chance", lambda: _spread_table(_by_entry(results, "spread"))),
+        ("Figure 1", figures.level_curves),
+        ("Figure 2", closeup),
+        (
+            "the period",
+            lambda: figures.periods(results["period-annulus/periods"], experiment.saddle_rate()),
+        ),
+        ("the fates near the edge", fates),
+        ("the other integrators", lambda: _others(results)),
+    ]
+
+
+def _by_entry(results: Results, what: str) -> dict[tuple[float, int], Any]:
+    """Return what was computed for each entry of Table 1, by h and s."""
+    return {(h, s): results[f"period-annulus/{what} {h} {s}"] for h in STEPS for s in DEGREES}
 
 
 def ratios(cells: Cells) -> list[float]:
@@ -113,13 +131,13 @@ def ratios(cells: Cells) -> list[float]:
     return [experiment.error_of(cells[key]["gauss"].c) / PRINTED[key][1] for key in PRINTED]
 
 
-def _claims(
-    cells: Cells,
-    spreads: Spreads,
-    periods: list[tuple[float, float]],
-    rate: float,
-    orbits: Mapping[str, figures.Path],
-) -> list[Claim]:
+def claims(results: Results) -> list[Claim]:
+    """Return the claims of the paper's section."""
+    cells: Cells = _by_entry(results, "cell")
+    spreads: Spreads = _by_entry(results, "spread")
+    periods: list[tuple[float, float]] = results["period-annulus/periods"]
+    rate = experiment.saddle_rate()
+    orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
     field = emit.numpy(experiment.PROBLEM.system, "field")
     rest = max(float(np.abs(field(0.0, np.array(point), experiment.PROBLEM.par)).max()) for point in (P1, P2))
     rates = [float(experiment.eigenvalues(point).real.max()) for point in (P1, P2)]

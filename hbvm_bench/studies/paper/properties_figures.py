@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.document import HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.properties import Order
 
 MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))

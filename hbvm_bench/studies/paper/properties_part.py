@@ -2,13 +2,15 @@
 
 from functools import partial
 
+from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.studies.paper import properties, properties_figures
-from hbvm_bench.studies.paper.document import Claim, Part, number
-from hbvm_bench.studies.paper.tasks import Results, Task
+from hbvm_bench.studies.paper.drawn import number
+from hbvm_bench.studies.paper.results import Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 
+KEY, TITLE = "claims", "What the paper says of the methods"
 PAIRS = tuple((k, s) for s in properties.DEGREES for k in (s, s + 1, 2 * s, 3 * s, properties.BIG))
 REVERSED = (Gauss(s=2, h=0.5), HBVM(k=4, s=2, h=0.5), HBVM(k=9, s=4, h=0.5))
 COLLOCATED = ((2, 2), (3, 2), (4, 2), (5, 2), (6, 2), (3, 3), (8, 3), (10, 4), (13, 5))
@@ -53,46 +55,46 @@ def defects() -> list[tuple[str, float]]:
     return [(repr(method), properties.symplectic_defect(method)) for method in MAPPED]
 
 
-def part(results: Results) -> Part:
-    """Return this part of the report."""
-    orders: list[properties.Order] = results["claims/orders"]
-    cubic, quintic = results["claims/cubic"], results["claims/quintic"]
-    return Part(
-        key="claims",
-        title="What the paper says of the methods",
-        lead=["The theory's statements, each measured on the paper's own polynomial problems."],
-        claims=_claims(results),
-        blocks=[
-            properties_figures.order(orders),
-            properties_figures.threshold(cubic, quintic),
-            Table(
-                key="claims-collocation",
-                title="Extended collocation conditions, and what is not symplectic",
-                head=("method", "what", "defect"),
-                rows=(
-                    *(
-                        (
-                            f"HBVM(k={k}, s={s}, h=0.5)",
-                            "residual of σ′ = Σ Pⱼ ∫ Pⱼ f(σ) at the nodes",
-                            number(residual),
-                        )
-                        for k, s, residual in results["claims/extended"]
-                    ),
-                    *(
-                        (method, "|MᵀJM − J|, M the derivative of one step", number(defect))
-                        for method, defect in results["claims/symplectic"]
-                    ),
-                ),
-                words=(0, 1),
-                note="The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
-                "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not "
-                "symplectic; Gauss the other way about.",
-            ),
-        ],
+def blocks(results: Results) -> list[Maker]:
+    """Return what makes each block of the section."""
+    return [
+        (
+            "the methods",
+            lambda: "The theory's statements, each measured on the paper's own polynomial problems.",
+        ),
+        ("the order", lambda: properties_figures.order(results["claims/orders"])),
+        (
+            "the threshold",
+            lambda: properties_figures.threshold(results["claims/cubic"], results["claims/quintic"]),
+        ),
+        ("collocation and symplecticity", lambda: _collocation(results)),
+    ]
+
+
+def _collocation(results: Results) -> Table:
+    what = "residual of σ′ = Σ Pⱼ ∫ Pⱼ f(σ) at the nodes"
+    residuals = [
+        (f"HBVM(k={k}, s={s}, h=0.5)", what, number(residual))
+        for k, s, residual in results["claims/extended"]
+    ]
+    defects = [
+        (method, "|MᵀJM − J|, M the derivative of one step", number(defect))
+        for method, defect in results["claims/symplectic"]
+    ]
+    return Table(
+        key="claims-collocation",
+        title="Extended collocation conditions, and what is not symplectic",
+        head=("method", "what", "defect"),
+        rows=[*residuals, *defects],
+        words=(0, 1),
+        note="The residual is on the quintic, where the integrals are exact from k ≥ 5s/2 on; "
+        "the derivative on Hénon–Heiles. HBVM with k > s conserves the energy and is not "
+        "symplectic; Gauss the other way about.",
     )
 
 
-def _claims(results: Results) -> list[Claim]:
+def claims(results: Results) -> list[Claim]:
+    """Return the claims of the paper's section on the methods."""
     orders: list[properties.Order] = results["claims/orders"]
     off = max(abs(row.slope - 2 * row.s) for row in orders)
     back = max(error for _, error in results["claims/reversal"])

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, number, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array

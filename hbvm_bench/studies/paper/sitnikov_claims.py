@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.report.document import Claim
 from hbvm_bench.studies.paper import sitnikov, sitnikov_figures
 from hbvm_bench.studies.paper.axis_motion import Growth
-from hbvm_bench.studies.paper.document import Claim, number
+from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.sitnikov import Orbit, StepRow, usable
 
 # Limits of the verdicts, each with what was measured.

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.document import GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 

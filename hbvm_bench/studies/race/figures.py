@@ -10,15 +10,7 @@ from matplotlib.lines import Line2D
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import (
-    INK,
-    MARKERS,
-    MUTED,
-    UNKNOWN_MARKER,
-    Look,
-    base_colours,
-    base_looks,
-)
+from hbvm_bench.report.figures.style import INK, MUTED, Look
 from hbvm_bench.studies.race import standings
 from hbvm_bench.studies.race.results import Outcome, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
@@ -26,11 +18,6 @@ from hbvm_bench.studies.race.tables import asked, power
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
-
-
-def looks(races: Sequence[Race]) -> dict[str, Look]:
-    """Return the look of every method that runs in the races, by its name."""
-    return base_looks(parse_spec(o.setting.method).name for race in races for o in race.outcomes)
 
 
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
@@ -41,7 +28,7 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     race : Race
         Results of one contest.
     look : mapping of str to Look
-        By a method's name, see `looks`.
+        By a method's name.
     """
     shown = [outcome for outcome in race.outcomes if outcome.counts]
     if not shown:
@@ -65,11 +52,11 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
             )
             axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
             for family in standings.present(race):
-                _draw(axes, [o for o in shown if o.setting.family == family], family, key)
+                _draw(axes, [o for o in shown if o.setting.family == family], key, look)
             axes.set_xlabel("seconds for the whole span (median)")
             axes.set_title(f"{title}, relative", color=INK)
             panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
-        _legend(side, [f for f in standings.present(race) if any(o.setting.family == f for o in shown)])
+        _legend(side, [f for f in standings.present(race) if any(o.setting.family == f for o in shown)], look)
     energy, position = (power(level) for level in levels)
     return picture(
         figure,
@@ -120,19 +107,19 @@ def front(outcomes: Sequence[Outcome], key: str) -> list[Outcome]:
     return best
 
 
-def _draw(axes: Axes, outcomes: Sequence[Outcome], family: str, key: str) -> None:
+def _draw(axes: Axes, outcomes: Sequence[Outcome], key: str, look: Mapping[str, Look]) -> None:
     if not outcomes:
         return
     line = front(outcomes, key)
-    colour = base_colours(FAMILIES[family].lead)[0]
-    axes.plot([o.median or 0.0 for o in line], [_height(o, key) for o in line], color=colour, linewidth=1.1)
+    lead = look[parse_spec(outcomes[0].setting.method).name].light
+    axes.plot([o.median or 0.0 for o in line], [_height(o, key) for o in line], color=lead, linewidth=1.1)
     for outcome in outcomes:
-        name = parse_spec(outcome.setting.method).name
+        own = look[parse_spec(outcome.setting.method).name]
         axes.plot(
             [outcome.median or 0.0],
             [_height(outcome, key)],
-            MARKERS.get(name, UNKNOWN_MARKER),
-            color=base_colours(name)[0],
+            own.marker,
+            color=own.light,
             markersize=5.0 if outcome in line else 3.6,
             clip_on=False,
         )
@@ -142,15 +129,16 @@ def _height(outcome: Outcome, key: str) -> float:
     return min(max(getattr(outcome, key), 10.0**FLOOR), 10.0**TOP)
 
 
-def _legend(axes: Axes, families: Sequence[str]) -> None:
+def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> None:
     axes.set_axis_off()
     handles: list[Line2D] = []
     for family in families:
-        for name in (FAMILIES[family].lead, "Gauss") if family == OURS else (FAMILIES[family].lead,):
-            label = name if family == OURS else FAMILIES[family].title
-            handles.append(
-                Line2D([], [], color=base_colours(name)[0], marker=MARKERS[name], markersize=5, label=label)
-            )
+        lead = FAMILIES[family].lead
+        for name in (lead, "Gauss") if family == OURS else (lead,):
+            if name in look:
+                label = name if family == OURS else FAMILIES[family].title
+                own = look[name]
+                handles.append(Line2D([], [], color=own.light, marker=own.marker, markersize=5, label=label))
     axes.legend(handles=handles, loc="center left", borderaxespad=0.0, fontsize=8.5)
 
 

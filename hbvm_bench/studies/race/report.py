@@ -1,29 +1,23 @@
-"""The report of a race: ``README.md``, ``index.html`` and ``figures/``, from stored results alone."""
+"""The report of a race, from stored results alone."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 
+from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
-from hbvm_bench.report import shell
-from hbvm_bench.report.figures import canvas
-from hbvm_bench.report.figures.canvas import Picture
-from hbvm_bench.report.figures.style import Look
-from hbvm_bench.report.markdown import code, in_markdown
-from hbvm_bench.store.files import write_all
+from hbvm_bench.report.document import Details, Document, Files, Items, Maker, Note, Section, attempt
+from hbvm_bench.report.figures.style import Look, looks
+from hbvm_bench.report.provenance import PEERS, again
+from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.accuracy import SAMPLES
 from hbvm_bench.studies.race.contests import CONTESTS
-from hbvm_bench.studies.race.figures import looks, work_precision
-from hbvm_bench.studies.race.results import SCHEMA, Race, by_kind
+from hbvm_bench.studies.race.figures import work_precision
+from hbvm_bench.studies.race.results import SCHEMA, Race
 from hbvm_bench.studies.race.rounds import SHORTEST
 from hbvm_bench.studies.race.settings import FAMILIES
 from hbvm_bench.studies.race.standings import calibrated, present
-from hbvm_bench.summaries import peers
-from hbvm_bench.summaries.table import Table
 
 BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful
 
@@ -56,50 +50,92 @@ does not apply, is a row with its reason.
 RULES = tuple(" ".join(paragraph.split()) for paragraph in RULES_TEXT.strip().split("\n\n"))
 
 
-@dataclass(frozen=True)
-class Section:
-    """What the report says about one contest."""
+def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None = None) -> Document:
+    """Return the report.
 
-    race: Race
-    picture: Picture | None
-    tables: list[Table]
-    full: Table
-    remarks: list[str]
-
-
-def write(races: Sequence[Race], directory: Path) -> list[Path]:
-    """Write the report and return the paths of its two documents.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory cannot be written.
+    Parameters
+    ----------
+    races : sequence of Race
+        One per contest.
+    others : mapping of str to sequence of Race, optional
+        All that was measured, by the kind of processor.
     """
-    look = looks(races)
-    sections = [section(race, look) for race in races]
-    top = [tables.headline(races), tables.goals(races)]
-    found = by_kind(directory, list(CONTESTS))
-    if len(found) > 1:
-        top.insert(1, tables.kinds(found))
-    made = {
-        "data/settings.csv": settings_csv(sections).encode(),
-        "README.md": markdown(sections, top).encode(),
-        "index.html": page(sections, top, look).encode(),
-        **canvas.files(s.picture for s in sections if s.picture is not None),
-    }
-    write_all({directory / name: data for name, data in made.items()})
-    return [directory / "README.md", directory / "index.html"]
+    look = looks(parse_spec(o.setting.method).name for race in races for o in race.outcomes)
+    in_order = sorted(races, key=lambda race: race.started)
+    last = in_order[-1]
+    top: list[Maker] = [
+        ("the ratios", partial(tables.headline, races)),
+        ("the goals", partial(tables.goals, races)),
+    ]
+    if others is not None and len(others) > 1:
+        top.insert(1, ("the kinds of processor", partial(tables.kinds, others)))
+    stored: dict[str, bytes | None] = {f"{race.contest.key}.json": None for race in races}
+    # older results were timed in another way than the one that was checked
+    comparable = all(race.schema == SCHEMA for race in races)
+    return Document(
+        "The race: who is how fast at which accuracy",
+        [
+            "Time at the same energy and position error: every family with the same number of settings, "
+            "declared before the run, all in one process and interleaved round by round."
+        ],
+        [
+            *map(Note, machine.sentences(race.machine for race in in_order)),
+            *attempt(*top),
+            *(section(race, look) for race in races),
+            Section(
+                "The rules",
+                [
+                    Items(RULES, "numbered"),
+                    *(attempt(PEERS) if comparable else []),
+                    "What machine code runs:",
+                    Items([f"{family.title}: {family.code}" for family in FAMILIES.values()]),
+                ],
+                "rules",
+                nav="Rules",
+            ),
+            Section(
+                "Raw data",
+                [
+                    *attempt(("the settings as a file", partial(settings_csv, races))),
+                    Files("With all timing samples", stored),
+                ],
+                "data-files",
+                nav="Data",
+            ),
+            again(
+                "race",
+                commands(in_order),
+                ", ".join(sorted({race.started[:10] for race in races})),
+                last.machine,
+                last.versions,
+            ),
+        ],
+        list(look.values()),
+        names={one.number: name for name, one in look.items()},
+    )
 
 
 def section(race: Race, look: Mapping[str, Look]) -> Section:
-    """Gather what the report says about one contest."""
-    shown = [tables.fastest(race), tables.levels(race), tables.defaults(race), tables.compiling(race)]
+    """Return what the report says about one contest."""
+    title = race.contest.title
+    shown = (tables.fastest, tables.levels, tables.defaults, tables.compiling)
     return Section(
-        race,
-        work_precision(race, look),
-        [t for t in shown if t is not None],
-        tables.everything(race),
-        remarks(race),
+        title,
+        [
+            Note((f"To t = {race.t_end}. " if race.quick else "") + f"{race.rounds} rounds."),
+            Items(remarks(race)),
+            *attempt(
+                (f"Work and precision: {title}", partial(work_precision, race, look)),
+                *((f"{title}: {table.__name__}", partial(table, race)) for table in shown),
+            ),
+            Details(
+                f"All {len(race.outcomes)} settings",
+                attempt((f"all settings of {title}", partial(tables.everything, race))),
+            ),
+        ],
+        race.contest.key,
+        code=race.contest.problem,
+        nav=title.split(",")[0],
     )
 
 
@@ -141,45 +177,6 @@ def earlier_definition(race: Race) -> list[str]:
     ]
 
 
-def markdown(sections: Sequence[Section], top: Sequence[Table]) -> str:
-    """Return the report as markdown, with relative links to its figures."""
-    environment = shell.environment("hbvm_bench.studies.race", autoescape=False)
-    environment.filters |= {"code": code, "table": in_markdown}
-    return environment.get_template("race.md.j2").render(**_content(sections, top))
-
-
-def page(sections: Sequence[Section], top: Sequence[Table], look: Mapping[str, Look]) -> str:
-    """Return the report as one self-contained HTML document."""
-    environment = shell.environment("hbvm_bench.studies.race", autoescape=True)
-    return environment.get_template("race.html.j2").render(
-        **_content(sections, top),
-        **shell.values(
-            [s.picture for s in sections if s.picture is not None],
-            list(look.values()),
-            names={one.number: name for name, one in look.items()},
-            data={"csv": settings_csv(sections)},
-        ),
-    )
-
-
-def _content(sections: Sequence[Section], top: Sequence[Table]) -> dict[str, object]:
-    races = sorted((s.race for s in sections), key=lambda race: race.started)
-    last = races[-1]
-    return {
-        "sections": sections,
-        "top": top,
-        "rules": RULES,
-        # older results were timed in another way than the one that was checked
-        "peers": peers.kept() if all(race.schema == SCHEMA for race in races) else None,
-        "families": [(family.title, family.code) for family in FAMILIES.values()],
-        "processors": machine.sentences(race.machine for race in races),
-        "machine": list(last.machine.items()),
-        "versions": list(last.versions.items()),
-        "command": commands(races),
-        "started": sorted({s.race.started[:10] for s in sections}),
-    }
-
-
 def commands(races: Sequence[Race]) -> str:
     """Return the commands the contests came from; one if together they are all contests, run alike."""
     words = [race.command.split(" ") for race in races]
@@ -191,12 +188,9 @@ def commands(races: Sequence[Race]) -> str:
     return "\n".join(dict.fromkeys(race.command for race in races))
 
 
-def settings_csv(sections: Sequence[Section]) -> str:
+def settings_csv(races: Sequence[Race]) -> Files:
     """Return all settings of all contests as one table of text."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    for number, one in enumerate(sections):
-        if number == 0:
-            writer.writerow(["contest", *one.full.head])
-        writer.writerows([one.race.contest.key, *row] for row in one.full.rows)
-    return stream.getvalue()
+    found = [(race.contest.key, tables.everything(race)) for race in races]
+    head = ("contest", *found[0][1].head)
+    text = csv_of([head, *((key, *row) for key, table in found for row in table.rows)])
+    return Files("Every setting of every contest", {"data/settings.csv": text})

@@ -10,9 +10,7 @@ from hbvm_bench.studies.race.results import Outcome, Probe, Race
 from hbvm_bench.studies.race.settings import FAMILIES, OURS
 from hbvm_bench.studies.race.standings import LEVELS, POSITION_OVER_ENERGY, Comparison
 from hbvm_bench.summaries.rows import seconds
-from hbvm_bench.summaries.table import Table
-
-NONE = "–"
+from hbvm_bench.summaries.table import NONE, Table
 
 CACHES = {
     "empty": "nothing",

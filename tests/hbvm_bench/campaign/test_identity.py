@@ -79,7 +79,7 @@ EDITED = {
     "hbvm_bench/run/worker.py": [False, False],
     "hbvm_bench/cli.py": [False, False],
     "hbvm_bench/summaries/rows.py": [False, False],
-    "hbvm_bench/report/sections.py": [False, False],
+    "hbvm_bench/report/problem.py": [False, False],
 }
 
 

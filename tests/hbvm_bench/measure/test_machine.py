@@ -10,10 +10,13 @@ import pytest
 
 from hbvm_bench.cli import main
 from hbvm_bench.measure import machine, processor
+from hbvm_bench.report.markdown import markdown
+from hbvm_bench.report.write import write
 from hbvm_bench.run import timing_pass
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
+from hbvm_bench.studies.automatic import report as automatic
 from hbvm_bench.studies.automatic import runs
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.contests import CONTESTS
@@ -128,10 +131,11 @@ def test_a_processor_without_avx2_is_refused(monkeypatch, capsys):
 def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     runs.keep(of(ZEN4), tmp_path)
     runs.keep(of(ZEN5, 3.0), tmp_path)
-    page = runs.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path).read_text(encoding="utf-8")
-    assert {path.name for path in tmp_path.iterdir()} == {"README.md", "znver4-256bit.json", "znver5.json"}
+    runs.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
+    page = markdown(automatic.document(runs.by_kind(tmp_path)))
+    assert {path.name for path in tmp_path.iterdir()} == {"znver4-256bit.json", "znver5.json"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
-    assert re.search(r"kepler \| Taylor\(tol=1e-15\) \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
+    assert re.search(r"kepler \| `Taylor\(tol=1e-15\)` \| ≥ 2 \| 2\.00× reached \| 3\.00× reached", page)
     assert re.search(r"henon\\_heiles \| .* \| not run", page)
     assert "256 bits wide" in page
     (tmp_path / "znver4-256bit.json").write_bytes(b"{}")
@@ -151,7 +155,8 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
         ],
     )
     runs.keep(first, tmp_path)
-    page = runs.keep(later, tmp_path).read_text(encoding="utf-8")
+    runs.keep(later, tmp_path)
+    page = markdown(automatic.document(runs.by_kind(tmp_path)))
     assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [first, later]
     assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
     assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
@@ -162,7 +167,8 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
 
 def test_arithmetic_of_another_width_is_another_kind(tmp_path):
     for bits, ratio in ((512, 2.0), (256, 3.0)):
-        page = runs.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path).read_text(encoding="utf-8")
+        runs.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path)
+    page = markdown(automatic.document(runs.by_kind(tmp_path)))
     assert "| znver5-256bit | znver5-512bit |" in page
     assert re.search(r"\| 3\.00× reached \| 2\.00× reached \|", page)
 
@@ -178,7 +184,7 @@ def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
     assert table.head == ("problem", "peer", "znver5", "znver4-256bit-avx2")
     assert table.rows[0][1] == "heyoka"
     assert table.rows[0][2] == table.rows[0][3] == "15.0× (15.0–15.0)"
-    path, _ = report.write([one], tmp_path / "race")
+    path, _ = write(report.document([one], found), tmp_path / "race")
     text = path.read_text(encoding="utf-8")
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
@@ -188,9 +194,9 @@ def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "was restricted to AVX2" in said
     assert "| Outer Solar System, six bodies, 12 000 years | heyoka | 1e-13, 1e-10 | ≥ 10 | 15.0×" in said
-    assert "| Outer Solar System, six bodies, 12 000 years | Gauss(s=8, h=1.5) | Taylor() |" in said
+    assert "| Outer Solar System, six bodies, 12 000 years | `Gauss(s=8, h=1.5)` | `Taylor()` |" in said
     assert "| problem | against | goal | znver4-256bit | znver5 |" in said
-    assert "| kepler | Taylor(tol=1e-15) | ≥ 2 | 2.00× reached | 1.50× missed |" in said
+    assert "| kepler | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 1.50× missed |" in said
     assert "earlier definition" not in said
     results.save(msgspec.structs.replace(one, schema=1), tmp_path / "race")
     assert main(["headline", str(tmp_path)]) == 0

@@ -9,15 +9,16 @@ pytest.importorskip("playwright.sync_api")
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from hbvm_bench.commands import paper
+from hbvm_bench.report.document import Claim, Claims, Document, Section
+from hbvm_bench.report.write import write
 from hbvm_bench.studies.endure import report as endure
-from hbvm_bench.studies.paper.document import Claim, Part
+from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
 from hbvm_bench.studies.paper.properties import Order
 from hbvm_bench.studies.paper.properties_figures import order
 from hbvm_bench.studies.race import report as race
 from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench.studies import test_endure
-from tests.hbvm_bench.studies.race.conftest import made_up
+from tests.hbvm_bench.studies.race.conftest import made_up as made_up_race
 
 from .test_report_browser import CHROMIUM, browser, opened, wait_for_change
 
@@ -25,23 +26,31 @@ __all__ = ["browser"]  # a fixture
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium on this machine")
 
 
-def made_up_part():
-    """Return a part of the paper's report with one of everything."""
+def made_up_document():
+    """Return a document with a figure, claims and a table, as the report on the paper has them."""
     rows = [Order(s, s, [0.2, 0.1], [0.2 ** (2 * s), 0.1 ** (2 * s)], 2.0 * s) for s in (1, 2)]
     claim = Claim("It is of order 2s", "Section 2", "2.00 at `h=0.1`, 3.4e-15", "holds")
     table = Table("Numbers", ("method", "error"), [("Gauss(s=2)", "3.4e-15")], key="numbers")
-    return Part("made-up", "Made up", ["A sentence."], [claim], [order(rows), table])
+    claims = Claims([("Made up", "made-up", [claim])])
+    return Document(
+        "Made up",
+        ["A sentence."],
+        [claims, Section("Made up", [order(rows), table], "made-up")],
+        LOOKS,
+        NAMES,
+    )
 
 
 @pytest.fixture(scope="module", params=["race", "endure", "paper"])
 def folder(request, tmp_path_factory):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
-        race.write([made_up()], target)
+        made = race.document([made_up_race()])
     elif request.param == "endure":
-        endure.write(test_endure.made(target, years=1e5, starts=3), target)
+        made = endure.document(test_endure.made(target, years=1e5, starts=3))
     else:
-        paper.write_parts([made_up_part()], target, "hbvm-bench paper")
+        made = made_up_document()
+    write(made, target)
     return target
 
 

@@ -13,7 +13,8 @@ pytest.importorskip("playwright.sync_api")
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect, sync_playwright
 
-from hbvm_bench.report.write import write_report
+from hbvm_bench.report.campaign import document
+from hbvm_bench.report.write import write
 from hbvm_bench.store.store import Store
 from tests.hbvm_bench import made_up_run
 
@@ -27,7 +28,7 @@ PATIENCE = 30_000  # milliseconds, on a machine with other work
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     target = tmp_path_factory.mktemp("report")
-    write_report(made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run"))), target)
+    write(document(made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run")))), target)
     return target
 
 
@@ -35,7 +36,7 @@ def folder(tmp_path_factory):
 def large(tmp_path_factory):
     target = tmp_path_factory.mktemp("large")
     texts = [f"pendulum(p={1 + number / 10})" for number in range(2)]
-    write_report(made_up_run.write(Store(tmp_path_factory.mktemp("run")), texts, 200, missing=3), target)
+    write(document(made_up_run.write(Store(tmp_path_factory.mktemp("run")), texts, 200, missing=3)), target)
     return target
 
 

@@ -13,10 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hbvm_bench.report import pack
-from hbvm_bench.report.content import gather
+from hbvm_bench.report.campaign import document, gather
+from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv, as_json, numbers
 from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import write_index
+from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.merge import merge
 from hbvm_bench.store.records import Result
 from hbvm_bench.store.store import Store
@@ -59,7 +61,7 @@ def test_the_numbers_of_a_figure_are_those_that_it_draws():
 
 def test_a_figures_csv_has_every_point_and_gaps_stay_gaps():
     made = plot()
-    rows = list(csv.DictReader(io.StringIO(as_csv(made))))
+    rows = list(csv.DictReader(io.StringIO(as_csv(made).decode())))
     assert len(rows) == 202
     assert rows[0]["name"] == 'a "b", c'
     assert rows[100]["y"] == ""
@@ -88,10 +90,10 @@ def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
     assert len(content.records) == 4 + 3  # the case that the first run lacks is in the second
     assert [record.seconds for record in content.records if record.id == newer.id] == [7.0]
     assert content.runs[0].missing == []
-    assert content.title.startswith("2 runs together")
-    assert content.measured == "2026-11-21 to 2026-11-22"
-    numbers_ = {record.case.method: content.looks[record.id].number for record in content.records}
-    assert len(set(numbers_.values())) == 4  # a method has one number and one look on every problem
+    made = document([first, second])
+    assert made.title.startswith("2 runs together")
+    assert "Measured on 2026-11-21 to 2026-11-22" in markdown(made)
+    assert [look.number for look in made.looks] == [1, 2, 3, 4]  # one look on every problem
 
 
 def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
@@ -114,7 +116,8 @@ def test_what_is_missing_is_named(tmp_path):
     store = made_up_run.write(Store(tmp_path), ["pendulum(p=1.0)"], 3, missing=1)
     content = gather([store])
     assert [case.method for case in content.runs[0].missing] == [made_up_run.methods(3)[0]]
-    assert [case.method for case in content.sections[0].missing] == [made_up_run.methods(3)[0]]
+    folded = [block.summary for block in document(store).walk() if isinstance(block, Details)]
+    assert "1 cases on this problem have no result yet" in folded
 
 
 def test_the_list_of_reports_says_what_each_is_with_a_picture_and_its_command(tmp_path):

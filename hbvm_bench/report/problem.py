@@ -1,8 +1,10 @@
 """One problem's part of a report: sentences, rows and figures."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +15,15 @@ from hbvm_bench.measure.quantities import PLANETOID_Z
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
+from hbvm_bench.report.document import Block, Details, Items, Maker, Ranked, Section, attempt
 from hbvm_bench.report.figures import motion, over_time, portraits, views
 from hbvm_bench.report.figures.canvas import Picture, drawing
 from hbvm_bench.report.figures.drift import drift_figure
-from hbvm_bench.report.figures.motion import Motion
 from hbvm_bench.report.figures.over_time import Drawn, OverTime
 from hbvm_bench.report.figures.style import Look, method_name
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import GROUPS, Row, at_once, group_of, rows, title_of
+from hbvm_bench.summaries.rows import GROUPS, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -30,53 +32,26 @@ MOST_DRAWN = 32  # cases in a figure of a large report
 
 
 @dataclass(frozen=True)
-class Section:
-    """One problem's part of the report.
-
-    Attributes
-    ----------
-    problem : Problem
-        What was integrated.
-    title : str
-        Of the problem; of an ensemble also how many trajectories it has.
-    summary, shortcomings : list of str
-        Sentences.
-    groups : list of (str, list of Row)
-        Its rows, each group with its title.
-    missing : list of Case
-        Cases that have not run.
-    pictures : list of Picture
-        In order.
-    reference : Reference or None
-        The trusted solution.
-    truth : list of (str, str)
-        Its values that the table's readers want beside it.
-    motion : Motion or None
-        What the page can move.
-    """
+class ProblemPart:
+    """What a report says on one problem: its rows and sentences, and a section of its own."""
 
     problem: Problem
-    title: str
+    ranked: Ranked
     summary: list[str]
-    shortcomings: list[str]
-    groups: list[tuple[str, list[Row]]]
-    missing: list[Case]
-    pictures: list[Picture]
-    reference: Reference | None
-    truth: list[tuple[str, str]]
-    motion: Motion | None
+    section: Section
 
 
-def section(
+def part(
     text: str,
     found: Sequence[tuple[Record, dict[str, Array]]],
     look: dict[str, Look],
-    missing: list[Case],
+    missing: Sequence[Case],
     number: int,
     *,
     brief: bool = False,
-) -> Section:
-    """Gather what the report says about one problem, or about an ensemble of it.
+    summarized: bool = False,
+) -> ProblemPart:
+    """Make what the report says about one problem, or about an ensemble of it.
 
     Parameters
     ----------
@@ -86,74 +61,91 @@ def section(
         Its cases, at least one, and their series. An ensemble's are over its trajectories
         and not over time: it has rows and no figures.
     look : dict of Look
-        By case id.
-    missing : list of Case
+        By method.
+    missing : sequence of Case
         Those that have no result yet.
     number : int
         Of the section, from 1.
     brief : bool
         Whether only the main figures are drawn, of the most telling cases.
+    summarized : bool
+        Whether its summary stands in its own section.
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
     known = solutions.find(problem)
     ensemble = records[0].case.ensemble
-    cases = [Drawn(record, look[record.id], series) for record, series in found if ensemble is None]
+    cases = [Drawn(record, look[record.case.method], series) for record, series in found if ensemble is None]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
     table = rows(records)
-    pictures = _pictures(problem, drawn, known, number, brief=brief)
-    moving = [picture.key for picture in pictures if picture.key.partition("-")[0] == "motion"]
-    return Section(
-        problem=problem,
-        title=f"{problem.title}{at_once(ensemble)}",
-        summary=[*words.summary(records), *([words.WITNESSES] if ensemble is not None else [])],
-        shortcomings=words.shortcomings(records),
-        groups=[
-            (title_of(key, members), members)
-            for key in GROUPS
-            if (members := [row for row in table if row.group == key])
-        ],
-        missing=missing,
-        pictures=pictures,
-        motion=Motion(moving[0], motion.chosen(drawn)) if moving else None,
-        reference=known,
-        truth=_truth(problem, known),
+    groups = [
+        (title_of(key, members), members)
+        for key in GROUPS
+        if (members := [row for row in table if row.group == key])
+    ]
+    summary = [*words.summary(records), *([words.WITNESSES] if ensemble is not None else [])]
+    title = f"{problem.title}{at_once(ensemble)}"
+    unrun = Details(
+        f"{len(missing)} cases on this problem have no result yet",
+        [Items([f"`{case.method}`" for case in missing])],
     )
+    truth = _truth(problem, known)
+    blocks: list[Block] = [
+        *([Items(summary, "cards")] if summarized else []),
+        *([Items(truth)] if truth else []),
+        *([unrun] if missing else []),
+        *_figures(problem, drawn, known, number, brief=brief),
+        Section("What our own methods do wrong", [Items(words.shortcomings(records))], f"wrong-{number}"),
+    ]
+    section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
+    return ProblemPart(problem, Ranked(title, repr(problem), groups), summary, section)
 
 
-def _pictures(
+def _figures(
     problem: Problem, cases: Sequence[Drawn], known: Reference | None, number: int, *, brief: bool
-) -> list[Picture]:
+) -> list[Block]:
     suffix = "" if number == 1 else f"-{number}"  # file names and anchors are unique in a report
-    if brief:
-        main = telling(cases)
+    main = telling(cases) if brief else cases
+    left = len(cases) - len(main)
+    note = f" Drawn: {len(main)} of {len(cases)} cases, the best and the default of each method." * (left > 0)
+
+    def finished(make: Callable[[], Any]) -> Picture | None:
         with drawing():
-            made = [
-                work_precision(cases),
-                drift_figure(main),
-                over_time.over_time(main, OVER_TIME[0]),
-                portraits.portrait(problem, main),
-                portraits.section(problem, main),
-            ]
-        left = len(cases) - len(main)
-        note = f" Drawn: {len(main)} of {len(cases)} cases, the best and the default of each method." * (
-            left > 0
-        )
-        return [
-            replace(p, key=p.key + suffix, caption=p.caption + ("" if p.key == "work-precision" else note))
-            for p in made
-            if p is not None
-        ]
-    with drawing():
-        made = [work_precision(cases), drift_figure(cases)]
-        made += [over_time.over_time(cases, what) for what in OVER_TIME]
-        made += [over_time.over_time(cases, what) for what in _other_invariants(cases)]
-        made += [portraits.portrait(problem, cases), portraits.section(problem, cases)]
-        if problem.name == "sitnikov":
-            made.insert(2, motion.still(cases, "The system in space"))
-        made += [view(problem, cases, known) for view in views.VIEWS.get(problem.name or "", ())]
-        made.append(views.step_sizes(cases))
-    return [replace(picture, key=picture.key + suffix) for picture in made if picture is not None]
+            made: Picture | None = make()
+        if made is None:
+            return None
+        caption = made.caption + ("" if made.key == "work-precision" else note)
+        return replace(made, key=made.key + suffix, caption=caption)
+
+    makers = _makers(problem, cases, main, known, brief=brief)
+    return attempt(*((f"{title}, {problem!r}", partial(finished, make)) for title, make in makers))
+
+
+def _makers(
+    problem: Problem, cases: Sequence[Drawn], main: Sequence[Drawn], known: Reference | None, *, brief: bool
+) -> list[Maker]:
+    """Return what draws each figure, in order; a new one is a line here."""
+
+    def errors(what: OverTime) -> Maker:
+        return what.title, lambda: over_time.over_time(main, what)
+
+    sitnikov = problem.name == "sitnikov"
+    made: list[Maker] = [
+        ("Work and precision", lambda: work_precision(cases)),
+        ("Drift of the energy", lambda: drift_figure(main)),
+    ]
+    if sitnikov and not brief:
+        made.append(("The system in space", lambda: motion.still(cases, "The system in space")))
+    made += [errors(what) for what in (OVER_TIME[:1] if brief else (*OVER_TIME, *_other_invariants(cases)))]
+    made += [
+        ("Phase portrait", lambda: portraits.portrait(problem, main)),
+        ("Section", lambda: portraits.section(problem, main)),
+    ]
+    if not brief:
+        own = views.VIEWS.get(problem.name or "", ())
+        made += [("A view of this problem", lambda view=view: view(problem, cases, known)) for view in own]
+        made.append(("Step sizes", lambda: views.step_sizes(cases)))
+    return made
 
 
 def telling(cases: Sequence[Drawn]) -> list[Drawn]:
@@ -265,23 +257,23 @@ def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
     return (series["t"], series[names[0]]) if names else None
 
 
-def _truth(problem: Problem, known: Reference | None) -> list[tuple[str, str]]:
+def _truth(problem: Problem, known: Reference | None) -> list[str]:
+    """Return what is known of the trusted solution, as far as the table's readers want it."""
     if known is None:
         return []
     made = known.provenance
-    text = f"{made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"
+    said = [f"Reference: {made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"]
     floor = problem.errors(known.high, known.t)
     least = ", ".join(
         f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}"
         for name in ("energy", "angular_momentum")
         if name in floor
     )
-    values = [("Reference", text)]
     if least:
-        values.append(
-            ("Errors of the reference itself once rounded to doubles, the least a run can show", least)
+        said.append(
+            f"Errors of the reference itself once rounded to doubles, the least a run can show: {least}"
         )
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
         z = known.high[-1, PLANETOID_Z]
-        values.insert(0, (f"Reference value of z at t = {problem.t_end:g}", f"{z:.16g}"))
-    return values
+        said.insert(0, f"Reference value of z at t = {problem.t_end:g}: {z:.16g}")
+    return said

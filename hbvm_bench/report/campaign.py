@@ -1,0 +1,342 @@
+"""The report of a campaign: everything that its stores say, as one document."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.report import overview, provenance, words
+from hbvm_bench.report.document import (
+    Block,
+    Commands,
+    Details,
+    Document,
+    Files,
+    Items,
+    Notice,
+    Results,
+    Section,
+    attempt,
+)
+from hbvm_bench.report.figures.style import looks, method_name
+from hbvm_bench.report.problem import ProblemPart, part
+from hbvm_bench.store.files import csv_of, json_of
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Store, again, damage, progress
+from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries.rows import columns, group_of, status_of, tasks
+from hbvm_bench.summaries.table import Table
+from problems.errors import InputError
+
+Series = dict[str, NDArray[np.float64]]
+
+# A report of more than these draws only its main figures.
+BRIEF_PROBLEMS = 3
+BRIEF_CASES = 150
+
+FEW = 3  # problems whose summaries all stand at the top
+LISTED = 12  # cases without a rank that are listed at once; more are folded away
+KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One of the runs that a report is made of.
+
+    Attributes
+    ----------
+    title, description, command, version
+        Of its campaign.
+    planned : int
+        How many cases it has.
+    missing : list of Case
+        Those that have no result yet.
+    """
+
+    title: str
+    description: str
+    command: str
+    version: str
+    planned: int
+    missing: list[Case]
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the stores of one or more runs hold: the runs, and every case with its series."""
+
+    runs: list[Run]
+    found: list[tuple[Record, Series]]
+
+    @property
+    def records(self) -> list[Record]:
+        """All cases."""
+        return [record for record, _ in self.found]
+
+
+def gather(stores: Sequence[Store]) -> Gathered:
+    """Read the stores of one or more runs.
+
+    A case that several runs have is taken from the one that got further with it
+    (`hbvm_bench.store.store.progress`).
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a directory holds no run, or no run has a finished case.
+    """
+    indices = [store.index() for store in stores]
+    furthest: dict[str, tuple[Record, Store]] = {}
+    for store in stores:
+        for record in store.records():
+            if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
+                furthest[record.id] = (record, store)
+    if not furthest:
+        raise InputError(
+            f"none of the {sum(len(index.ids) for index in indices)} cases of the run in "
+            f"{str(stores[0].directory)!r} has finished; {again(indices[0], stores[0].directory)}."
+        )
+    runs = [
+        Run(
+            title=index.campaign.title or index.campaign.name,
+            description=" ".join(index.campaign.description.split()),
+            command=index.command,
+            version=index.version,
+            planned=len(index.ids),
+            missing=[case for number, case in index.listed() if number not in furthest],
+        )
+        for index in indices
+    ]
+    return Gathered(runs, [_read(record, store) for record, store in furthest.values()])
+
+
+def document(stores: Store | Sequence[Store]) -> Document:
+    """Return the report on one or more runs.
+
+    Raises
+    ------
+    problems.errors.InputError
+        See `gather`.
+    """
+    gathered = gather([stores] if isinstance(stores, Store) else stores)
+    runs, records = gathered.runs, gathered.records
+    series = {record.id: (record, series) for record, series in gathered.found}
+    look = looks(record.case.method for record in records)
+    missing = [case for run in runs for case in run.missing]
+    printed = {case.problem: repr(make_problem(case.problem)) for case in missing}  # as the records have it
+    tables = tasks(records)
+    brief = len(tables) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES
+    parts = [
+        part(
+            text,
+            [series[record.id] for record in members],
+            look,
+            [case for case in missing if (printed[case.problem], case.ensemble) == (text, ensemble)],
+            number,
+            brief=brief,
+            summarized=len(tables) > FEW,
+        )
+        for number, ((text, ensemble), members) in enumerate(tables.items(), 1)
+    ]
+    one = len(runs) == 1
+    title = runs[0].title if one else f"{len(runs)} runs together: {'; '.join(run.title for run in runs)}"
+    overall = _overall(records, several=len(parts) > 1)
+    return Document(
+        title,
+        [runs[0].description] if one else [],
+        [
+            *(overall if len(parts) > 1 else []),
+            _results(parts, runs, records),
+            *(overall if len(parts) == 1 else []),
+            *(one.section for one in parts),
+            _fairness(records),
+            Section(
+                "Raw data",
+                attempt(("the results as files", partial(_files, title, runs, records))),
+                "data-files",
+                nav="Data",
+            ),
+            _again(runs, records),
+            Section("Sources", [Items(_sources(parts))], "sources"),
+        ],
+        list(look.values()),
+        name="report.md",
+    )
+
+
+def _read(record: Record, store: Store) -> tuple[Record, Series]:
+    """Return a record and its series; where these are damaged, none and a remark."""
+    series = store.series(record.id)
+    why = damage(record, series, make_problem(record.case.problem).system.dim)
+    if not why:
+        return record, series
+    said = f"its series in the store are damaged ({why}): not drawn"
+    note = "; ".join(text for text in (record.case.note, said) if text)
+    return replace(record, case=replace(record.case, note=note)), {}
+
+
+def _overall(records: Sequence[Record], *, several: bool) -> list[Block]:
+    """Return what the cases say together."""
+    title = "Over all problems" if several else "Which integrator to take"
+    look = looks(record.case.method for record in records)
+    numbers: dict[str, int] = {}
+    for record in records:
+        numbers.setdefault(method_name(record), look[record.case.method].number)
+    made = attempt(
+        ("which integrator for which need", partial(overview.needed, records)),
+        ("which integrator on which problem", partial(overview.outcome, records)),
+        ("the law of the energy's drift", partial(overview.drifting, records)),
+        ("performance profiles", partial(overview.profiles, records, numbers)),
+    )
+    return [Section(title, made, "overview", nav="Over all problems" * several)] if made else []
+
+
+def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequence[Record]) -> Section:
+    """Return what came out: the sentences where there are few, and every case as a row."""
+    blocks: list[Block] = [
+        Notice(
+            f"{len(run.missing)} of {run.planned} cases have no result yet",
+            f"({run.title}). To run them: `{run.command}`",
+        )
+        for run in runs
+        if run.missing
+    ]
+    if len(parts) == 1:
+        blocks.append(Items(parts[0].summary, "cards"))
+    elif len(parts) <= FEW:
+        blocks += [
+            Section(one.ranked.title, [Items(one.summary, "cards")], f"summary-{i}", code=one.ranked.problem)
+            for i, one in enumerate(parts, 1)
+        ]
+    else:
+        counts: Counter[str] = Counter()
+        for one in parts:
+            for title, rows in one.ranked.groups:
+                counts[title.split(",")[0].split(":")[0].lower()] += len(rows)
+        said = ", ".join(f"{what}: {count}" for what, count in counts.items())
+        blocks.append(f"{len(records)} cases on {len(parts)} problems; {said}.")
+    shown = columns(records)
+    meaning = Table(
+        "",
+        ("column", "unit", "meaning"),
+        [
+            (metric.short, metric.unit or "–", f"{metric.label}. {metric.description}")
+            for metric in METRICS.values()
+        ],
+        words=(0, 1, 2),
+    )
+    look = looks(record.case.method for record in records)
+    blocks += [
+        Results(shown, [one.ranked for one in parts], look),
+        Details("What the columns mean", [meaning]),
+    ]
+    return Section("What came out", blocks, "results", nav="Results")
+
+
+def _fairness(records: Sequence[Record]) -> Section:
+    """Return the rules, the settings of each method, and what was excluded."""
+    rules = (*words.RULES, *fairness.sentences(records), *provenance.processors(records))
+    settings = Table(
+        "How many settings each method has",
+        ("method", "library", "settings", *KINDS),
+        [
+            (name, library, str(sum(kinds.values())), *(str(kinds.get(kind, 0)) for kind in KINDS))
+            for name, library, kinds in words.settings_count(records)
+        ],
+        words=(0, 1),
+    )
+    excluded = words.excluded(records)
+    left_out = Details(
+        f"{len(excluded)} cases that take part in no ranking, and why",
+        [Items(excluded)],
+        open=len(excluded) <= LISTED,
+    )
+    return Section(
+        "Fairness: the rules, the settings, what was excluded",
+        [
+            Items(rules, "numbered"),
+            settings,
+            *attempt(provenance.PEERS),
+            *([left_out] if excluded else []),
+        ],
+        "fairness",
+        nav="Fairness",
+    )
+
+
+def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
+    days = provenance.days(records)
+    return Section(
+        "Run it again",
+        [
+            Commands("\n".join(run.command for run in runs)),
+            f"Measured{f' on {days}' if days else ''} with hbvm-bench {runs[0].version}. "
+            "`hbvm-bench show DIRECTORY --json` prints every number with all timing samples; "
+            "`hbvm-bench report DIRECTORY` draws this report again without running anything.",
+            *provenance.facts(dict(provenance.machines(records)), dict(provenance.versions(records))),
+        ],
+        "again",
+        nav="Run it again",
+    )
+
+
+def _sources(parts: Sequence[ProblemPart]) -> list[str]:
+    references = dict.fromkeys(text for one in parts for text in one.problem.references)
+    return [*references, "`hbvm-bench cite` prints how the authors of the methods ask to be cited."]
+
+
+def _files(title: str, runs: Sequence[Run], records: Sequence[Record]) -> Files:
+    return Files(
+        "Every case with every metric, every reason and every timing sample",
+        {
+            "data/results.csv": results_csv(records),
+            "data/results.json": json_of(results_json(title, runs, records)),
+        },
+    )
+
+
+def results_csv(records: Sequence[Record]) -> bytes:
+    """Return one line per case: what it is, how it ended, every metric, and the quartiles of the time."""
+    keys = [key for key in METRICS if any(key in record.result.metrics for record in records)]
+    first = ("problem", "method", "library", "settings", "group", "status", "reason", "t_stop")
+    rows: list[tuple[str, ...]] = [
+        (*first, *keys, *(f"{key}_void" for key in keys), "time_q1", "time_q3", "time_samples")
+    ]
+    for record in records:
+        result, values = record.result, record.result.metrics
+        summary = record.timing.summary if record.timing is not None else {}
+        numbers = (values[key].value if key in values else None for key in keys)
+        rows.append(
+            (
+                *(record.case.problem, record.case.method, record.library, record.case.settings),
+                *(group_of(record), status_of(record), result.reason or result.violation),
+                "" if result.t_stop is None else repr(result.t_stop),
+                *("" if number is None else repr(number) for number in numbers),
+                *("void" if key in values and values[key].void else "" for key in keys),
+                *("" if q not in summary else repr(summary[q]) for q in ("q1", "q3")),
+                " ".join(map(repr, record.timing.samples)) if record.timing is not None else "",
+            )
+        )
+    return csv_of(rows)
+
+
+def results_json(title: str, runs: Sequence[Run], records: Sequence[Record]) -> dict[str, Any]:
+    """Return all records as JSON values, with what they were made by."""
+    return {
+        "title": title,
+        "runs": [{"command": run.command, "version": run.version} for run in runs],
+        "metrics": {
+            metric.key: {"label": metric.label, "unit": metric.unit, "description": metric.description}
+            for metric in METRICS.values()
+        },
+        "cases": [msgspec.to_builtins(record) for record in records],
+    }

@@ -1,0 +1,261 @@
+"""What every report is made of: blocks, which `markdown` and `html` print, each in its way.
+
+A text is a ``str``. What stands between backquotes in it is code; nothing else in it means anything.
+A report is a `Document`, a paragraph of it is a text, and everything else is one of the blocks below, a
+`Table` or a `Picture`. A picture is described once, where it is drawn: its title, caption and numbers.
+"""
+
+import re
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from hbvm_bench.measure.metrics import Metric
+from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.figures.style import Look
+from hbvm_bench.store.files import csv_of
+from hbvm_bench.summaries.rows import Row
+from hbvm_bench.summaries.table import Table
+
+VERDICTS = {"holds": "confirmed", "partly": "confirmed in part", "no": "not found"}
+
+
+@dataclass(frozen=True)
+class Note:
+    """A paragraph in small print."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A paragraph that a reader must not miss: in short, and what to know of it."""
+
+    head: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list; ``cards`` are the few sentences that stand out, side by side where there is room."""
+
+    items: Sequence[str]
+    kind: Literal["plain", "numbered", "cards"] = "plain"
+
+
+@dataclass(frozen=True)
+class Commands:
+    """What to type, a command a line."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of a publication beside what was measured.
+
+    Attributes
+    ----------
+    words : str
+        The claim.
+    paper : str
+        What the publication gives for it: a number, a figure.
+    here : str
+        What came out.
+    verdict : {"holds", "partly", "no"}
+        See `VERDICTS`.
+    """
+
+    words: str
+    paper: str
+    here: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Claims:
+    """Claims in groups, each group with its title and the anchor of the section that it is of."""
+
+    groups: Sequence[tuple[str, str, Sequence[Claim]]]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """The rows of one problem: its title, how it is written, and its groups of rows with their titles."""
+
+    title: str
+    problem: str
+    groups: Sequence[tuple[str, Sequence[Row]]]
+
+
+@dataclass(frozen=True)
+class Results:
+    """Cases as rows, which a page sorts and filters.
+
+    Attributes
+    ----------
+    columns : sequence of Metric
+        What is shown of every case.
+    problems : sequence of Ranked
+        The rows; of the i-th, counted from 1, the section has the anchor ``problem-i``.
+    looks : mapping of str to Look
+        By method.
+    """
+
+    columns: Sequence[Metric]
+    problems: Sequence[Ranked]
+    looks: Mapping[str, Look]
+
+
+@dataclass(frozen=True)
+class Files:
+    """Files to save, by their path beside the document; ``None`` for those that lie there already."""
+
+    text: str
+    files: Mapping[str, bytes | None]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A part that could not be made, and why."""
+
+    title: str
+    reason: str
+    trace: str = ""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Blocks that a page folds away behind a line of words."""
+
+    summary: str
+    blocks: Sequence["Block"]
+    open: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """Blocks under a heading.
+
+    Attributes
+    ----------
+    title : str
+        The heading.
+    blocks : sequence of Block
+        What stands under it.
+    key : str
+        Its anchor.
+    code : str
+        What stands after the title as code, such as the problem.
+    nav : str
+        What a page's navigation calls it; empty for what is not in there.
+    """
+
+    title: str
+    blocks: Sequence["Block"]
+    key: str
+    code: str = ""
+    nav: str = ""
+
+
+Block = (
+    str | Note | Notice | Items | Commands | Claims | Results | Files | Failed | Details | Section
+    | Table | Picture
+)  # fmt: skip
+
+
+Maker = tuple[str, Callable[[], Block | Sequence[Block] | None]]
+"""What makes a block, or several, or none, with its name for the case that it fails."""
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report.
+
+    Attributes
+    ----------
+    title : str
+        Its heading.
+    lead : sequence of str
+        Paragraphs before everything else.
+    blocks : sequence of Block
+        The rest.
+    looks : sequence of Look
+        Of what has a colour in its figures; no two have one number.
+    names : mapping of int to str
+        What the legends of the page call a look by its number, where that is not what its curves
+        are called.
+    name : str
+        Of the file with the markdown.
+    """
+
+    title: str
+    lead: Sequence[str]
+    blocks: Sequence[Block]
+    looks: Sequence[Look] = ()
+    names: Mapping[int, str] = field(default_factory=dict)
+    name: str = "README.md"
+
+    def walk(self) -> Iterator[Block]:
+        """Yield every block, in order; what holds blocks comes before them."""
+        waiting = list(reversed(self.blocks))
+        while waiting:
+            block = waiting.pop()
+            yield block
+            if isinstance(block, Section | Details):
+                waiting.extend(reversed(block.blocks))
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """All figures, in order."""
+        return [block for block in self.walk() if isinstance(block, Picture)]
+
+    @property
+    def failed(self) -> list[Failed]:
+        """What could not be made."""
+        return [block for block in self.walk() if isinstance(block, Failed)]
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """What lies beside the documents, by path: figures, their numbers, tables with a key, data."""
+        made: dict[str, bytes] = {}
+        for block in self.walk():
+            if isinstance(block, Picture):
+                made |= block.files
+            elif isinstance(block, Table) and block.key:
+                made[f"data/{block.key}.csv"] = csv_of([block.flat_head, *block.rows])
+            elif isinstance(block, Files):
+                made |= {path: data for path, data in block.files.items() if data is not None}
+        return made
+
+
+def attempt(*makers: Maker) -> list[Block]:
+    """Return the blocks that are made; in the place of one that raises, a `Failed` that says so.
+
+    A report is made once, after hours of computing: one figure that cannot be drawn must not
+    take the others with it.
+    """
+    made: list[Block] = []
+    for title, make in makers:
+        try:
+            found = make()
+        except Exception as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            found = Failed(title, reason, traceback.format_exc())
+        if isinstance(found, Sequence) and not isinstance(found, str):
+            made.extend(found)
+        elif found is not None:
+            made.append(found)
+    return made
+
+
+def pieces(text: object) -> list[tuple[str, bool]]:
+    """Return a text on one line in pieces, each with whether it is code."""
+    split = re.split(r"`([^`]+)`", " ".join(str(text).split()))
+    return [(piece, i % 2 == 1) for i, piece in enumerate(split) if piece]
+
+
+def is_call(text: str) -> bool:
+    """Whether a cell of a table is the call of a method or of a problem, which is set as code."""
+    return re.fullmatch(r"[A-Za-z_]\w*\(.*\)", text) is not None

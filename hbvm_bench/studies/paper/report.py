@@ -1,0 +1,122 @@
+"""The report on the seed paper's experiments, from kept results alone: claim, paper, here."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Protocol
+
+from hbvm_bench.report.document import (
+    Claim,
+    Claims,
+    Commands,
+    Document,
+    Files,
+    Maker,
+    Section,
+    attempt,
+)
+from hbvm_bench.store.files import csv_of
+from hbvm_bench.studies.paper import (
+    henon_heiles_part,
+    period_annulus_part,
+    properties_part,
+    sitnikov_part,
+)
+from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
+from hbvm_bench.studies.paper.results import NAME, Found, Kept, Results, Task
+
+
+class Part(Protocol):
+    """One of the paper's experiments: a module that computes, draws and says."""
+
+    @property
+    def KEY(self) -> str:
+        """Its name on the command line and its anchor."""
+        ...
+
+    @property
+    def TITLE(self) -> str:
+        """Its heading."""
+        ...
+
+    @staticmethod
+    def tasks() -> list[Task]:
+        """Return the computations."""
+        ...
+
+    @staticmethod
+    def claims(results: Results) -> list[Claim]:
+        """Return what the paper says and what came out."""
+        ...
+
+    @staticmethod
+    def blocks(results: Results) -> list[Maker]:
+        """Return what is shown: what makes each block, with its name."""
+        ...
+
+
+PARTS: tuple[Part, ...] = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
+KEYS = tuple(part.KEY for part in PARTS)
+
+
+def tasks(keys: Sequence[str] = KEYS) -> list[Task]:
+    """Return the computations of the named parts."""
+    return [task for part in PARTS if part.KEY in keys for task in part.tasks()]
+
+
+def document(kept: Kept, keys: Sequence[str] = KEYS) -> Document:
+    """Return the report on the named parts."""
+    parts = [part for part in PARTS if part.KEY in keys]
+    results = Found(tasks(keys), kept)
+
+    def claims(part: Part) -> Claims:
+        return Claims([(part.TITLE, part.KEY, part.claims(results))])
+
+    made = attempt(*((f"the claims of {part.TITLE}", partial(claims, part)) for part in parts))
+    groups = [group for block in made if isinstance(block, Claims) for group in block.groups]
+    rows = [(title, c.words, c.paper, c.here, c.verdict) for title, _, found in groups for c in found]
+    table = csv_of([("part", "claim", "paper", "here", "verdict"), *rows])
+    return Document(
+        "The seed paper, run again",
+        [
+            "Every experiment, figure and table of the paper from one command, beside what the paper says. "
+            "Where the two differ, the difference is explained; where the paper is silent, it is measured.",
+            "L. Brugnano, F. Iavernaro, T. Susca: Numerical comparisons between Gauss–Legendre methods and "
+            "Hamiltonian BVMs defined over Gauss points",
+        ],
+        [
+            Section(
+                "Claim, paper, here",
+                [Claims(groups), *(block for block in made if not isinstance(block, Claims))],
+                "all-claims",
+                nav="Claims",
+            ),
+            *(
+                Section(part.TITLE, attempt(*part.blocks(results)), part.KEY, nav=part.TITLE)
+                for part in parts
+            ),
+            Section(
+                "Raw data",
+                [
+                    Files("All claims", {"data/claims.csv": table}),
+                    Files("What every computation returned (MessagePack)", {NAME: None}),
+                ],
+                "data-files",
+                nav="Data",
+            ),
+            Section(
+                "Run it again",
+                [
+                    Commands(kept.command),
+                    "Everything is computed anew, by the same integrators that the bench compares, and takes "
+                    "one to two minutes on two cores; `hbvm-bench paper --redraw --out DIRECTORY` draws this "
+                    "report again without running anything. The same machine and versions give the same "
+                    "bytes; elsewhere the last digits of what depends on the last bit will differ.",
+                ],
+                "again",
+                nav="Run it again",
+            ),
+        ],
+        LOOKS,
+        NAMES,
+        name="report.md",
+    )
