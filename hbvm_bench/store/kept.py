@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from hbvm_bench.store.files import write_json
+from hbvm_bench.store.files import ensure_writable, write_json
 from hbvm_bench.store.records import SCHEMA, Record, decoded
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -66,9 +66,23 @@ def of(store: Store, name: str) -> Kept:
     return Kept(index=index, records=records)
 
 
-def save(kept: list[Kept], path: Path) -> None:
-    """Write runs into one file, all of them or nothing."""
-    write_json(path, kept)
+def keep(run: Kept, path: Path, name: str) -> None:
+    """Write a run into one file, beside the problems in it that were not run this time.
+
+    Those keep the machine, the versions, the command and the date that they were measured with.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the directory cannot be written, or what lies there is something else.
+    """
+    ensure_writable(path.parent)
+    again = {one.case.problem for one in run.records}
+    old = [
+        msgspec.structs.replace(one, records=[kept for kept in one.records if kept.case.problem not in again])
+        for one in (load(path, name) if path.is_file() else [])
+    ]
+    write_json(path, [*(one for one in old if one.records), run])
 
 
 def load(path: Path, name: str) -> list[Kept]:
