@@ -38,7 +38,7 @@ $(STAMP): FORCE
 	  echo "$$lock" > $(VENV)/.locked || exit 1; \
 	fi; \
 	if [ "$$(cat $@ 2>/dev/null)" != "$$project" ]; then \
-	  $(PIP) --no-build-isolation --no-deps -e . && echo "$$project" > $@; \
+	  $(PIP) --no-build-isolation --no-deps -e . && echo "$$project" > $@ && $(BIN)/hbvm-bench warm; \
 	fi
 .PHONY: FORCE
 FORCE:

@@ -29,6 +29,7 @@ app = typer.Typer(
 
 # Commands with an implementation of their own; each is imported only when it is asked for.
 SEPARATE = {
+    "advise": "hbvm_bench.commands.advise",
     "automatic": "hbvm_bench.commands.automatic",
     "race": "hbvm_bench.commands.race",
     "endure": "hbvm_bench.commands.endure",
@@ -44,6 +45,7 @@ SEPARATE = {
     "merge": "hbvm_bench.commands.merge",
     "plugins": "hbvm_bench.commands.plugins",
     "run": "hbvm_bench.commands.run",
+    "warm": "hbvm_bench.commands.warm",
 }
 
 

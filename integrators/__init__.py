@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 from integrators import registry
 from integrators.integrate import integrate
 from integrators.protocol import MethodBase, Samples, Stats, Status
-from integrators.solution import Solution
+from integrators.solution import Solution, load
+from integrators.watch import Progress
 
 if TYPE_CHECKING:
+    from integrators.advice import advise as advise
     from integrators.events import Event as Event
     from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
@@ -20,10 +22,21 @@ if TYPE_CHECKING:
     from integrators.order import order_of as order_of
     from integrators.order import stability as stability
 
-__all__ = ["MethodBase", "Samples", "Solution", "Stats", "Status", "integrate", "registry"]
+__all__ = [
+    "MethodBase",
+    "Progress",
+    "Samples",
+    "Solution",
+    "Stats",
+    "Status",
+    "integrate",
+    "load",
+    "registry",
+]
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",
+    "advise": "integrators.advice",
     "order_of": "integrators.order",
     "section": "integrators.events",
     "stability": "integrators.order",

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from integrators.caveats import blind, unseen
 from integrators.hbvm import HBVM, Solver
@@ -99,6 +100,11 @@ class Gauss(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
+        made = self._compiled(system)
+        made.method = self
+        return made
+
+    def _compiled(self, system: System) -> Any:
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 

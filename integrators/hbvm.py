@@ -192,11 +192,6 @@ class HBVM(MethodBase):
         return {name: value for name, value in self.options().items() if name in names}
 
     def _refusal(self, system: System) -> str | None:
-        if system.kind == "poisson" and (given := self.control()):
-            return (
-                f"the steps that keep a Poisson system's energy do not take {', '.join(given)}; "
-                "leave that out, or use Gauss."
-            )
         if system.kind != "poisson" or self.solver in ("auto", "fixed_point"):
             return None
         return (
@@ -208,23 +203,26 @@ class HBVM(MethodBase):
         """Compile the vector field of ``system``, and the kernel if this machine has not yet."""
         if (refusal := self._refusal(system)) is not None:
             raise InputError(refusal)
+        made = self._compiled(system)
+        made.method = self
+        return made
+
+    def _compiled(self, system: System) -> Any:
         k, s, defect = self.k, self.s, None
         if k is None or s is None:
             from integrators.automatic import choose
 
             assert self.tol is not None
             k, s, defect = choose(system, self.tol)
-        if system.kind == "poisson":
-            from integrators.kernel.line.program import LineProgram
-
-            return LineProgram(system, k=k, s=s, h=self.h, tol=self.tol)
+        keep = () if system.kind == "poisson" else None
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
             return AdaptiveProgram(
-                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, **self.control()
-            )
+                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
+                **self.control(),
+            )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None
-        return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver)
+        return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver, keep=keep)

@@ -1,26 +1,33 @@
 """Integrate a problem with a method: the one function most users need."""
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
 from integrators.protocol import (
+    SAMPLINGS,
     Array,
     MethodBase,
     Samples,
+    Stats,
     Status,
+    Stepper,
     UserError,
     as_numbers,
     check_problem,
     check_times,
 )
 from integrators.solution import Solution
+from integrators.watch import Bar, Pieces, Report, Watch, identity, read
 from problems import limits
-from problems.errors import InputError
+from problems.checks import Must, checked
+from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.systems.untraced import Foreign
 
@@ -29,6 +36,7 @@ if TYPE_CHECKING:
     from integrators.events.search import Found
 
 DEFAULT_SAMPLES = 1001
+NotNegative = Annotated[float, Must("a number of seconds, 0 or more", lambda x: x >= 0)]
 
 
 def integrate(
@@ -37,8 +45,15 @@ def integrate(
     times: ArrayLike | None = None,
     sample: str | None = None,
     events: "Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]]" = (),
+    *,
+    progress: bool | Report = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    every_seconds: float = 60.0,
+    resume: str | os.PathLike[str] | None = None,
 ) -> Solution:
     """Integrate ``problem`` with ``method`` and return the states at ``times``.
+
+    Ctrl-C ends the integration: what was reached is returned, with the status ``INTERRUPTED``.
 
     Parameters
     ----------
@@ -57,6 +72,18 @@ def integrate(
         `integrators.events.Event`. They change nothing of the steps and samples, but a
         terminal event ends them. Finding them takes every step once more (twice where
         the steps vary); ``stats.extra["event_search"]`` counts that work.
+    progress : bool or callable, optional
+        True: a bar on the terminal, if there is one. A function: it is called about ten times a second
+        with an `integrators.watch.Progress`.
+    checkpoint : path, optional
+        A file that is written every so many seconds, when the integration ends, and at Ctrl-C: what the
+        continuation depends on, and the samples until then. It is always whole, whenever the process ends.
+    every_seconds : float
+        Seconds from one file to the next, at least.
+    resume : path, optional
+        Go on from the checkpoint in this file, of the same problem, method, times, sampling and events: the
+        solution has the same bits as without the break. If there is no such file and ``checkpoint`` is
+        the same path, begin at the beginning. Only give a file that you made: it is a pickle.
 
     Returns
     -------
@@ -65,8 +92,8 @@ def integrate(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or for times, samplings, events and
-        initial states that cannot be used.
+        If the method does not accept the problem, or for times, samplings, events,
+        initial states and files that cannot be used.
     Exception
         What a `problems.Foreign` field raises in the very first step. Later errors, and those of an event's
         function, end the integration as ``USER_ERROR``, with the trajectory up to there.
@@ -74,33 +101,60 @@ def integrate(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
+    if not isinstance(sample, str | None):
+        raise unknown("sampling", sample, SAMPLINGS)
+    if not callable(progress) and not isinstance(progress, bool):
+        raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
+    seconds = checked("integrate", "every_seconds", every_seconds, NotNegative)
+    if progress is True:
+        with Bar() as bar:
+            return integrate(
+                problem, method, times, sample, events,
+                progress=bar, checkpoint=checkpoint, every_seconds=seconds, resume=resume,
+            )  # fmt: skip
     program = method.compile(problem.system)
     grid = _grid(problem, times)
-    found = None
+    found, looked_for = None, {}
     if not isinstance(events, Sequence) or events:
         from integrators.events.event import named
-        from integrators.events.search import search
 
         if sample == "land":
             raise InputError(
                 "events are those of the method's own steps, which sample='land' changes; use 'side'."
             )
-        found = search(problem, method, program, named(events), float(check_times(grid, problem.t0)[-1]))
+        looked_for = named(events)
+    end = float(check_times(grid, problem.t0)[-1]) if grid.size or looked_for else problem.t0
+    path = None if checkpoint is None else Path(checkpoint)
+    kept, belongs = {}, {}
+    if path is not None or resume is not None:
+        belongs = identity(problem, method, grid, sample, looked_for)
+    if resume is not None and (Path(resume) != path or Path(resume).exists()):
+        kept = read(resume, belongs)
+    report = progress or None
+    watch = Watch(problem.t0, end, 1 + bool(looked_for), report, path, seconds, belongs)
+    if looked_for:
+        from integrators.events.search import search
+
+        found = kept.get("found")
+        if found is None:
+            found = search(problem, method, program, looked_for, end, watch.look, kept.get("search"))
+        watch.phase = 1
         if found.status is Status.EVENT:
             grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
+        if found.status is Status.INTERRUPTED:
+            grid = grid[:0]
     try:
         stepper = program.start(problem.y0, problem.par, problem.t0)
     except UserError as raised:
         raise raised.error from None
-    samples = Samples(grid, np.empty((0, problem.system.dim)), Status.FINISHED)
-    error: Exception | None = None
-    if grid.size:
-        samples = stepper.advance(grid, sample=sample)
-        error = getattr(stepper, "error", None)
-        if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
-            raise error
+    way = _Way(stepper, grid, sample, kept.get("way"))
+    way.go(watch, {} if found is None else {"found": found})
+    watch.write()
+    samples, stats = way.samples, way.stats
+    error: Exception | None = getattr(stepper, "error", None)
+    if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
+        raise error
     finished = samples.status is Status.FINISHED
-    stats = replace(stepper.stats)
     if isinstance(problem.system, Foreign):
         stats.extra = {**stats.extra, "field": problem.system.written}
     solution = Solution(
@@ -108,7 +162,7 @@ def integrate(
         y=samples.y,
         status=samples.status,
         reason=samples.reason,
-        t_stop=float(samples.t[-1]) if finished and samples.t.size else stepper.t,
+        t_stop=float(samples.t[-1]) if finished and samples.t.size else way.t,
         stats=stats,
         compile_seconds=program.compile_seconds,
         from_cache=program.from_cache,
@@ -117,6 +171,98 @@ def integrate(
         error=error,
     )
     return solution if found is None else _with_events(solution, found)
+
+
+class _Way:
+    """The samples of a trajectory, made piece by piece, with the very bits of one call of ``advance``.
+
+    Parameters
+    ----------
+    stepper : Stepper
+        At the start.
+    grid : ndarray, shape (n,)
+        Times asked for.
+    sample : str or None
+        The sampling.
+    kept : mapping, optional
+        What `save` returned, of the same integration: it goes on from there.
+    """
+
+    def __init__(self, stepper: Stepper, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
+        self._stepper, self._grid, self._sample = stepper, grid, sample
+        self._t, self._y = [grid[:0]], [np.empty((0, stepper.y.size))]
+        self._made, self._before = 0, Stats()
+        self._status, self._reason = Status.FINISHED, ""
+        self.t = stepper.t
+        if kept is not None:
+            stepper.restore(kept["stepper"])
+            self._t, self._y, self._made, self._before = [kept["t"]], [kept["y"]], kept["made"], kept["stats"]
+            self._status, self._reason, self.t = kept["status"], kept["reason"], kept["here"]
+
+    @property
+    def samples(self) -> Samples:
+        """All until now."""
+        return Samples(np.concatenate(self._t), np.concatenate(self._y), self._status, self._reason)
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of all the work, that before a break too."""
+        now, before = replace(self._stepper.stats), self._before
+        for name in ("steps", "rejections", "evaluations", "iterations"):
+            counts = [count for count in (getattr(now, name), getattr(before, name)) if count is not None]
+            setattr(now, name, sum(counts) if counts else None)
+        return now
+
+    def save(self) -> dict[str, Any]:
+        """Return what the continuation depends on."""
+        samples = self.samples
+        self._t, self._y = [samples.t], [samples.y]
+        return {
+            "stepper": self._stepper.checkpoint(), "t": samples.t, "y": samples.y, "made": self._made,
+            "stats": self.stats, "status": self._status, "reason": self._reason, "here": self.t,
+        }  # fmt: skip
+
+    def go(self, watch: Watch, also: Mapping[str, Any]) -> None:
+        """Go to the end, a failure or Ctrl-C; ``watch`` looks after each piece, and keeps ``also`` too."""
+        grid, ways = self._grid, getattr(self._stepper, "samplings", SAMPLINGS)
+        walks = watch.looks and "steps" in ways and self._sample != "land"
+        walks = walks and (self._sample is not None or ways[0] != "land")
+        pieces = Pieces(grid[-1] - self._stepper.t, watch) if grid.size else None
+        try:
+            while pieces is not None and self._made < grid.size and self._status is Status.FINISHED:
+                with pieces:
+                    self._piece(pieces.length, walks)
+                watch.look(self.t, lambda: self.stats.steps, lambda: {"way": self.save(), **also})
+        except KeyboardInterrupt:
+            self._status = Status.INTERRUPTED
+            self._reason = "Ctrl-C was pressed."
+
+    def _piece(self, length: float, walks: bool) -> None:
+        """Go on for a length of time: to its samples, or else by own steps, or else to the next sample."""
+        stepper, grid, made = self._stepper, self._grid, self._made
+        sign = 1.0 if grid[-1] >= self.t else -1.0
+        goal = self.t + sign * length
+        ahead = sign * (grid[made:] - goal) <= 0.0
+        n = int(np.count_nonzero(ahead))
+        how = self._sample
+        if how == "steps":
+            done = sign * (goal - grid[-1]) >= 0.0
+            part = np.array([grid[-1] if done else goal])
+            part = np.append(grid[:1], part) if grid[0] == self.t != part[0] else part
+            n = grid.size if done else 0
+        elif n or not walks or goal == self.t:
+            n = n or 1
+            part = grid[made : made + n]
+        else:
+            part, how = np.array([goal]), "steps"
+        reached = stepper.advance(part, sample=how)
+        if how == self._sample:
+            self._t.append(reached.t)
+            self._y.append(reached.y)
+            self._made += n if self._sample == "steps" else reached.t.size
+        self._status, self._reason = reached.status, reached.reason
+        failed = reached.status.failed
+        self.t = stepper.t if failed else float(part[-1])
 
 
 def _with_events(solution: Solution, found: "Found") -> Solution:

@@ -139,7 +139,7 @@ class LineIntegral(MethodBase):
             return (
                 "it needs the field as a formula, beside those of its invariants; write it as a VectorField."
             )
-        from integrators.kernel.line.program import components
+        from integrators.kernel.line.kept import components
 
         try:
             for name in self.invariants:
@@ -160,6 +160,13 @@ class LineIntegral(MethodBase):
         problems.errors.InputError
             For an invariant that the system does not have, or that depends on time.
         """
-        from integrators.kernel.line.program import LineProgram
+        from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 
-        return LineProgram(system, k=self.k, s=self.s, h=self.h, tol=self.tol, invariants=self.invariants)
+        made: HBVMProgram | AdaptiveProgram
+        if self.tol is not None:
+            made = AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
+        else:
+            assert self.h is not None
+            made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)
+        made.method = self
+        return made

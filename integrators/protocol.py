@@ -67,6 +67,7 @@ class Status(StrEnum):
     NOT_INVARIANT = "not_invariant"
     MAX_STEPS = "max_steps"
     USER_ERROR = "user_error"
+    INTERRUPTED = "interrupted"
 
     @property
     def failed(self) -> bool:
@@ -248,6 +249,24 @@ class Program(Protocol):
     def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> Stepper:
         """Return a stepper at ``t0``; `UserError` where a function of the user raises there."""
         ...
+
+
+class Compiled:
+    """Base of programs: pickled, one is the method and the system that it is compiled from again.
+
+    Attributes
+    ----------
+    method : MethodBase
+        Set by its `MethodBase.compile`.
+    system : System
+        What it was compiled for.
+    """
+
+    method: Any
+    system: System
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self.method).compile, (self.method, self.system)
 
 
 class _Signature:

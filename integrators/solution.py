@@ -1,14 +1,27 @@
 """A trajectory, what it cost, and what to know about it."""
 
+import json
+import os
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from integrators import plain
 from integrators.caveats import unseen
-from integrators.protocol import Array, MethodBase, Stats, Status
+from integrators.protocol import Array, MethodBase, Program, Stats, Status, as_numbers
+from problems.errors import InputError, MissingLibraryError, shown
 from problems.problem import Problem
+
+FORMAT = 1  # of files
+LOOKED_AT = 2000  # states of which the errors are printed, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +46,12 @@ class Occurrences:
         return self.t.size
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """A trajectory and what it cost.
+    """A trajectory and what it cost; ``print`` tells the essential.
+
+    Called with times, it returns the states there: `__call__`. It pickles, with any problem,
+    and `save` and `load` keep it in a file.
 
     Attributes
     ----------
@@ -76,6 +92,80 @@ class Solution:
     events: Mapping[str, Occurrences] = field(default_factory=dict)
     error: Exception | None = None
 
+    def __call__(self, t: ArrayLike) -> Array:
+        """Return the states at any times that the trajectory covers.
+
+        From the last sample before a time the method goes on as it began there: own steps, and what
+        its `Stepper.advance` makes between them. So these states have the method's order, and
+        those of an energy-preserving method its energy, which no interpolation has; the price is
+        at most the steps from one sample to the next. At a sample's own time it is that sample.
+
+        Parameters
+        ----------
+        t : array_like
+            Times of any shape and order, between the problem's ``t0`` and the last one reached.
+
+        Returns
+        -------
+        ndarray, shape (..., dim)
+
+        Raises
+        ------
+        problems.errors.InputError
+            For times outside, or at which the method does not arrive from the sample before.
+        """
+        times = as_numbers("t", t)
+        before = self.t.size == 0 or self.t[0] != self.problem.t0
+        at = np.concatenate([[self.problem.t0][: int(before)], self.t])
+        states = np.concatenate([self.problem.y0[np.newaxis][: int(before)], self.y])
+        end = float(at[-1])
+        if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
+            end = self.t_stop  # a terminal event, after the last sample
+        sign = 1.0 if end >= self.problem.t0 else -1.0
+        wanted, places = np.unique(sign * times, return_inverse=True)
+        inside = (wanted >= sign * at[0]) & (wanted <= sign * end)
+        if not inside.all():
+            wrong = float(sign * wanted[int(np.argmin(inside))])
+            raise InputError(
+                f"t={wrong!r} is not between t = {float(at[0])!r} and {end!r}, which the solution covers."
+            )
+        found = np.empty((wanted.size, self.problem.system.dim))
+        sample = np.searchsorted(sign * at, wanted, side="right") - 1
+        for i in np.unique(sample):
+            mine = sample == i
+            goals = sign * wanted[mine]
+            here = int(goals[0] == at[i])
+            made = np.repeat(states[i : i + 1], here, axis=0)
+            if goals.size > here:
+                stepper = self._program.start(states[i], self.problem.par, float(at[i]))
+                reached = stepper.advance(goals[here:])
+                if reached.status.failed:
+                    raise InputError(
+                        f"{self.method!r} does not go on from t = {float(at[i])!r}: {reached.reason}"
+                    )
+                made = np.concatenate([made, reached.y])
+            found[mine] = made
+        return found[places.reshape(times.shape)]
+
+    @cached_property
+    def _program(self) -> Program:
+        return self.method.compile(self.problem.system)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != "_program"}
+
+    @property
+    def q(self) -> Array | None:
+        """Positions (n, dof), a view of ``y``; ``None`` for systems that have no positions and momenta."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[:, :dof]
+
+    @property
+    def p(self) -> Array | None:
+        """Momenta (n, dof), a view of ``y``; ``None`` as for ``q``."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[:, dof:]
+
     @property
     def v(self) -> Array | None:
         """Velocities (n, dof) of a Hamiltonian problem with constant masses, else ``None``."""
@@ -110,3 +200,195 @@ class Solution:
     def guards(self) -> dict[str, Array]:
         """Return the quantities that a symmetry keeps at exactly zero, by name."""
         return self.problem.guards(self.y, self.t)
+
+    def __repr__(self) -> str:
+        return (
+            f"Solution({self.problem!r}, {self.method!r}, {self.status} at t = {self.t_stop!r}, "
+            f"{self.t.size} states)"
+        )
+
+    def __str__(self) -> str:
+        lines = [repr(self.problem), self._with(), self._cost(), *self._kept()]
+        if self.events:
+            counts = ", ".join(f"{name} {len(found)}" for name, found in self.events.items())
+            lines.append(f"events found: {counts}")
+        lines += [f"warning: {sentence}" for sentence in self.warnings]
+        return "\n".join(lines)
+
+    def _with(self) -> str:
+        """Return how it was integrated, with what the method chose itself, and how it ended."""
+        method, extra, steps = self.method, self.stats.extra, self.stats.steps
+        chosen = [f"{key}={extra[key]}" for key in "ks" if key in extra and getattr(method, key, 0) is None]
+        if steps and (getattr(method, "h", None) is None or getattr(method, "tol", None) is not None):
+            chosen.append(f"steps of {abs(self.t_stop - self.problem.t0) / steps:.3g} on average")
+        words = f" ({', '.join(chosen)})" if chosen else ""
+        ended = f"{self.status} at t = {self.t_stop:.15g}, {self.t.size} states"
+        return f"{self.method!r}{words}\n{ended}{': ' + self.reason if self.reason else ''}"
+
+    def _cost(self) -> str:
+        stats = self.stats
+        counts = {
+            "rejected": stats.rejections,
+            "evaluations of the field": stats.evaluations,
+            "iterations": stats.iterations,
+        }
+        told = [f"{stats.steps} steps", *(f"{n} {name}" for name, n in counts.items() if n)]
+        told += [f"solver: {stats.solver}"] if stats.solver else []
+        cached = ", from a cache" if self.from_cache else ""
+        return f"{', '.join(told)}; compiled in {self.compile_seconds:.2g} s{cached}"
+
+    def _kept(self) -> list[str]:
+        """Return the largest errors of the invariants; of long solutions, at some of the states."""
+        if not self.t.size:
+            return []
+        every = -(-self.t.size // LOOKED_AT)
+        places = np.unique(np.append(np.arange(0, self.t.size, every), self.t.size - 1))
+        errors = self.problem.errors(self.y[places], self.t[places])
+        largest = ", ".join(f"{name} {float(error.max()):.1e}" for name, error in errors.items())
+        where = f" at {places.size} of the states" if every > 1 else ""
+        return [f"largest errors{where}: {largest}"] if errors else []
+
+    def to_pandas(self) -> Any:
+        """Return a ``pandas.DataFrame``: the times are its index, q0, q1 ... p0 ... (or y0 ...) its columns.
+
+        Raises
+        ------
+        problems.errors.MissingLibraryError
+            If pandas is not installed.
+        """
+        pandas = _library("pandas")
+        names = [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[1])]
+        frame = pandas.DataFrame(self.y, index=pandas.Index(self.t, name="t"), columns=names)
+        frame.attrs = self._about()
+        return frame
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset``: q and p (or y) along ``t`` and ``i``.
+
+        Raises
+        ------
+        problems.errors.MissingLibraryError
+            If xarray is not installed.
+        """
+        xarray = _library("xarray")
+        parts = {name: (("t", "i"), part) for name, part in self._parts().items()}
+        return xarray.Dataset(parts, coords={"t": self.t}, attrs=self._about())
+
+    def _parts(self) -> dict[str, Array]:
+        return {"y": self.y} if self.q is None or self.p is None else {"q": self.q, "p": self.p}
+
+    def _about(self) -> dict[str, str]:
+        return {"problem": repr(self.problem), "method": repr(self.method), "status": str(self.status)}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the solution to a file that `load` reads: arrays and JSON in NumPy's npz format.
+
+        The problem is in it with its formulas as they were traced, so that it needs none of your
+        functions to be loaded; the field of a `problems.Foreign` is code and is not. A file of that
+        name is replaced when the new one is complete.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a method that is not registered, or a file that cannot be written.
+        """
+        arrays: dict[str, NDArray[Any]] = {"t": self.t, "y": self.y}
+        for name, found in self.events.items():
+            arrays |= {f"event_{key}:{name}": value for key, value in vars(found).items()}
+        words = {
+            "format": FORMAT,
+            "problem": plain.packed_problem(self.problem, arrays),
+            "method": plain.packed_method(self.method, arrays),
+            "stats": plain.packed(asdict(self.stats), arrays),
+            "events": list(self.events),
+            "status": str(self.status),
+            "error": None if self.error is None else [type(self.error).__name__, str(self.error)],
+        }
+        words |= {key: getattr(self, key) for key in _AS_THEY_ARE}
+        arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        write_whole(
+            Path(path),
+            lambda file: np.savez(file, **arrays),  # pyright: ignore[reportArgumentType]
+        )
+
+
+_AS_THEY_ARE = ("reason", "t_stop", "compile_seconds", "from_cache")
+
+
+def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Solution:
+    """Return the solution that `Solution.save` wrote to a file, bit for bit.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file.
+    problem : Problem, optional
+        For a field that is not traced, which no file holds: the problem that was integrated.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a file that is not there, is damaged, or is none of these.
+    """
+    try:
+        with Path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        words = json.loads(arrays["words"].tobytes())
+        if words["format"] != FORMAT:
+            raise InputError(f"{path} is of format {words['format']}, which this version does not read.")
+        found = plain.unpacked_problem(words["problem"], arrays) or problem
+        if found is None:
+            raise InputError(
+                f"the field of the solution in {path} is code, which the file does not hold; "
+                "load it with problem=, the one that was integrated."
+            )
+        kinds = {name: [f"event_{key}:{name}" for key in ("t", "y", "direction")] for name in words["events"]}
+        return Solution(
+            t=arrays["t"],
+            y=arrays["y"],
+            status=Status(words["status"]),
+            stats=Stats(**plain.unpacked(words["stats"], arrays)),
+            problem=found,
+            method=plain.unpacked_method(words["method"], arrays),
+            events={name: Occurrences(*(arrays[key] for key in keys)) for name, keys in kinds.items()},
+            error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
+            **{key: words[key] for key in _AS_THEY_ARE},
+        )
+    except (InputError, FileNotFoundError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"there is no file {path}; give one that Solution.save wrote.") from None
+    except Exception as error:  # whatever reading a file of any content raises
+        raise InputError(
+            f"{path} is not a solution, or is damaged ({type(error).__name__}: {shown(str(error))}); "
+            "give a file that Solution.save wrote."
+        ) from None
+
+
+def write_whole(path: Path, write: Any) -> None:
+    """Write a file under another name and give it its own when it is complete.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If that cannot be done.
+    """
+    temporary = None
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".tmp")
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+        Path(temporary).replace(path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror}; give another path.") from None
+    finally:
+        if temporary is not None:
+            with suppress(OSError):
+                Path(temporary).unlink()
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingLibraryError(f"{name} is not installed; install it with: pip install {name}.") from None

@@ -20,6 +20,7 @@ from integrators.one_thread import one_thread
 from integrators.options import Step
 from integrators.protocol import (
     Array,
+    Compiled,
     MethodBase,
     Samples,
     Stats,
@@ -35,13 +36,12 @@ from problems.errors import unknown
 from problems.problem import System
 
 
-class ProgramBase:
+class ProgramBase(Compiled):
     """A method compiled for one system; satisfies `integrators.protocol.Program`.
 
     A subclass implements `stepper`.
     """
 
-    method: Any
     compile_seconds: float = 0.0
     from_cache: bool | None = None
 

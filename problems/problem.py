@@ -138,6 +138,16 @@ class Problem:
             object.__setattr__(named, key, value)
         return named
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what `__setstate__` takes: copies and pickles need none of the user's functions."""
+        return {**vars(self), "arguments": dict(self.arguments)}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        arrays = {key: state[key] for key in ("y0", "par", "times") if state[key] is not None}
+        frozen = {key: _frozen(array) for key, array in arrays.items()}
+        for key, value in {**state, **frozen, "arguments": MappingProxyType(state["arguments"])}.items():
+            object.__setattr__(self, key, value)
+
     def __repr__(self) -> str:
         if self.name is None:
             return f"Problem({self._made_with})"

@@ -262,12 +262,7 @@ def _fairness(records: Sequence[Record]) -> Section:
     )
     return Section(
         "Fairness: the rules, the settings, what was excluded",
-        [
-            Items(rules, "numbered"),
-            settings,
-            *attempt(provenance.PEERS),
-            *([left_out] if excluded else []),
-        ],
+        [Items(rules, "numbered"), settings, *attempt(provenance.PEERS), *([left_out] if excluded else [])],
         "fairness",
         nav="Fairness",
     )

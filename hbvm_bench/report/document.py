@@ -79,6 +79,12 @@ class Claims:
 
     groups: Sequence[tuple[str, str, Sequence[Claim]]]
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many claims have which verdict."""
+        found = [claim.verdict for _, _, claims in self.groups for claim in claims]
+        return {verdict: found.count(verdict) for verdict in VERDICTS}
+
 
 @dataclass(frozen=True)
 class Ranked:
@@ -106,6 +112,12 @@ class Results:
     columns: Sequence[Metric]
     problems: Sequence[Ranked]
     looks: Mapping[str, Look]
+
+    @property
+    def libraries(self) -> list[str]:
+        """The libraries of the cases, each once."""
+        rows = (row for problem in self.problems for _, rows in problem.groups for row in rows)
+        return list(dict.fromkeys(row.record.library for row in rows))
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,7 @@ def _(block: Commands, level: int = 2) -> str:
 
 @printed.register
 def _(block: Claims, level: int = 2) -> str:
-    found = [claim.verdict for _, _, claims in block.groups for claim in claims]
-    parts = [" · ".join(f"**{found.count(key)}** {said}" for key, said in VERDICTS.items())]
+    parts = [" · ".join(f"**{count}** {VERDICTS[key]}" for key, count in block.counts.items())]
     for title, _, claims in block.groups:
         rows = [
             (words(claim.words), words(claim.paper), words(claim.here), VERDICTS[claim.verdict])

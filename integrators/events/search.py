@@ -1,6 +1,7 @@
 """Follow a trajectory and find the events on it."""
 
-from collections.abc import Iterator, Sequence
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,11 @@ DEGREES = (8, 24, 64)  # of g along a step: the least, where s is not known, the
 CLOSE = 64  # units in the last place: nothing happens in a time as short
 SAME = 1e-5  # of a step: two touches as close are one
 COUNTERS = ("steps", "evaluations", "iterations")
+Look = Callable[[float, Callable[[], int], Callable[[], dict[str, Any]]], None]
+_LASTING = (
+    "_t", "_taken", "_length", "_count", "_finite", "_touched", "_hits", "_terminal", "_failed", "_looked",
+    "_zero",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -111,20 +117,23 @@ class Search:
         self._failed = False  # one of the steppers
         self._looked = problem.t0
         self._zero = self._rests(problem)
+        self._before: dict[str, int] = dict.fromkeys(
+            COUNTERS, 0
+        )  # counts of the work that another process did
 
-    def run(self) -> Found:
-        """Search to the end, the first terminal event, or a failure of the method."""
-        raised: UserError | Unresolved | None = None
+    def run(self, look: Look) -> Found:
+        """Search to the end, the first terminal event, a failure of the method, or Ctrl-C."""
+        raised: UserError | Unresolved | KeyboardInterrupt | None = None
         try:
             while self._t != self._end and self._terminal is None and not self._failed:
                 self._go_on()
                 self._count = min(4 * self._count, self._most)
-        except (UserError, Unresolved) as error:
+                look(self._t, lambda: self._walker.stats.steps, self.save)
+        except (UserError, Unresolved, KeyboardInterrupt) as error:
             raised = error
         stop = self._hits[-1].t if self._terminal is not None else self._t
         status, reason, error = self._outcome(stop, raised)
-        steppers = (self._walker, self._probe)
-        work = {name: sum(getattr(stepper.stats, name) or 0 for stepper in steppers) for name in COUNTERS}
+        work = {name: self._before[name] + count for name, count in self._work().items()}
         return Found(
             events={name: self._occurrences(i) for i, name in enumerate(self._names)},
             t_stop=stop,
@@ -133,6 +142,23 @@ class Search:
             stats=replace(self._walker.stats, **work),
             error=error,
         )
+
+    def save(self) -> dict[str, Any]:
+        """Return all that the rest of the search depends on."""
+        lasting = {name: copy.copy(getattr(self, name)) for name in _LASTING}
+        work = {name: self._before[name] + count for name, count in self._work().items()}
+        return {"search": {"walker": self._walker.checkpoint(), "work": work, "lasting": lasting}}
+
+    def load(self, kept: Mapping[str, Any]) -> None:
+        """Go on from where `save` was called."""
+        self._walker.restore(kept["walker"])
+        self._before = kept["work"]
+        for name, value in kept["lasting"].items():
+            setattr(self, name, copy.copy(value))
+
+    def _work(self) -> dict[str, int]:
+        steppers = (self._walker, self._probe)
+        return {name: sum(getattr(stepper.stats, name) or 0 for stepper in steppers) for name in COUNTERS}
 
     def _go_on(self) -> None:
         """Take some steps, and look for events in them."""
@@ -144,7 +170,7 @@ class Search:
                 self._look(before, t, y)
 
     def _outcome(
-        self, stop: float, raised: "UserError | Unresolved | None"
+        self, stop: float, raised: "UserError | Unresolved | KeyboardInterrupt | None"
     ) -> tuple[Status, str, Exception | None]:
         """Return status, reason and, if there is one, the user's error."""
         if self._terminal is not None:
@@ -152,6 +178,8 @@ class Search:
         known = f"are known up to t = {self._looked!r} only."
         if isinstance(raised, UserError):
             return Status.USER_ERROR, f"{raised}: events {known}", raised.error
+        if isinstance(raised, KeyboardInterrupt):
+            return Status.INTERRUPTED, f"Ctrl-C was pressed while events were looked for; they {known}", None
         if raised is not None:
             return Status.STALLED, f"{raised} Events {known}", None
         for stepper in (self._walker, self._probe):
@@ -292,10 +320,18 @@ class Search:
 
 
 def search(
-    problem: Problem, method: MethodBase, program: Program, events: dict[str, Event], end: float
-) -> Found:
-    """Search for events from the problem's start to a time; see `Search`."""
+    problem: Problem, method: MethodBase, program: Program, events: dict[str, Event], end: float,
+    look: Look = lambda t, steps, kept: None, kept: Mapping[str, Any] | None = None,
+) -> Found:  # fmt: skip
+    """Search for events from the problem's start to a time; see `Search`.
+
+    ``look`` is called after every few steps with the time, the steps made, and a function that returns what
+    the rest of the search depends on: ``{"search": kept}``, with which it goes on in another process.
+    """
     try:
-        return Search(problem, method, program, events, end).run()
+        searching = Search(problem, method, program, events, end)
+        if kept is not None:
+            searching.load(kept)
+        return searching.run(look)
     except UserError as raised:  # at the start
         raise raised.error from None

@@ -142,18 +142,17 @@ class _Work:
         if not groups:
             return
         program, size = self.program, len(groups[0])
-        contexts = [program.context(side=side) for side in (False, True) for _ in range(size)]
-        for context in contexts[:size]:
-            context.point(program.scaled(self.h))
-        addresses = np.array([context.address for context in contexts])
+        pairs = [program.contexts() for _ in range(size)]
+        for own, _ in pairs:
+            own.point(program.scaled(self.h))
+        addresses = np.array([[context.address for context in pair] for pair in pairs])
         y, times = self.result.y, self.result.t
         pace = Pace(CHUNK, self.starts.shape[1])
         for group in groups:
-            here = np.concatenate([addresses[: len(group)], addresses[size : size + len(group)]])
-            for member, i in enumerate(group):
-                for context in (contexts[member], contexts[size + member]):
-                    program.load(context, self.parameters[i])
-                self._reset(contexts[member], self.starts[i])
+            here = addresses[: len(group)].T.copy()
+            for pair, i in zip(pairs, group, strict=False):
+                program.load(pair, self.starts[i], self.parameters[i], self.t0)
+                self._reset(pair[0], self.starts[i])
             made, broken = 0, False
             while made < times.size:
                 try:
@@ -168,11 +167,11 @@ class _Work:
                     break
                 if self.stop.is_set():
                     return
-            for member, i in enumerate(group):
-                if broken or contexts[member].wanted:
+            for pair, i in zip(pairs, group, strict=False):
+                if broken or pair[0].wanted:
                     self.alone(i)
                 else:
-                    self._report(i, contexts[member])
+                    self._report(i, pair)
 
     def alone(self, i: int) -> None:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
@@ -199,8 +198,8 @@ class _Work:
         context.t0, context.h = self.t0, self.h
         steps(engine.RESET, context.address, out=start.ctypes.data)
 
-    def _report(self, i: int, ctx: Context) -> None:
-        result = self.result
+    def _report(self, i: int, pair: tuple[Context, Context]) -> None:
+        result, ctx = self.result, pair[0]
         result.steps[i] = ctx.steps
         result.iterations[i] = ctx.iterations
         result.evaluations[i] = ctx.evaluations
@@ -208,4 +207,4 @@ class _Work:
             t = ctx.t0 + ctx.n * ctx.h
             result.y[i, ctx.made :] = np.nan
             result.t_stop[i] = t
-            result.status[i], result.reason[i] = failure(ctx.outcome, ctx, t)
+            result.status[i], result.reason[i] = failure(ctx.outcome, self.program, pair, t)

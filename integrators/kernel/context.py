@@ -23,8 +23,9 @@ Numbers = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # How a step, or an advance, ended.
-# SCATTERED: the iteration has converged, but not to the trajectory.
-RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED = range(7)
+# SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
+# integral is to keep is no invariant.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT = range(8)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -34,6 +35,9 @@ FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
+
+# What a line integral does; see `Context.line`.
+VALUES, END, ARRIVE = range(3)
 
 KINKS_KEPT = 64
 
@@ -89,11 +93,16 @@ class Context(Memory):
         Of the program.
     tables : mapping of str to ndarray
         Tables by their slot's name; not copied.
+    more : mapping of str to number, optional
+        What further slots begin with.
     """
 
     # --- what is integrated, and how ---
     field = Integer()  # address of void(times, stages, par, values) on one block of stages
     fused = Integer()  # address of whole sweeps, void(context, count, tested); 0: none, see `step.fused`
+    # address of a line integral, int64(what, context); 0: plain. It makes the VALUES at the stages from the
+    # field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
+    line = Integer()
     parameters = Integer()
     par = Array("parameters")
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
@@ -112,6 +121,7 @@ class Context(Memory):
     raw_matrix = Array()  # values -> stages (THROUGH: coefficients -> stages), for a step of 1
     matrix = Array(8, "matrix_size")  # the same for the step h
     extrapolation = Array()  # the previous step's values -> stages
+    extrapolation_two = Array()  # the values of the step before that one, and its own -> stages; route 8
     matrix_size = Integer()  # in vectors of 8
     projection = Array()  # values -> coefficients
     groups = Integer()  # of 8 coefficients
@@ -137,6 +147,7 @@ class Context(Memory):
     stages = Array(*STAGE)
     old_stages = Array(*STAGE)  # before the last product, where changes are measured
     values = Array(*STAGE)  # of the field
+    older_values = Array(*STAGE)  # of the step before
     base = Array(*STAGE)  # what a stage has besides the state and the forces
     sums = Array(*STAGE)
     coefficients = Array(8, "most_groups", "padded")
@@ -167,6 +178,7 @@ class Context(Memory):
     time_low = Real()  # what `t0` lacks, where steps vary
     n = Integer()  # steps since `t0`
     length = Real()  # of the step that `values` belong to; 0: none
+    older_length = Real()  # of the one that `older_values` belong to, right before that; 0: none
     solved = Integer()  # what solves the step ahead: UNSOLVED, BY_VALUES, BY_INCREMENT
     age = Integer()  # steps until sizes are taken anew
     free = Integer()  # iterations without a test
@@ -178,6 +190,7 @@ class Context(Memory):
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
     tolerance = Real()
+    rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
     untested = Integer()  # iterations left before the first test, in a batch
     alive = Integer()  # 1: takes part in a batch
@@ -226,7 +239,6 @@ class Context(Memory):
     defect_aim = Real()
     error_decay = Real()  # of coefficients from one degree to the next, where the error is allowed
     defect_decay = Real()  # the same where the defect is
-    log_rate = Real()  # logarithm of the iteration's contraction, as measured
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
     rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
     length_limit = Real()  # no step is longer, for what the iteration allows
@@ -241,7 +253,7 @@ class Context(Memory):
     doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
     kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
 
-    def __init__(self, shape: Shape, tables: Mapping[str, Numbers]):
+    def __init__(self, shape: Shape, tables: Mapping[str, Numbers], more: Mapping[str, int] | None = None):
         c, rows = shape.constants, shape.rows
         groups, mode_groups = -(-(c.s + c.first) // 8), -(-c.modes // 8)
         numbers = {
@@ -253,7 +265,7 @@ class Context(Memory):
             "most_groups": max(groups, mode_groups),
             "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1,
         }  # fmt: skip
-        super().__init__(numbers, {**tables, "block": shape.block, "group": shape.group})
+        super().__init__({**numbers, **(more or {})}, {**tables, "block": shape.block, "group": shape.group})
         self.shape = shape
         self.row_factor[:] = 1.0
         self.kick_factor.reshape(-1, 8)[:, :4] = 1.0

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,25 +11,28 @@ from integrators.caveats import sees_kinks
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
+from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
 from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.stepper import AdaptiveStepper, HBVMStepper
-from integrators.protocol import Array, check_parameters, check_start, check_state
+from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.varying import AdaptiveStepper
+from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import System
 
 TOLERANCE = 1e-16
 
-FIRST_RATE = 0.01
+FIRST_RATE = math.log2(0.01)
 
-MARGIN = 0.82
+MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
 Errors of order 25 and more vary strongly from step to step, and a rejected step costs as
@@ -47,7 +51,7 @@ UNSEEN = 1e-12
 """Part of a block's size that the error at a kink of the field may always be."""
 
 
-class HBVMProgram:
+class HBVMProgram(Compiled):
     """HBVM(k, s) with step h, compiled for one system; satisfies `integrators.protocol.Program`.
 
     Parameters
@@ -64,24 +68,46 @@ class HBVMProgram:
         second-order form wherever the system has one, but for blended iteration.
     solver : {"auto", "fixed_point", "newton", "blended"}, optional
         How the stage equations are solved; see `integrators.hbvm.HBVM`.
+    keep : sequence of str, optional
+        Invariants to keep by line integrals, by name; ``name[i]`` for one component of a vector. If there
+        is none, the energy of a Poisson system. First-order form, fixed point.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a form that the system does not have; for an invariant that it does not have, or that depends
+        on time.
     """
 
     varying = False
     """Whether steps vary in length."""
+    _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
-        self, system: System, *, k: int, s: int, h: float, form: str | None = None, solver: str = "auto"
+        self,
+        system: System,
+        *,
+        k: int,
+        s: int,
+        h: float,
+        form: str | None = None,
+        solver: str = "auto",
+        keep: Sequence[str] | None = None,
     ):
         started = binary.clock()
         self.system = system
         self.h = h
+        if keep is not None:
+            form, solver = "first", "fixed_point"
         self.solver, self._named = SOLVERS[solver], solver
         self.second = (system.separable and solver != "blended") if form is None else form == "second"
         if self.second and not system.separable:
             raise InputError(f"{system.name} is not separable with constant masses; use form='first'.")
         lanes = tables.lanes_for(k)
         self.constants = tables.constants(k, s, self.second, lanes)
-        self.field = field_of(system, "force" if self.second else "field", lanes)
+        self.kept = None if keep is None else Kept(system, self.constants, keep)
+        what = self.kept.values if self.kept else "force" if self.second else "field"
+        self.field = field_of(system, what, lanes)
         kernel = steps.code()
         block, group = blocks(system)
         rows = system.dim
@@ -92,7 +118,7 @@ class HBVMProgram:
             group = group[: block[-1] + 1]
         self._known_velocity: tuple[bytes, Array] = (b"?", np.empty(0))
         unit = tables.unit(self.constants, self._velocity(np.full(system.n_par, np.nan)))
-        self.fused = self._sweeps(rows, lanes) if unit else None
+        self.fused = self._sweeps(what, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
             system.n_par, block, group, self.constants,
@@ -100,25 +126,25 @@ class HBVMProgram:
         self._fixed = tables.fixed(self.constants)
         self._scaled: dict[float, dict[str, Array]] = {}
         self._fresh: dict[bool, Context] = {}
-        self.from_cache = all(
-            made.from_cache for made in (self.field, kernel, self.fused) if made is not None
-        )
+        parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
+        self.from_cache = all(made.from_cache for made in parts if made is not None)
         self._linearization: Linearization | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
         self.compile_seconds = binary.clock() - started
 
-    def _sweeps(self, rows: int, lanes: int) -> binary.Native | None:
+    def _sweeps(self, what: str, rows: int, lanes: int) -> binary.Native | None:
         """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None
-        return fused.compile_sweeps(self.system, "force" if self.second else "field", lanes, rows)
+        return fused.compile_sweeps(self.system, what, lanes, rows)
 
     @property
     def description(self) -> str:
         """The method with all that steps depend on, as text."""
         c, form = self.constants, "second" if self.second else "first"
-        return f"HBVM(k={c.k}, s={c.s}, h={self.h!r}, form={form!r}, solver={self._named!r})"
+        kept = f", {self.kept.description}" if self.kept else ""
+        return f"HBVM(k={c.k}, s={c.s}, h={self.h!r}, form={form!r}, solver={self._named!r}{kept})"
 
     @property
     def lanes(self) -> bool:
@@ -134,7 +160,7 @@ class HBVMProgram:
             If ``y0`` is not finite, or ``y0`` or ``par`` is not of the system's length.
         """
         values = check_parameters(par, self.system)
-        return HBVMStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+        return self._stepper(self, check_state(y0, self.system.dim), values, check_start(t0))
 
     def batch(
         self,
@@ -193,21 +219,32 @@ class HBVMProgram:
             self._scaled[h] = tables.scaled(self.constants, h, squared=squared)
         return self._scaled[h]
 
-    def context(self, *, side: bool = False) -> Context:
-        """Return fresh memory for a trajectory, or for its partial steps."""
+    def contexts(self) -> tuple[Context, Context]:
+        """Return fresh memory for a trajectory, and for its partial steps."""
+        own, side = self._context(side=False), self._context(side=True)
+        if self.kept:
+            self.kept.share(own, side)
+        return own, side
+
+    def _context(self, *, side: bool) -> Context:
         if side not in self._fresh:
             scaled = self.scaled(self.h)
-            shared = {"projection": scaled["projection"]} if side else scaled
-            made = Context(self.shape, {**self._fixed, **shared})
+            tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
+            made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
+            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 
-    def load(self, context: Context, par: Array) -> None:
-        """Put parameters, and the velocities that follow from them, into a context."""
-        context.par[:] = par
-        if self.second:
-            context.velocity[: self.shape.rows] = self._velocity(par)
+    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
+        """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
+        for context in contexts:
+            context.par[:] = par
+            if self.second:
+                context.velocity[: self.shape.rows] = self._velocity(par)
+        contexts[0].h = self.h
+        if self.kept:
+            self.kept.load(contexts, y, par, t0)
 
     def _velocity(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
@@ -244,9 +281,12 @@ class AdaptiveProgram(HBVMProgram):
         Times that steps end at, ascending.
     max_steps : int, optional
         Steps of a trajectory, at most.
+    keep : sequence of str, optional
+        What to keep by line integrals; see `HBVMProgram`.
     """
 
     varying = True
+    _stepper = AdaptiveStepper
 
     def __init__(
         self,
@@ -261,8 +301,9 @@ class AdaptiveProgram(HBVMProgram):
         max_step: float | None = None,
         breakpoints: Sequence[float] = (),
         max_steps: int | None = None,
+        keep: Sequence[str] | None = None,
     ):
-        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver)
+        super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver, keep=keep)
         started = binary.clock()
         from integrators.legendre import legendre  # 50 digits, which take their time to be imported
 
@@ -287,27 +328,28 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
         self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
-        self._doubt, self._slowest = _decays(k, m, tol, middle, sees_kinks(k, system))
+        looks = sees_kinks(k, system) and not self.kept
+        self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
 
     @property
     def description(self) -> str:
         """The method with all that steps depend on, as text."""
-        c = self.constants
+        c, kept = self.constants, f", {self.kept.description}" if self.kept else ""
         return (
             f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
             f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self.breakpoints.tolist()!r}, "
-            f"max_steps={self.max_steps!r})"
+            f"max_steps={self.max_steps!r}{kept})"
         )
 
-    def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> AdaptiveStepper:
-        """Return a stepper at ``t0``; as `HBVMProgram.start`."""
-        values = check_parameters(par, self.system)
-        return AdaptiveStepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
+        super().load(contexts, y, par, t0)
+        contexts[0].next_length = self.first or 0.0
+        contexts[0].doubt_end = t0
 
-    def context(self, *, side: bool = False) -> Context:
-        """Return fresh memory for a trajectory, or for its partial steps."""
-        context = super().context(side=True)  # with a matrix of its own
+    def _context(self, *, side: bool) -> Context:
+        context = super()._context(side=True)  # with a matrix of its own
         context.point({"estimators": self._estimators})
         context.varying = 1
         context.error_degree = self.degree
@@ -325,7 +367,6 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.longest = math.inf if self.max_step is None else self.max_step
         context.stop = context.length_limit = math.inf
-        context.log_rate = math.log(FIRST_RATE)
         return context
 
 

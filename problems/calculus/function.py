@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from problems.trace.graph import Affine, Graph, Loop, Node
 
@@ -72,6 +73,30 @@ class Function:
             if inside:
                 loops.append((loop, inside))
         return Function(self.graph, self.outputs[low:high], tuple(loops))
+
+    def plain(self) -> list[Any]:
+        """Return the outputs as lists of numbers; nodes and loops by their numbers in the graph."""
+        return [
+            [[[term.node.id, term.key] for term in terms] for terms in self.outputs],
+            [
+                [loop.id, [[list(e.index.coefficients), e.index.offset, e.node.id] for e in entries]]
+                for loop, entries in self.loops
+            ],
+        ]
+
+    @classmethod
+    def of_plain(cls, graph: Graph, plain: Sequence[Any]) -> "Function":
+        """Return the function that `plain` was returned by, on the same graph or one like it."""
+        nodes, loops = graph.nodes, graph.loops
+        outputs = tuple(tuple(Term(nodes[i], key) for i, key in terms) for terms in plain[0])
+        return cls(
+            graph,
+            outputs,
+            tuple(
+                (loops[i], tuple(LoopTerm(Affine(tuple(c), offset), nodes[n]) for c, offset, n in entries))
+                for i, entries in plain[1]
+            ),
+        )
 
     def __neg__(self) -> "Function":
         outputs = tuple(tuple(Term(-term.node, term.key) for term in terms) for terms in self.outputs)

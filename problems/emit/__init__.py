@@ -160,8 +160,9 @@ def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
     columns = np.ascontiguousarray(np.atleast_2d(states.T))
     out = np.empty_like(columns)
     times = np.broadcast_to(np.asarray(t, dtype=np.float64), len(columns))
-    for time, state, row in zip(times.tolist(), columns, out, strict=True):
-        system.evaluate(time, state, np.asarray(par, dtype=np.float64), row)
+    with np.errstate(all="ignore"):
+        for time, state, row in zip(times.tolist(), columns, out, strict=True):
+            system.evaluate(time, state, np.asarray(par, dtype=np.float64), row)
     return out[0] if states.ndim == 1 else np.ascontiguousarray(out.T)
 
 

@@ -121,7 +121,7 @@ def module(text: str, stem: str) -> ModuleType:
     name = f"{stem}_{hashlib.sha256(full.encode()).hexdigest()[:20]}"
     if name in sys.modules:
         return sys.modules[name]
-    path = _written(f"{name}.py", full)
+    path = _written(f"{name[-120:]}.py", full)  # names of files have a length that systems bound
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

@@ -20,6 +20,8 @@ from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
 
+_DECLARED = ("hamiltonian", "domain", "invariant", "guard")  # kinds of functions that users write
+
 _COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
 
 
@@ -88,20 +90,54 @@ class System:
         self.parameters: Mapping[str, Value] = MappingProxyType(
             {key: _parameter(key, value) for key, value in parameters.items()}
         )
-        layout: dict[str, tuple[int, int | None]] = {}
-        offset = 0
-        for key, value in self.parameters.items():
-            size = len(value) if isinstance(value, tuple) else None
-            layout[key] = (offset, size)
-            offset += 1 if size is None else size
-        self._layout = layout
-        self.n_par = offset
+        self._layout, self.n_par = _layout(self.parameters)
         self._graph = Graph(dof)
         self._functions: dict[str, Function | None] = {}  # None: it has none of this name
         self._jacobians: dict[str, Jacobian | None] = {}
         self._vectors: set[str] = set()  # invariants that are lists
         self.invariant_names: tuple[str, ...] = tuple(invariants)
         self.guard_names: tuple[str, ...] = tuple(guards)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what was traced, without the functions that it was traced from, as JSON can keep it."""
+        declared = {
+            name: function.plain()
+            for name, function in self._functions.items()
+            if function is not None and (name.partition(":")[0] in _DECLARED or self._writes(name))
+        }
+        bodies = self.bodies and [self.bodies.masses, self.bodies.G, self.bodies.dimension]
+        return {
+            "name": self.name,
+            "dim": self.dim,
+            "dof": self.dof,
+            "parameters": {key: np.array(value).tolist() for key, value in self.parameters.items()},
+            "invariants": list(self.invariant_names),
+            "guards": list(self.guard_names),
+            "vectors": sorted(self._vectors),
+            "bodies": bodies,
+            "graph": self._graph.__getstate__(),
+            "functions": declared,
+        }
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.name, self.dim, self.dof = state["name"], state["dim"], state["dof"]
+        self.bodies = state["bodies"] and Bodies(*state["bodies"])
+        self.parameters = MappingProxyType(
+            {key: _parameter(key, value) for key, value in state["parameters"].items()}
+        )
+        self._layout, self.n_par = _layout(self.parameters)
+        self._graph = Graph.__new__(Graph)
+        self._graph.__setstate__(state["graph"])
+        self._functions = {
+            name: Function.of_plain(self._graph, plain) for name, plain in state["functions"].items()
+        }
+        self._jacobians = {}
+        self._vectors = set(state["vectors"])
+        self.invariant_names, self.guard_names = tuple(state["invariants"]), tuple(state["guards"])
+
+    def _writes(self, name: str) -> bool:
+        """Whether a function is written by the user and not derived, besides those that all systems have."""
+        return name in ("field", "gradient", "structure")
 
     def _set_energy(self, energy: Node) -> None:
         self._functions["hamiltonian"] = function_of(self._graph, [energy])
@@ -285,6 +321,17 @@ class System:
             key: float(par[offset]) if size is None else par[offset : offset + size].copy()
             for key, (offset, size) in self._layout.items()
         }
+
+
+def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, int | None]], int]:
+    """Return where each parameter lies in the flat vector, and the length of that."""
+    layout: dict[str, tuple[int, int | None]] = {}
+    offset = 0
+    for key, value in parameters.items():
+        size = len(value) if isinstance(value, tuple) else None
+        layout[key] = (offset, size)
+        offset += 1 if size is None else size
+    return layout, offset
 
 
 def _parameter(name: str, value: Any) -> Value:

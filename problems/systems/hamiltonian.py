@@ -72,6 +72,13 @@ class Hamiltonian(System):
     def __repr__(self) -> str:
         return f"Hamiltonian({self.name}, dof={self.dof})"
 
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        super().__setstate__(state)
+        [self._energy] = self.function("hamiltonian").roots
+
+    def _writes(self, name: str) -> bool:
+        return False
+
     @property
     def separable(self) -> bool:
         """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""

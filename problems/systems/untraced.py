@@ -1,7 +1,7 @@
 """Systems whose field is not traced: a numba function, or any Python function."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -76,11 +76,22 @@ class Foreign(System):
         if not callable(f):
             raise InputError(f"f must be a function, not {shown(f)}.")
         super().__init__(f, dim, None, parameters, invariants, guards, name)
+        self._take(f)
+        self._trace_declared(invariants, guards)
+
+    def _take(self, f: Callable[..., Any]) -> None:
         self.f = f
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
         self.native: dict[int, tuple[int, Any]] = {}  # what the kernel makes of it, by lanes
-        self._trace_declared(invariants, guards)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the function itself, which pickle can keep and JSON cannot."""
+        return {**super().__getstate__(), "f": self.f}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        super().__setstate__(state)
+        self._take(state["f"])
 
     def __repr__(self) -> str:
         return f"Foreign({self.name}, dim={self.dim})"
@@ -103,19 +114,20 @@ class Foreign(System):
     def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
         """Put the derivative at one state into ``out``; NaN where it is not defined.
 
+        NumPy warns of that, unless whoever calls, for many states at a time, silences it: ``np.errstate``.
+
         Raises
         ------
         problems.errors.InputError
             If f returns something else than dim numbers.
         """
-        arguments = [t, y, *([par] if self.takes_parameters else [])]
-        out[:] = np.nan
+        arguments = (t, y, par) if self.takes_parameters else (t, y)
         try:
-            with np.errstate(all="ignore"):
-                if self.in_place:
-                    self.f(*arguments, out)
-                    return
-                value = self.f(*arguments)
+            if self.in_place:
+                out[:] = np.nan
+                self.f(*arguments, out)
+                return
+            value = self.f(*arguments)
         except UNDEFINED:
             out[:] = np.nan
             return

@@ -17,7 +17,7 @@ products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``
 
 import math
 import numbers
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
+from problems.errors import InputError, shown
 from problems.trace.source_line import refuse, users_line
 
 T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
@@ -291,9 +292,39 @@ class Graph:
         self._table[key] = node
         return node
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the graph as numbers, texts and lists, which JSON and pickle can keep."""
+        return {
+            "dof": self.dof,
+            "loops": [loop.rows.tolist() for loop in self.loops],
+            "nodes": [
+                [node.op, [arg.id for arg in node.args], _plain(node.data), node.flags]
+                + ([] if node.loop is None else [node.loop.id])
+                for node in self.nodes
+            ],
+        }
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Make the graph again: the same nodes, with the same numbers."""
+        self.__init__(state["dof"])
+        loops = [self.loop(np.array(rows, dtype=np.int64)) for rows in state["loops"]]
+        for op, args, data, flags, *inside in state["nodes"]:
+            loop = loops[inside[0]] if inside else None
+            data = _OF_PLAIN[op](data, loops) if op in _OF_PLAIN else None
+            if op not in _OF_PLAIN and op not in FUNCTIONS and op not in _ARITHMETIC:
+                raise InputError(f"a graph has no operation {shown(op)}.")
+            node = Node(self, op, tuple(self.nodes[i] for i in args), data, int(flags), loop)
+            self.nodes.append(node)
+            self._table[_key(node)] = node
+
     def loop(self, rows: NDArray[np.int64]) -> Loop:
         """Return the loop over a list of indices, shape (n, width); one object per list."""
         return self._loops.setdefault((rows.shape, rows.tobytes()), Loop(rows, len(self._loops)))
+
+    @property
+    def loops(self) -> list[Loop]:
+        """The loops of declared sums, by number."""
+        return list(self._loops.values())
 
     def const(self, value: float) -> Node:
         """Return the node of a literal."""
@@ -465,6 +496,54 @@ class Graph:
                 return node
             case _:
                 return self.call(node.op, args[0])
+
+
+_ARITHMETIC = ("add", "sub", "mul", "div", "neg")
+
+
+def _affine(plain: Sequence[Any]) -> Affine:
+    return Affine(tuple(int(c) for c in plain[0]), int(plain[1]))
+
+
+_OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
+    "const": lambda data, _: float(data),
+    "symbol": lambda data, _: (str(data[0]), data[1] if isinstance(data[1], int) else _affine(data[1])),
+    "index": lambda data, _: _affine(data),
+    "pow": lambda data, _: int(data),
+    "sum": lambda data, loops: loops[data],
+}
+"""What `Node.data` is, from what `_plain` returns."""
+
+
+def _plain(data: Any) -> Any:
+    match data:
+        case Loop():
+            return data.id
+        case Affine():
+            return [list(data.coefficients), data.offset]
+        case (space, place):
+            return [space, _plain(place)]
+    return data
+
+
+def _key(node: Node) -> Hashable:
+    """Return what a node is found by, as the methods of `Graph` that make nodes write it."""
+    args = tuple(arg.id for arg in node.args)
+    match node.op:
+        case "const":
+            return "const", repr(node.data)
+        case "symbol":
+            return "symbol", *node.data, None if node.loop is None else node.loop.id
+        case "index":
+            assert node.loop is not None
+            return "index", node.data, node.loop.id
+        case "sum":
+            return "sum", *args, node.data.id
+        case "pow":
+            return "pow", *args, node.data
+        case "add" | "mul":
+            return node.op, *sorted(args)
+    return node.op, *args
 
 
 def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:

@@ -16,8 +16,6 @@ from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
 
-WELL = problems.load("rigid_body")
-
 FAULTS = [
     Fault("HBVM(max_step=0)", lambda: HBVM(max_step=0.0), r"max_step=0\.0 of HBVM must be a finite step"),
     Fault("HBVM(max_step=nan)", lambda: HBVM(max_step=math.nan), "max_step=nan"),
@@ -30,11 +28,6 @@ FAULTS = [
         "takes breakpoints with a tolerance only, not with h=0.1 alone; give tol",
     ),
     Fault("Gauss(s=2, h=0.1, max_steps=9)", lambda: Gauss(s=2, h=0.1, max_steps=9), "Gauss takes max_steps"),
-    Fault(
-        "HBVM(breakpoints=[1]) on a Poisson system",
-        lambda: integrators.integrate(WELL, HBVM(breakpoints=[1.0])),
-        "do not take breakpoints; leave that out, or use Gauss",
-    ),
 ]  # fmt: skip
 
 

@@ -74,7 +74,7 @@ class Broken(HBVM):
             stepper.advance = wrong
             if fault == "forgets":
                 stepper.restore = lambda checkpoint: restore(
-                    dataclasses.replace(checkpoint, e=checkpoint.e + 1e-12)
+                    dataclasses.replace(checkpoint, arrays=tuple(a + 1e-12 for a in checkpoint.arrays))
                 )
             return stepper
 

@@ -14,7 +14,7 @@ import pytest
 import integrators
 import problems
 from integrators import HBVM, Gauss, integrate
-from integrators.kernel.stepper import AdaptiveStepper
+from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Status
 from problems import Foreign, Hamiltonian, Problem, VectorField
 

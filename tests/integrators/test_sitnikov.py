@@ -28,7 +28,10 @@ def test_gauss_of_order_4_loses_the_planetoid():
     # When it does depends on the last bit: of 40 starts 39 lost it, half of them by t = 390, the last at 896.
     lost = 0
     for i in range(5):
-        solution = run(problems.load("sitnikov", z3=1e-9 * (1 + i * 1e-3)), Gauss(s=2, h=0.5))
+        problem = problems.load("sitnikov", z3=1e-9 * (1 + i * 1e-3))
+        solution = integrators.integrate(problem, Gauss(s=2, h=0.5), TIMES)
+        # Of 30 starts one comes too near a body at t = 1375 for a step of this length to have a solution.
+        assert solution.status == "finished" or (solution.status.failed and solution.t_stop > 1000)
         z = np.abs(solution.y[:, 8])
         lost += z.max() > 10 and solution.t[z > 10][0] < 1200
         assert solution.errors()["energy"].max() > 0.05  # measured 0.23 to 1.1

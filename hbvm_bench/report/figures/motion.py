@@ -132,12 +132,7 @@ def _pane(axes: Axes, case: Drawn) -> None:
         if len(path) and np.abs(path[-1]).max() < REACH:
             axes.plot(*path[-1], "o", color=colour if body == 2 else MUTED, markersize=5 if body == 2 else 8)
     name = f"{case.look.number}  {method_name(case.record)}  {options(case.record)}"
-    axes.set_title(
-        f"{name}\n{_fate(case, float(t[-1]))}",
-        color=INK,
-        fontsize=7.5,
-        loc="center",
-    )
+    axes.set_title(f"{name}\n{_fate(case, float(t[-1]))}", color=INK, fontsize=7.5, loc="center")
 
 
 def project(points: Array) -> Array:

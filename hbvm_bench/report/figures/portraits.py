@@ -77,11 +77,7 @@ def crossings(y: Array) -> tuple[Array, Array]:
 
 
 def _grid(
-    clouds: Sequence[tuple[Drawn, Array, Array]],
-    key: str,
-    title: str,
-    caption: str,
-    labels: tuple[str, str],
+    clouds: Sequence[tuple[Drawn, Array, Array]], key: str, title: str, caption: str, labels: tuple[str, str]
 ) -> Picture | None:
     if not clouds:
         return None

@@ -112,10 +112,7 @@ def blocks(results: Results) -> list[Maker]:
         ("how much is chance", lambda: _spread_table(_by_entry(results, "spread"))),
         ("Figure 1", figures.level_curves),
         ("Figure 2", closeup),
-        (
-            "the period",
-            lambda: figures.periods(results["period-annulus/periods"], experiment.saddle_rate()),
-        ),
+        ("the period", lambda: figures.periods(results["period-annulus/periods"], experiment.saddle_rate())),
         ("the fates near the edge", fates),
         ("the other integrators", lambda: _others(results)),
     ]
@@ -163,12 +160,7 @@ def claims(results: Results) -> list[Claim]:
             f"±{rates[1]:.4f}",
             "holds" if rest < 1e-14 and min(rates) > 0 else "no",
         ),
-        Claim(
-            "H* = H(P₁)",
-            "9.050199350868576e-2",
-            f"{level!r}",
-            "holds" if level == H_STAR else "partly",
-        ),
+        Claim("H* = H(P₁)", "9.050199350868576e-2", f"{level!r}", "holds" if level == H_STAR else "partly"),
         Claim(
             "The period tends to infinity as H → H*",
             "cited theorem",

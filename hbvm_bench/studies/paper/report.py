@@ -4,23 +4,9 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Protocol
 
-from hbvm_bench.report.document import (
-    Claim,
-    Claims,
-    Commands,
-    Document,
-    Files,
-    Maker,
-    Section,
-    attempt,
-)
+from hbvm_bench.report.document import Claim, Claims, Commands, Document, Files, Maker, Section, attempt
 from hbvm_bench.store.files import csv_of
-from hbvm_bench.studies.paper import (
-    henon_heiles_part,
-    period_annulus_part,
-    properties_part,
-    sitnikov_part,
-)
+from hbvm_bench.studies.paper import henon_heiles_part, period_annulus_part, properties_part, sitnikov_part
 from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
 from hbvm_bench.studies.paper.results import NAME, Found, Kept, Results, Task
 

@@ -69,12 +69,7 @@ def trajectories(
             left.plot(x, y, color=INK, linewidth=0.9)
             far = int(np.argmax(np.hypot(x, y)))
             left.annotate(
-                str(number),
-                (1.11 * x[far], 1.11 * y[far]),
-                ha="center",
-                va="center",
-                fontsize=8,
-                color=INK,
+                str(number), (1.11 * x[far], 1.11 * y[far]), ha="center", va="center", fontsize=8, color=INK
             )
         left.set_xlim(-reach, reach)
         left.set_ylim(-reach, reach)

@@ -1,1 +1,1 @@
-"""Line integral methods beyond HBVM: several invariants at once, and Poisson systems."""
+"""Line integrals beyond HBVM, several invariants and Poisson systems: other values at a step's stages."""

@@ -1,16 +1,16 @@
-"""The compiled steps of line integral methods in this process."""
+"""The compiled line integrals in this process."""
 
 from typing import Any
 
-from integrators.kernel.native.engine import ENTRY, Engine
+from integrators.kernel.native.engine import Engine
 from integrators.kernel.step.engine import SOURCES
 
 
 def _entry() -> Any:
-    from integrators.kernel.line.loops import entry  # imports numba
+    from integrators.kernel.line.entry import entry  # imports numba
 
     return entry
 
 
-steps = Engine(_entry, ENTRY, *SOURCES, "line")
-"""``steps(what, ctx, ...)``, as `integrators.kernel.step.engine.steps`."""
+line = Engine(_entry, "what ctx", *SOURCES, "line")
+"""Its address is what the steps call where there is a `integrators.kernel.context.Context.line`."""

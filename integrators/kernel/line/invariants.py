@@ -1,12 +1,13 @@
-"""Coefficients of a polynomial along which several invariants are kept.
+"""Values along which several invariants are kept.
 
 With f and the gradients g_i of the invariants at the k stages, their Legendre
 coefficients gamma_j, phi_ij for j < s, and a fixed metric W = diag > 0,
 
     sigma' = sum_j P_j (gamma_j - W sum_i phi_ij alpha_i),
-    sum_m (sum_j phi_ij' W phi_mj) alpha_m = sum_j phi_ij' gamma_j  =: r_i.
+    sum_m (sum_j phi_ij' W phi_mj) alpha_m = sum_j phi_ij' gamma_j  =: r_i,
 
-For an invariant g_i'f = 0 at every stage, so r_i is minus what f and g_i leave
+which are the coefficients of the values f - W sum_i g_i alpha_i at the stages: those take the
+place of the field's. For an invariant g_i'f = 0 at every stage, so r_i is minus what f and g_i leave
 out of their first s Legendre coefficients,
 
     r_i = -sum_l b_l (g_i - sum_j P_j phi_ij)' (f - sum_j P_j gamma_j)  at c_l,
@@ -19,6 +20,9 @@ then vanish exactly, and a fixed-order factorization leaves them so.
 """
 
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_field, get, larger, largest, put, splat8, spread, total
+from integrators.kernel.step.stages import offset, place
+from integrators.kernel.step.sweep import multiply
 
 DEPENDENT = 1e-10  # a pivot this small, relative to its row, is none
 REGULAR = 1e-6  # rounding is taken back along these directions only
@@ -27,12 +31,18 @@ GAIN = 0.125  # of a gap is taken back in a step: the noise of its evaluation av
 
 
 @compiled
-def total(m, row):
-    """Sum up a row of ``sums`` in order, partial sums first."""
-    sums, order, ends = m.sums, m.order, m.ends
+def row(ctx, chunk):
+    """Return where in `LineContext.found` the first row of a group of eight stages is."""
+    return place(chunk, ctx.every * ctx.lanes, ctx.lanes)
+
+
+@compiled
+def ordered(ctx):
+    """Sum up ``terms`` in order, partial sums first."""
+    terms, order, ends = ctx.terms, ctx.order, ctx.ends
     whole, part = 0.0, 0.0
-    for i in range(m.dim):
-        part += sums[row, order[i]]
+    for i in range(ctx.rows):
+        part += terms[order[i]]
         if ends[i]:
             whole += part
             part = 0.0
@@ -40,74 +50,72 @@ def total(m, row):
 
 
 @compiled
-def project(m, width):
-    """Set the Legendre coefficients of the first ``width`` columns of ``stages``."""
-    legendre, projection, stages = m.legendre, m.projection, m.stages
-    for j in range(m.s):
-        for d in range(width):
-            legendre[j, d] = 0.0
-        for i in range(m.k):
-            weight = projection[j, i]
-            for d in range(width):
-                legendre[j, d] += weight * stages[i, d]
-
-
-@compiled
-def leave_rest(m, i):
-    """Set ``rest`` to what the Legendre coefficients leave of stage i."""
-    rest, basis, legendre, stages = m.rest, m.basis, m.legendre, m.stages
-    width = m.width
-    for d in range(width):
-        rest[d] = 0.0
-    for j in range(m.s):
-        weight = basis[i, j]
-        for d in range(width):
-            rest[d] += weight * legendre[j, d]
-    for d in range(width):
-        rest[d] = stages[i, d] - rest[d]
-
-
-@compiled
-def set_right(m):
-    """Set r."""
-    sums, rest, weights, right = m.sums, m.rest, m.weights, m.right
-    n, dim = m.invariants, m.dim
+def keep_invariants(ctx):
+    """Set ``values`` to f - W sum_i g_i alpha_i, from ``found``."""
+    lanes, every, dim, n = ctx.lanes, ctx.every, ctx.rows, ctx.invariants
+    width, groups, chunks = dim * (1 + n), ctx.coefficient_groups, ctx.chunks
+    multiply(ctx.onto, groups, chunks, ctx.found, lanes, ctx.legendre, 8, width, every)
+    multiply(ctx.back, chunks, groups, ctx.legendre, 8, ctx.rest, lanes, width, every)
+    set_gram(ctx)
+    set_right(ctx)
+    alpha, right, owed, h = ctx.alpha, ctx.right, ctx.owed, ctx.h
     for a in range(n):
+        alpha[a] = owed[a] / h if h != 0.0 else 0.0
+    solve_gram(ctx, alpha, REGULAR)
+    solve_gram(ctx, right, DEPENDENT)
+    for a in range(n):
+        alpha[a] += right[a]
+    for chunk in range(chunks):
+        found, values = ctx.found + row(ctx, chunk), ctx.values + offset(ctx, chunk)
         for d in range(dim):
-            sums[a, d] = 0.0
-    for i in range(m.k):
-        leave_rest(m, i)
-        for a in range(n):
-            first = dim * (1 + a)
-            for d in range(dim):
-                sums[a, d] -= weights[i] * (rest[d] * rest[first + d])
-    for a in range(n):
-        right[a] = total(m, a)
+            moved = splat8(0.0)
+            for a in range(n):
+                moved += spread(alpha, a) * get(found, lanes * (dim * (1 + a) + d))
+            put(values, lanes * d, get(found, lanes * d) - spread(ctx.metric, d) * moved)
 
 
 @compiled
-def set_gram(m):
+def set_gram(ctx):
     """Set the matrix of the equations for alpha, its lower half."""
-    sums, legendre, metric, gram = m.sums, m.legendre, m.metric, m.gram
-    dim = m.dim
-    for a in range(m.invariants):
+    terms, legendre, metric, gram = ctx.terms, ctx.legendre, ctx.metric, ctx.gram
+    dim, every = ctx.rows, ctx.every
+    for a in range(ctx.invariants):
         for b in range(a + 1):
             first, second = dim * (1 + a), dim * (1 + b)
             for d in range(dim):
-                sums[0, d] = 0.0
-            for j in range(m.s):
-                for d in range(dim):
-                    sums[0, d] += legendre[j, first + d] * legendre[j, second + d]
-            for d in range(dim):
-                sums[0, d] *= metric[d]
-            gram[a, b] = total(m, 0)
+                products = splat8(0.0)
+                for group in range(ctx.coefficient_groups):
+                    i = 8 * every * group
+                    products += get(legendre, i + 8 * (first + d)) * get(legendre, i + 8 * (second + d))
+                terms[d] = total(products) * metric[d]
+            gram[a, b] = ordered(ctx)
 
 
 @compiled
-def solve_gram(m, right, threshold):
+def set_right(ctx):
+    """Set r."""
+    lanes, dim, terms, weights = ctx.lanes, ctx.rows, ctx.terms, ctx.weights
+    width = dim * (1 + ctx.invariants)
+    for chunk in range(ctx.chunks):
+        found, rest = ctx.found + row(ctx, chunk), ctx.rest + row(ctx, chunk)
+        for d in range(width):
+            put(rest, lanes * d, get(found, lanes * d) - get(rest, lanes * d))
+    for a in range(ctx.invariants):
+        for d in range(dim):
+            products = splat8(0.0)
+            for chunk in range(ctx.chunks):
+                rest = ctx.rest + row(ctx, chunk)
+                product = get(rest, lanes * d) * get(rest, lanes * (dim * (1 + a) + d))
+                products += get(weights, 8 * chunk) * product
+            terms[d] = -total(products)
+        ctx.right[a] = ordered(ctx)
+
+
+@compiled
+def solve_gram(ctx, right, threshold):
     """Replace ``right`` by the solution, by LDL' in the order of the invariants, without small pivots."""
-    gram, lower, pivots, active = m.gram, m.lower, m.pivots, m.active
-    n = m.invariants
+    gram, lower, pivots, active = ctx.gram, ctx.lower, ctx.pivots, ctx.active
+    n = ctx.invariants
     for a in range(n):
         pivot = gram[a, a]
         for b in range(a):
@@ -130,91 +138,80 @@ def solve_gram(m, right, threshold):
 
 
 @compiled
-def keep_invariants(m, h):
-    """Set ``new`` to the coefficients of sigma', from ``stages``."""
-    new, legendre, alpha, right, missing = m.new, m.legendre, m.alpha, m.right, m.missing
-    project(m, m.width)
-    set_gram(m)
-    set_right(m)
-    for a in range(m.invariants):
-        alpha[a] = missing[a] / h
-    solve_gram(m, alpha, REGULAR)
-    solve_gram(m, right, DEPENDENT)
-    for a in range(m.invariants):
-        alpha[a] += right[a]
-    for j in range(m.s):
-        for d in range(m.dim):
-            new[j, d] = legendre[j, d] - correction(m, j, d)
-
-
-@compiled
-def correction(m, j, d):
-    """Return component d of W sum_i phi_ij alpha_i."""
-    legendre, alpha, dim = m.legendre, m.alpha, m.dim
+def correction(ctx, d):
+    """Return component d of W sum_i phi_i0 alpha_i."""
+    legendre, alpha, dim = ctx.legendre, ctx.alpha, ctx.rows
     value = 0.0
-    for a in range(m.invariants):
-        value += legendre[j, dim * (1 + a) + d] * alpha[a]
-    return m.metric[d] * value
+    for a in range(ctx.invariants):
+        value += legendre[8 * (dim * (1 + a) + d)] * alpha[a]
+    return ctx.metric[d] * value
 
 
 @compiled
-def measure_gap(m):
-    """Set ``missing`` to what the step is to take back: a part of what rounding cost the invariants so far.
+def measure_gap(ctx):
+    """Set ``owed`` to what the step is to take back: a part of what rounding cost the invariants so far.
 
     What is more than rounding was lost by the quadrature (k too small); it is
-    counted and stays lost: the invariants are then kept at what they are now.
-    Uses the first of ``stages``, here at the state, and the invariants' values in ``right``.
+    counted and stays lost: the invariants are then kept at what they are now. At a start without a
+    past they are what they are. Uses the first stages, which the step behind does not need any more.
     """
-    stages, sums, right, reference, missing, active = (
-        m.stages,
-        m.sums,
-        m.right,
-        m.reference,
-        m.missing,
-        m.active,
-    )
-    y, e, previous, length, dim = m.y, m.e, m.previous, m.length, m.dim
-    for a in range(m.invariants):
-        gap = right[a] - reference[a]
-        scale = abs(right[a]) + abs(reference[a])
+    rest, reference, owed, active, terms = ctx.rest, ctx.reference, ctx.owed, ctx.active, ctx.terms
+    state, error, lanes, dim, n = ctx.state, ctx.error, ctx.lanes, ctx.rows, ctx.invariants
+    for lane in range(lanes):
+        ctx.times[lane] = ctx.t0
         for d in range(dim):
-            moved = 0.0
-            for j in range(m.s):
-                moved = max(moved, abs(length * previous[j, d]))
-            scale += abs(stages[0, dim * (1 + a) + d]) * (abs(y[d]) + moved)
-            sums[0, d] = stages[0, dim * (1 + a) + d] * e[d]
-        gap += total(m, 0)
-        if not active[a]:
+            ctx.stages[lanes * d + lane] = state[d]
+    call_field(ctx.measure, ctx.times, ctx.stages, ctx.par, rest)
+    for a in range(n):
+        value = rest[lanes * (dim * n + a)]
+        gap = value - reference[a]
+        scale = abs(value) + abs(reference[a])
+        for d in range(dim):
+            slope = rest[lanes * (dim * a + d)]
+            scale += abs(slope) * (abs(state[d]) + abs(ctx.length) * steepest(ctx, d))
+            terms[d] = slope * error[d]
+        gap += ordered(ctx)
+        if ctx.length == 0.0:
+            reference[a], gap = value, 0.0
+        elif not active[a]:
             gap = 0.0
         elif not abs(gap) <= ROUNDING * scale:
-            reference[a] = right[a]
-            gap = 0.0
-            m.lost += 1
-        missing[a] = GAIN * gap
+            reference[a], gap = value, 0.0
+            ctx.lost += 1
+        owed[a] = GAIN * gap
 
 
 @compiled
-def find_change(m, threshold):
-    """Return the first invariant that is none, or -1.
+def steepest(ctx, d):
+    """Return the largest of row d's values in the step behind."""
+    top = splat8(0.0)
+    for chunk in range(ctx.chunks):
+        top = larger(top, abs(get(ctx.values, offset(ctx, chunk) + ctx.lanes * d)))
+    return largest(top)
+
+
+@compiled
+def find_change(ctx, threshold):
+    """Return whether one of the invariants is none: `LineContext.culprit`.
 
     Its gradient along the field, summed over the stages, is compared with the sum
-    of the absolute values of the terms; their ratio is left in DEFECT.
+    of the absolute values of the terms; their ratio is left in `LineContext.defect`.
     """
-    sums, weights, stages = m.sums, m.weights, m.stages
-    dim = m.dim
-    for a in range(m.invariants):
-        first = dim * (1 + a)
+    terms, weights, lanes, dim = ctx.terms, ctx.weights, ctx.lanes, ctx.rows
+    for a in range(ctx.invariants):
+        size = 0.0
         for d in range(dim):
-            sums[0, d] = 0.0
-            sums[1, d] = 0.0
-        for i in range(m.k):
-            for d in range(dim):
-                term = weights[i] * (stages[i, d] * stages[i, first + d])
-                sums[0, d] += term
-                sums[1, d] += abs(term)
-        slope = abs(total(m, 0))
-        terms = total(m, 1)
-        if not slope <= threshold * terms:  # a gradient that is not finite is no good either
-            m.defect = slope / terms
-            return a
-    return -1
+            products, sizes = splat8(0.0), splat8(0.0)
+            for chunk in range(ctx.chunks):
+                found = ctx.found + row(ctx, chunk)
+                product = get(found, lanes * d) * get(found, lanes * (dim * (1 + a) + d))
+                term = get(weights, 8 * chunk) * product
+                products += term
+                sizes += abs(term)
+            terms[d] = total(products)
+            size += total(sizes)
+        slope = abs(ordered(ctx))
+        if not slope <= threshold * size:  # a gradient that is not finite is no good either
+            ctx.culprit, ctx.defect = a, slope / size
+            return True
+    return False

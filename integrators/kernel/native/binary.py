@@ -7,11 +7,13 @@ numba, which costs more than everything else it does before its first step.
 """
 
 import ctypes.util
+import gc
 import hashlib
 import logging  # noqa: F401 -- its lock must be taken after ours at a fork: whoever compiles may log
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -171,7 +173,7 @@ def _compiled(
 ) -> Made:
     from integrators.kernel.native import jit  # imports numba
 
-    with lock:
+    with lock, _uncollected():
         module, inner = jit.module(function, tuple(kind for kind, _ in arguments))
         entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
         module.link_in(llvm.parse_assembly(entry))
@@ -183,6 +185,18 @@ def _compiled(
         builder = llvm.create_pass_builder(machine, options)
         builder.getModulePassManager().run(module, builder)
         return emit(machine, module)
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Leave garbage where it is meanwhile: looking for it takes a tenth of a compiler's time."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def processor() -> str:

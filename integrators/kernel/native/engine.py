@@ -1,6 +1,7 @@
 """Compiled entries in this process, called with integers and addresses."""
 
 import ctypes
+import sys
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -8,9 +9,17 @@ from typing import Any
 from integrators.kernel.native import binary, store
 from integrators.kernel.native.foreign import raise_error
 
-# What the entries of `step` and, but for batches, of `line` can do; see `integrators.kernel.step.entry`.
+# What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, ADVANCE_BATCH, WALK = range(4)
 ENTRY = "what ctx side between count times targets parts first out budget"
+
+WAIT = "integrators: compiling the kernel for this processor, once: 5 to 10 s (ahead: `hbvm-bench warm`)"
+
+
+def _say_what_is_waited_for() -> None:
+    """Tell somebody who sits at a terminal why nothing happens."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print(WAIT, file=sys.stderr, flush=True)
 
 
 class Engine:
@@ -33,6 +42,7 @@ class Engine:
         """Return the machine code."""
 
         def make() -> tuple[str, bytes]:
+            _say_what_is_waited_for()
             from numba import types
 
             return " ", binary.build(self._make(), [(types.int64, "i64")] * len(self._arguments), "i64")

@@ -137,7 +137,7 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
     line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * lanes, size))
 
     def view(kind: Any, address: int) -> Any:
-        return np.ctypeslib.as_array(kind.from_address(address))
+        return np.frombuffer(kind.from_address(address))
 
     def field(t: int, stages: int, par: int, values: int) -> None:
         out = view(block, values).reshape(dim, lanes)
@@ -145,16 +145,19 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
         if _raised.error is not None:
             return
         try:
-            times = view(line, t)
-            rows = view(block, stages).reshape(dim, lanes)
+            times = view(line, t).tolist()
+            states = view(block, stages).reshape(dim, lanes).T.copy()
             given = view(numbers, par).copy() if size else np.empty(0)
-            for l in range(lanes):
-                if l and times[l] == times[l - 1] and (rows[:, l] == rows[:, l - 1]).all():
-                    out[:, l] = out[:, l - 1]  # idle lanes repeat the last stage
-                    continue
-                derivative = np.empty(dim)
-                system.evaluate(float(times[l]), rows[:, l].copy(), given, derivative)
-                out[:, l] = derivative
+            derivatives = np.empty((lanes, dim))
+            behind: tuple[Any, ...] = ()
+            with np.errstate(all="ignore"):
+                for time, state, derivative in zip(times, states, derivatives, strict=True):
+                    if behind and time == behind[0] and (state == behind[1]).all():
+                        derivative[:] = behind[2]  # idle lanes repeat the last stage
+                    else:
+                        system.evaluate(time, state, given, derivative)
+                    behind = time, state, derivative
+            out[:] = derivatives.T
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             _raised.error = error
 

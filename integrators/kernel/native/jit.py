@@ -7,6 +7,7 @@ keeps of each function nothing but what it was lowered to, and `module` links th
 that an entry needs; `integrators.kernel.native.binary` does the rest once.
 """
 
+from functools import cached_property
 from typing import Any, cast
 
 import llvmlite.binding as llvm
@@ -20,6 +21,8 @@ from numba.core.target_extension import (
     target_override,
     target_registry,
 )
+from numba.core.typing import mathdecl
+from numba.core.typing.context import Context
 
 NAME = "hbvm kernel"
 OPTIONS = {
@@ -56,6 +59,13 @@ class _Processor(CPU):
     """The processor, once more."""
 
 
+class _Types(Context):
+    """What numba knows of types, without NumPy's: each `+` would be looked up among the ufuncs too."""
+
+    def load_additional_registries(self) -> None:
+        self.install_registry(mathdecl.registry)
+
+
 class _Target(registry.CPUTarget):
     _made: Any = None
 
@@ -65,6 +75,14 @@ class _Target(registry.CPUTarget):
             self._made = cpu.CPUContext(self.typing_context, self._target_name)
             self._made._internal_codegen = _Codegen(NAME)
         return self._made
+
+    @cached_property
+    def _types(self) -> _Types:
+        return _Types()
+
+    @property
+    def typing_context(self) -> Any:
+        return self._types
 
 
 class _Passes(CompilerBase):

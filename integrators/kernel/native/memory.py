@@ -124,9 +124,10 @@ class Memory:
     slots: ClassVar[dict[str, Slot]] = {}
 
     def __init_subclass__(cls) -> None:
-        cls.slots = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
-        for place, slot in enumerate(cls.slots.values()):
+        own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
+        for place, slot in enumerate(own.values(), len(cls.slots)):
             slot.place = place
+        cls.slots = {**cls.slots, **own}
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
         def length(slot: Array) -> int:

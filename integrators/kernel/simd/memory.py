@@ -181,17 +181,6 @@ put_upper = _half(4)
 
 
 @intrinsic
-def upper(typing, x):
-    """Keep the upper four lanes and set the lower ones to zero."""
-
-    def generate(context, builder, sig, args):
-        zero = ir.Constant(vector(WIDTH), [0.0] * WIDTH)
-        return builder.shuffle_vector(zero, args[0], indices(0, 1, 2, 3, 12, 13, 14, 15))
-
-    return signature(EIGHT, EIGHT), generate
-
-
-@intrinsic
 def larger(typing, x, y):
     """Lane by lane the larger of two vectors that are not negative; NaN where either is."""
 
@@ -243,5 +232,7 @@ call_sweeps = _caller(3)
 """``call_sweeps(fused, ctx, count, tested)``: see `integrators.kernel.step.fused`."""
 call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
+call_line = _caller(2, types.int64)
+"""``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""

@@ -11,7 +11,7 @@ from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import multiply, product, project, through
+from integrators.kernel.step.sweep import multiply, product, product_of_two, project, through
 from integrators.kernel.tables import THROUGH
 
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
@@ -104,8 +104,10 @@ def start_plain(ctx):
 
 @compiled
 def start_extrapolated(ctx):
-    """First stages from the previous step's values, of the same length: one product with a table."""
-    if ctx.route == THROUGH:
+    """First stages from the values of the previous step, or of two, of the same length."""
+    if ctx.route == 8 and ctx.older_length == ctx.h:
+        product_of_two(ctx, ctx.extrapolation_two, ctx.older_values)
+    elif ctx.route == THROUGH:
         through(ctx, ctx.mode_projection, ctx.mode_groups, ctx.extrapolation)
     else:
         product(ctx, ctx.extrapolation)
@@ -166,7 +168,10 @@ def begin(ctx):
     prepare(ctx)
     if ctx.length == ctx.h and not ctx.varying:
         start_extrapolated(ctx)
+        ctx.older_length = ctx.h
+        ctx.values, ctx.older_values = ctx.older_values, ctx.values
     else:
+        ctx.older_length = 0.0
         predict(ctx, ctx, ctx.length, 0.0 if ctx.rejected else 1.0)
     ctx.age -= 1
     if ctx.age < 0 or ctx.predicted == 0:

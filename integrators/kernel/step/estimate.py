@@ -21,6 +21,10 @@ def coefficient(ctx, row, which):
     """Return eight partial sums of what row ``which`` of the estimators makes of a row of values."""
     values, i, chunks = ctx.values, ctx.lanes * row, ctx.chunks
     table = ctx.estimators + 8 * chunks * which
+    if ctx.route == 8:
+        return get(table, 0) * get(values, i)
+    if ctx.route == 16:
+        return fma(get(table, 8), get(values, i + 8), get(table, 0) * get(values, i))
     result = splat8(0.0)
     for chunk in range(chunks):
         result = fma(get(table, 8 * chunk), get(values, i + offset(ctx, chunk)), result)

@@ -5,10 +5,10 @@ rounded; the whole displacement is formed first and the state added last, as a
 sum whose rounding error is kept.
 """
 
-from integrators.kernel.context import BY_INCREMENT, DONE, NOT_FINITE, UNSOLVED
+from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma, two_sum
-from integrators.kernel.simd.memory import get, put, splat8, sums, swap, total
+from integrators.kernel.simd.memory import call_line, get, put, splat8, sums, swap, total
 from integrators.kernel.step.stages import offset
 
 
@@ -80,7 +80,9 @@ def finish_by_increment(ctx):
 
 @compiled
 def finish(ctx):
-    """Set the next state from the state and the solved step's values; return DONE or NOT_FINITE."""
+    """Set the next state from the state and the solved step's values; return the outcome."""
+    if ctx.line:
+        return call_line(ctx.line, END, ctx)
     if ctx.solved == BY_INCREMENT:
         return finish_by_increment(ctx)
     rows, h = ctx.rows, ctx.h
@@ -118,3 +120,11 @@ def commit(ctx):
     ctx.steps += 1
     ctx.length = ctx.h
     ctx.solved = UNSOLVED
+    arrive(ctx)
+
+
+@compiled
+def arrive(ctx):
+    """Let a line integral know of a new state, in which the step of ``Context.length`` has ended; 0: none."""
+    if ctx.line:
+        call_line(ctx.line, ARRIVE, ctx)

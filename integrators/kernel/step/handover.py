@@ -14,6 +14,7 @@ SHORTEST, LONGEST = 16, 256  # steps for which it then stays, twice as many each
 def solve_implicitly(ctx, side, started):
     """Solve the step in ``side``, ``ctx`` itself or a partial step of it, by the implicit solver."""
     ctx.implicit_steps += 1 - started
+    ctx.older_length = 0.0
     return call_solver(side.solver, side, side.solver_memory, started)
 
 

@@ -19,7 +19,7 @@ def kink(ctx, ends):
     t, h = ctx.t0, ctx.h
     if ctx.kinked == 0:
         suspect = ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
-        if not (ends and suspect and differs_at_an_end(ctx)):
+        if ctx.line or not (ends and suspect and differs_at_an_end(ctx)):
             return False
     found, end = ctx.kinks, ctx.kink_end
     if found == 0 or (t - end) * h >= 0.0:

@@ -7,7 +7,7 @@ from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.advance import step
 from integrators.kernel.step.begin import begin, set_factors
 from integrators.kernel.step.estimate import first_length
-from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.finish import arrive, commit, finish
 from integrators.kernel.step.handover import reconsider
 from integrators.kernel.step.iterate import close, test
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
@@ -129,11 +129,12 @@ def reset(ctx, start):
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
     set_factors(ctx, ctx.h)
-    ctx.length = 0.0
+    ctx.length = ctx.older_length = 0.0
     ctx.n = ctx.age = ctx.free = ctx.made = 0
     ctx.solved = UNSOLVED
     ctx.outcome = DONE
     ctx.alive = 1
+    arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)
         ctx.age = 0

@@ -5,7 +5,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
-from integrators.kernel.step.finish import finish
+from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.handover import settle_part
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.sweep import project
@@ -131,7 +131,7 @@ def add_counters(ctx, side):
 
 
 @compiled
-def arrive(ctx, t):
+def set_time(ctx, t):
     """Let the present time be t, and count steps from here."""
     ctx.t0, ctx.time_low, ctx.n = t, 0.0, 0
 
@@ -142,9 +142,10 @@ def land(ctx, side, t):
     copy(side.next_state, ctx.state, vectors_of_state(ctx))
     copy(side.next_error, ctx.error, vectors_of_state(ctx))
     copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
-    ctx.length = side.h
-    arrive(ctx, t)
+    ctx.length, ctx.older_length = side.h, 0.0
+    set_time(ctx, t)
     ctx.solved = UNSOLVED
+    arrive(ctx)
 
 
 @compiled
@@ -153,7 +154,7 @@ def sample(ctx, side, between, t, part, out):
     if part == 0.0:
         write(ctx, ctx.state, out)
         if between == LAND:
-            arrive(ctx, t)
+            set_time(ctx, t)
         return DONE
     if between in (DENSE, SIDE):
         # A part starts from the step ahead. Where that fails, nothing in it is reached: near a

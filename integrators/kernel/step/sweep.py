@@ -6,10 +6,12 @@ its size. Rows are independent and go through the same operations; the columns
 of A stay in registers while the rows pass by.
 """
 
+from integrators.kernel.context import VALUES
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import (
     call_field,
+    call_line,
     call_sweeps,
     columns,
     combine,
@@ -27,7 +29,10 @@ INFINITY = float("inf")
 
 @compiled
 def evaluate(ctx):
-    """Set the values of the field at the stages, one call per block of them."""
+    """Set the values of the field at the stages, one call per block of them, or those of a line integral."""
+    if ctx.line:
+        call_line(ctx.line, VALUES, ctx)
+        return
     field, par = ctx.field, ctx.par
     times, stages, values = ctx.times, ctx.stages, ctx.values
     lanes = ctx.lanes
@@ -50,6 +55,18 @@ def product8(ctx, table):
         for d in range(rows):
             moved = fma(spread(factor, d), combine_only(matrix, values, 8 * d), get(base, 8 * d))
             put(stages, 8 * d, spread(state, d) + moved)
+
+
+@compiled
+def product_of_two(ctx, table, older):
+    """As `product8`, of the values of two steps."""
+    before, last = columns(table, 0, 8), columns(table, 64, 8)
+    stages, values, base, state, factor = ctx.stages, ctx.values, ctx.base, ctx.row_state, ctx.row_factor
+    unit = ctx.unit
+    for d in range(ctx.rows):
+        sums = combine(last, values, 8 * d, combine_only(before, older, 8 * d))
+        moved = sums if unit else spread(factor, d) * sums
+        put(stages, 8 * d, spread(state, d) + (get(base, 8 * d) + moved))
 
 
 @compiled

@@ -3,20 +3,21 @@
 Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
 """
 
-from math import log
+from math import log, log2
 
 from integrators.kernel.context import (
     BY_VALUES,
     DIVERGED,
     DONE,
     FIXED_POINT,
+    NOT_KEPT,
     RUNNING,
     SCATTERED,
     UNDERFLOW,
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.simd.lanes import binary_log, two_sum
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, set_step
 from integrators.kernel.step.control import (
     APPROACH,
@@ -28,11 +29,13 @@ from integrators.kernel.step.control import (
     TINY,
     bounded,
     log_factor,
+    log_ratio,
+    log_size,
 )
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import close, evaluate_at_last, settle, test
+from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.size import ROUNDING
 from integrators.kernel.step.sweep import sweep, sweep_measured
@@ -41,9 +44,12 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
 # and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
 BUSY, BUSY_FIRST = 18.0, 36.0
-GOAL = log(1e-17)  # a change that is going to be no larger is not waited for
-FIRST_RATE, LEAST_RATE, MOST_RATE = log(0.01), log(1e-4), log(0.9)
-HOPE = log(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
+# Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
+LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
+MOST_UNTESTED = 12
+MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
+FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
+HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
 # MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
@@ -63,7 +69,7 @@ def attempt(ctx, h):
     """Solve the step of length h from the state; return the outcome."""
     set_step(ctx, h)
     if ctx.implicit:
-        ctx.log_rate = FIRST_RATE  # nobody knows what it will be afterwards
+        ctx.rate = FIRST_RATE  # nobody knows what it will be afterwards
         outcome = solve_implicitly(ctx, ctx, 0)
     else:
         begin(ctx)
@@ -75,29 +81,35 @@ def attempt(ctx, h):
 def iterate(ctx):
     """Iterate until the step is solved or has failed; return the outcome.
 
-    The first change and the rate of contraction, as it was at the last step, tell how
-    many iterations need no test. Nor does the one that will not change anything.
+    The first change and the rate of contraction, as it was at the last step, tell how many
+    iterations need no test; how many remain then, the rate of this step.
     """
     test(ctx, sweep_measured(ctx))
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
-    first = log(ctx.last)
-    rate = ctx.log_rate
-    sweep(ctx, int((GOAL - first) / rate) - 1)
+    first, known = binary_log(ctx.last), ctx.rate
+    rate = known
+    change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
     while ctx.outcome == RUNNING:
-        test(ctx, sweep_measured(ctx))
+        sweep(ctx, min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED))
+        strict = sweep_measured(ctx)
         tries = ctx.tried - tried
-        if tries <= 0:  # started anew
-            return settle(ctx)
-        last = ctx.last
-        if last > ROUNDING:
-            rate = min(max((log(last) - first) / tries, LEAST_RATE), MOST_RATE)
-        elif last == 0.0 and tries > 1:
+        if strict > ROUNDING:
+            change = binary_log(strict)
+            rate = min(max((change - first) / tries, LEAST_RATE), MOST_RATE)
+        elif strict == 0.0 and tries > 1:
             rate = max(rate + HOPE, LEAST_RATE)
-        if ctx.outcome == RUNNING and log(last) + rate < GOAL:
-            evaluate_at_last(ctx)
-    ctx.log_rate = rate
+        ctx.rate = rate
+        test(ctx, strict)
+        if ctx.tried <= tried:  # started anew
+            return settle(ctx)
+        if ctx.outcome == RUNNING:
+            if strict <= TRUSTED:
+                polish(ctx, strict)
+            elif tries >= TRIAL and tries + (LOG_REST - change) / rate > most:
+                ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
+                ctx.rate = known
     return close(ctx)
 
 
@@ -108,15 +120,15 @@ def longer(ctx, error, defect, grow):
         return SHRINK
     h = ctx.h
     behind = ctx.length_behind
-    change = log(abs(h / behind)) if behind != 0.0 else 0.0
+    change = log_ratio(h / behind) if behind != 0.0 else 0.0
     power = 1.0 / (2.0 * ctx.error_degree + 1.0)
-    here = power * log(max(error, TINY))
+    here = power * log_size(max(error, TINY))
     before = ctx.error_behind if behind != 0.0 else INFINITY
     factor = log_factor(ctx.error_aim, here, before, change)
     ctx.error_ahead = here
     if ctx.allowed_defect < INFINITY:
         power = 1.0 / (2.0 * ctx.k - 1.0)
-        here = power * log(max(defect, TINY))
+        here = power * log_size(max(defect, TINY))
         before = ctx.defect_behind if behind != 0.0 else INFINITY
         factor = min(factor, log_factor(ctx.defect_aim, here, before, change))
         ctx.defect_ahead = here
@@ -208,6 +220,8 @@ def ready(ctx):
         if implicit and ctx.implicit == 0:
             learn(ctx)
         ctx.solved = UNSOLVED
+        if outcome == NOT_KEPT:
+            return outcome
         error, defect = INFINITY, INFINITY
         if outcome == DONE:
             error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)

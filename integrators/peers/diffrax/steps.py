@@ -46,10 +46,15 @@ class _Direction:
 
     def __init__(self, stepper: StepperBase, program: DiffraxProgram, sign: int):
         self.sign = sign
+        self._of = stepper, program
         self.solve, known = program.made(sign)
         if not known:
             extra = stepper.stats.extra
             extra["compile_seconds"] = extra.get("compile_seconds", 0.0) + self.solve.seconds
+
+    def towards(self, sign: int) -> "_Direction":
+        """Return the compiled solve for the direction ``sign``."""
+        return self if sign == self.sign else _Direction(*self._of, sign)
 
     def plain(self, t: float, end: float, *rest: Any) -> Any:
         """Solve plainly; see `integrators.peers.diffrax.solve.Solve.plain`."""
@@ -121,10 +126,11 @@ class DiffraxStepper(FixedStepper):
 
     def _save_steps(self) -> Any:
         # JAX's arrays are immutable.
-        return self._way, self._states, self._inner
+        return self._way.sign, self._states, self._inner
 
     def _load_steps(self, steps: Any) -> None:
-        self._way, self._states, self._inner = steps
+        sign, self._states, self._inner = steps
+        self._way = self._way.towards(sign)
 
 
 class AdaptiveStepper(StepperBase):
@@ -244,7 +250,8 @@ class AdaptiveStepper(StepperBase):
 
     def _save(self) -> Any:
         # JAX's arrays are immutable.
-        return self._way, self._inner
+        return self._way.sign, self._inner
 
     def _load(self, inner: Any) -> None:
-        self._way, self._inner = inner
+        sign, self._inner = inner
+        self._way = self._way.towards(sign)

@@ -10,7 +10,7 @@ from scipy.integrate import DenseOutput
 
 import integrators
 from integrators.automatic import DEFECT
-from integrators.kernel.stepper import HBVMStepper
+from integrators.kernel.fixed import FixedStepper
 from integrators.plugins.scipy.field import Field
 from integrators.protocol import Samples, Status
 from integrators.times import plan
@@ -169,10 +169,10 @@ class Between:
     def state(self, t0: float, y: Array, t: float) -> Array:
         """Return the state at t from that at t0; not a number where the step cannot be solved."""
         with self._lock:
-            if not isinstance(self._stepper, HBVMStepper):
+            if not isinstance(self._stepper, FixedStepper):
                 self._earlier = self.evaluations
                 self._stepper = self._program.start(y, self._par, t0)
-            if isinstance(self._stepper, HBVMStepper):
+            if isinstance(self._stepper, FixedStepper):
                 made = self._stepper.single(y, t0, t)
             else:
                 made = self._stepper.advance(np.array([t]), sample="land")

@@ -21,15 +21,21 @@ from integrators.plugins.scipy.stages import Solved, Stages
 
 SAFETY = 0.9
 SHRINK, GROW = 0.2, 10.0  # bounds of the change of the step
-CONTRACTION = 0.35  # of the fixed-point iteration: beyond it, shorter steps cost less
+CONTRACTION = (
+    0.2  # of the fixed-point iteration that a step aims at; 1/e would be cheapest if rates were sure
+)
+TOO_SLOW = 0.85  # at which it is broken off, where the step may be shorter
 STIFF = 4.0  # Newton when the tolerance permits steps so much longer than the fixed point does
 STIFF_STEPS = 3  # for so many steps in a row
-MILD = 0.25  # the fixed point again when it contracts by this at least
+MILD = (
+    0.15  # the fixed point again when it contracts by this at least; below `CONTRACTION`, or they alternate
+)
 SLOW = 0.1  # rate of Newton's iteration above which the Jacobian is too old
 KEEP = 1.2  # Newton's factorisations are kept when the step could only grow by less
 NEWTON_ITERATIONS = 12
-MOST_NODES = 64
-UNSEEN = 1e-8  # size of the last two coefficients that k nodes determine, relative, for an automatic k
+FEW_NODES, MOST_NODES = 16, 64  # more than few only where Newton takes long steps: shorter ones cost less
+HIDDEN = 10.0  # times what may be hidden from the nodes, above which a step is taken again, shorter
+SEEN = 1e-8  # size of the last two coefficients that k nodes determine, relative, for an automatic k
 
 CLOSE = 1e-9  # part of a constant step that is not made for its own sake
 
@@ -104,16 +110,23 @@ class PythonSteps:
             h_abs = abs(h)
             solved = self._solve(t, h, y)
             if not solved.converged:
-                h_abs, rejected = 0.5 * h_abs, True
+                h_abs, rejected = h_abs * min(0.5, max(SHRINK, CONTRACTION / solved.rate)), True
                 continue
             error = self._error(t, h, y, solved)
             if not error <= 1.0:
                 wanted = SAFETY * error ** (-1.0 / self._order) if np.isfinite(error) else SHRINK
                 h_abs, rejected = h_abs * max(SHRINK, wanted), True
-            elif self._automatic and not self._seen(solved):
-                self._stages = self._stages.with_nodes(min(self.k + max(2, self.k // 4), MOST_NODES))
+                continue
+            unseen = self._unseen(solved) if self._automatic else 0.0
+            if unseen > 1.0 and self.k < (MOST_NODES if self._stiff else FEW_NODES):
+                self._stages = self._stages.with_nodes(self.k + max(2, self.k // 4))
+            elif unseen > HIDDEN and not self._stiff:
+                h_abs, rejected = h_abs * max(SHRINK, SAFETY * unseen ** (-1.0 / self.k)), True
             else:
-                self._length = h_abs * self._factor(h_abs, error, solved.rate, rejected)
+                factor = self._factor(h_abs, error, solved.rate, rejected)
+                if unseen > 0.0 and not self._stiff and self.k >= FEW_NODES:
+                    factor = max(SHRINK, min(factor, SAFETY * unseen ** (-1.0 / self.k)))
+                self._length = h_abs * factor
                 self._error_old = error
                 return t_new, solved
         return OdeSolver.TOO_SMALL_STEP
@@ -185,10 +198,11 @@ class PythonSteps:
         stages, newton, e = self._stages, self._newton, self._e
         guess = stages.guess(self._G, h / self._h if self._h else 0.0)
         if not self._stiff and self._limited < STIFF_STEPS:
-            solved = stages.solve(t, h, y, e, guess)
-            if solved.converged or not self._h:
+            slowest = TOO_SLOW if self._constant is None else np.inf
+            solved = stages.solve(t, h, y, e, guess, slowest=slowest)
+            if solved.converged or not self._h or solved.rate < np.inf:
                 return solved
-            return stages.solve(t, h, y, e, np.zeros_like(guess))
+            return stages.solve(t, h, y, e, np.zeros_like(guess), slowest=slowest)
         newton.old, self._stiff = newton.old or not self._stiff, True
         while True:
             if newton.old:
@@ -216,13 +230,15 @@ class PythonSteps:
             top, bottom = norm(last / scale), norm(solved.G[0] / scale)
             return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
 
-    def _seen(self, solved: Solved) -> bool:
-        """Whether k nodes see the energy to round-off: the coefficients have decayed to the root of it."""
-        if self.k + 2 > MOST_NODES:
-            return True
+    def _unseen(self, solved: Solved) -> float:
+        """Return how much of the field k nodes do not see: up to 1, the energy is kept to round-off.
+
+        The coefficients must have decayed to the root of that.
+        """
         sizes = np.abs(self._stages.coefficients(solved.values))
         top = sizes.max(axis=0)
-        return bool((sizes[-2:] <= UNSEEN * np.maximum(top, 1e-3 * top.max())).all())
+        floor = SEEN * np.maximum(top, 1e-3 * top.max())
+        return float((sizes[-2:] / np.where(floor > 0.0, floor, 1.0)).max())
 
     def dense_output(self) -> DenseOutput:
         """Return the states between the present one and the one before."""

@@ -19,6 +19,7 @@ STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
 PATIENCE = 2  # changes that are no new smallest one, to end the iteration below STAGNATION
 HOPELESS = 4  # the same above STAGNATION
 MAX_ITERATIONS = 100
+SURE = 10  # iterations after which their rate is believed
 FLOOR = 1e-3  # of the largest size: where rounding of the field may hide a small component
 MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
@@ -99,7 +100,7 @@ class Stages:
 
     def solve(
         self, t: float, h: float, y: Array, e: Array, G: Array,
-        correct: Callable[[Array], Array] | None = None, most: int = MAX_ITERATIONS,
+        correct: Callable[[Array], Array] | None = None, most: int = MAX_ITERATIONS, slowest: float = np.inf,
     ) -> Solved:  # fmt: skip
         """Solve the stage equations from a first guess ``G``.
 
@@ -115,6 +116,8 @@ class Stages:
             Newton's correction for a residual (s, n); ``None``: fixed point.
         most : int
             Iterations after which it has failed if changes are still above `STAGNATION`.
+        slowest : float
+            Rate above which changes shrink too slowly to go on.
         """
         best, last, stalled, rate = np.inf, np.inf, 0, 0.0
         values = np.empty((self.k, y.size), y.dtype)
@@ -147,6 +150,8 @@ class Stages:
                 return Solved(G, values, False, np.inf)
             if iteration and floored > STAGNATION:
                 rate = floored / last if iteration == 1 else max(0.5 * rate, floored / last)
+                if iteration >= SURE and rate > slowest:
+                    return Solved(G, values, False, rate)
             last = floored
         return Solved(G, values, False, max(rate, 1.0))
 

@@ -125,11 +125,11 @@ def test_a_collision_underflows_the_step():
 
 @pytest.mark.parametrize("options", [{"h": 0.1}, {"tol": 1e-8}], ids=str)
 def test_nan_from_the_field_is_a_status(options):
-    def f(y, m):  # the square root ends at y = 0
-        return [-1.0 + 0 * m.sqrt(y[0]), 0.0]
+    def f(y, m):  # the square root ends at y = 1
+        return [-1.0 + 0 * m.sqrt(y[0] - 1.0), 0.0]
 
     system = VectorField(f, dim=2, invariants={"second": lambda y: y[1]}, name="ending")
-    problem = Problem(system, y0=[1.05, 2.0], t_end=3.0)
+    problem = Problem(system, y0=[2.05, 2.0], t_end=3.0)
     method = LineIntegral(k=4, s=2, invariants=["second"], **options)
     solution = integrators.integrate(problem, method, np.linspace(0, 3, 31))
     assert solution.status is Status.NOT_FINITE

@@ -5,7 +5,8 @@ import pytest
 
 import problems
 from integrators import HBVM, LineIntegral
-from integrators.kernel.line.program import LineProgram, components
+from integrators.kernel.line.kept import components
+from integrators.kernel.program import HBVMProgram
 from integrators.legendre import tables
 from problems import emit
 
@@ -85,7 +86,7 @@ def test_a_vector_invariant_stands_for_its_components():
 
 def test_parameters_are_run_time_values():
     problem = problems.load("rigid_body", quartic=0.5, t_end=10.0)
-    program = LineProgram(problem.system, k=8, s=2, h=0.1, invariants=["energy", "casimir"])
+    program = HBVMProgram(problem.system, k=8, s=2, h=0.1, keep=["energy", "casimir"])
     ends = []
     for quartic in (0.5, 0.0):
         other = problems.load("rigid_body", quartic=quartic, t_end=10.0)

@@ -20,8 +20,8 @@ def test_both_laws_that_the_papers_methods_could_not_keep_together(sitnikov):
     solution = integrators.integrate(sitnikov, method, TIMES)
     assert solution.status == "finished", solution.reason
     errors = solution.errors()
-    assert errors["energy"].max() <= 1e-14  # measured 3.6e-15
-    assert errors["angular_momentum"].max() <= 2e-15  # measured 4.3e-16
+    assert errors["energy"].max() <= 1e-14  # measured 4.1e-15
+    assert errors["angular_momentum"].max() <= 2e-15  # measured 3.2e-16
     assert solution.guards()["off_axis"].max() == 0.0
     assert np.abs(solution.y[:, 8]).max() < 2  # measured 1.684
     assert solution.stats.extra["lost"] == 0
@@ -37,8 +37,8 @@ def test_all_seven_invariants_at_once(sitnikov):
     names = ["energy", "angular_momentum", "linear_momentum"]
     solution = integrators.integrate(sitnikov, LineIntegral(k=24, s=4, h=0.5, invariants=names), TIMES)
     errors = solution.errors()
-    assert errors["energy"].max() <= 1e-14  # measured 3.6e-15
-    assert errors["angular_momentum"].max() <= 2e-15  # measured 3.9e-16
+    assert errors["energy"].max() <= 1e-14  # measured 4.1e-15
+    assert errors["angular_momentum"].max() <= 2e-15  # measured 3.3e-16
     assert errors["linear_momentum"].max() <= 2e-15  # measured 5.1e-16
     assert solution.guards()["off_axis"].max() == 0.0
 
@@ -47,7 +47,7 @@ def test_errors_do_not_grow(sitnikov):
     method = LineIntegral(k=24, s=4, h=0.5, invariants=["energy", "angular_momentum"])
     errors = integrators.integrate(sitnikov, method, TIMES).errors()["energy"]
     early, late = (np.sqrt(np.mean(part**2)) for part in (errors[:1000], errors[-1000:]))
-    assert late < 2 * early  # measured 4.3e-16 and 3.5e-16
+    assert late < 2 * early  # measured 3.2e-16 and 3.5e-16
 
 
 def test_a_quadrature_that_is_too_coarse_is_not_hidden(sitnikov):

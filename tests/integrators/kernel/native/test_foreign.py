@@ -121,7 +121,7 @@ def test_the_time_is_the_stages_own():
     assert abs(made.y[0, 0] - math.sin(-3.0)) < 1e-14  # measured 2.8e-17
 
 
-@pytest.mark.parametrize("field", [lambda t, y: [math.sqrt(1 - y[0])], lambda t, y: [1 / (y[0] < 0.5)]])
+@pytest.mark.parametrize("field", [lambda t, y: [math.sqrt(1 - t)], lambda t, y: [1 / (y[0] < 0.5)]])
 def test_where_a_function_is_not_defined_is_a_status_with_the_time(field):
     problem = Problem(Foreign(field, dim=1, name="ends"), y0=[0.0], t_end=9.0)
     made = integrate(problem, HBVM(k=4, s=2, h=0.01), sample="steps")

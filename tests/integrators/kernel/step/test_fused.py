@@ -28,10 +28,10 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     problem = problems.load(name)
     times = np.arange(1, 60) * (0.7 * settings["h"])  # partial steps as well
     program = HBVMProgram(problem.system, **settings)
-    assert program.context().fused != 0
+    assert program.contexts()[0].fused != 0
     fused = run(problem, settings, times)
     monkeypatch.setattr(whole, "ROWS", 0)
-    assert HBVMProgram(problem.system, **settings).context().fused == 0
+    assert HBVMProgram(problem.system, **settings).contexts()[0].fused == 0
     alone = run(problem, settings, times)
     assert fused[0].tobytes() == alone[0].tobytes()
     assert fused[1] == alone[1]
@@ -39,7 +39,7 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
 
 def test_larger_systems_wider_methods_and_other_masses_are_not_fused():
     def fused(problem, **settings):
-        return HBVMProgram(problem.system, **settings).context().fused != 0
+        return HBVMProgram(problem.system, **settings).contexts()[0].fused != 0
 
     assert not fused(problems.load("outer_solar_system"), k=8, s=8, h=1.0)
     assert not fused(problems.load("kepler"), k=20, s=8, h=0.1)

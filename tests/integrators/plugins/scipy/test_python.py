@@ -80,8 +80,29 @@ def test_a_stiff_system_is_solved_by_newton_with_every_kind_of_jacobian(options:
 def test_newtons_iterations_go_on_while_they_converge() -> None:
     made = solve_ivp(van_der_pol, (0.0, 200.0), [2.0, 0.0], method=HBVM, rtol=1e-6, atol=1e-6)
     assert made.success
-    assert made.t.size < 18  # measured 15, and 26 when 12 iterations are all
-    assert made.njev < 3  # measured 1, and 7
+    assert made.t.size < 25  # measured 20, and 30 when 12 iterations are all
+    assert made.njev < 5  # measured 3, and 10
+
+
+def orbit(t: float, y: np.ndarray) -> list[float]:
+    cube = (y[0] ** 2 + y[1] ** 2) ** 1.5
+    return [y[2], y[3], -y[0] / cube, -y[1] / cube]
+
+
+def oscillators(t: float, y: np.ndarray) -> list[float]:
+    return [y[2], y[3], -y[0] - 2.0 * y[0] * y[1], -y[1] - y[0] ** 2 + y[1] ** 2]
+
+
+@pytest.mark.parametrize(
+    ("field", "start"), [(orbit, [0.4, 0.0, 0.0, 2.0]), (oscillators, [0.0, 0.1, 0.49, 0.0])]
+)
+def test_a_looser_tolerance_does_not_cost_much_more(field: Any, start: list[float]) -> None:
+    loose, tight = (
+        solve_ivp(field, (0.0, 50.0), start, method=HBVM, rtol=rtol, atol=1e-3 * rtol).nfev
+        for rtol in (1e-3, 1e-12)
+    )
+    # measured 1.22 and 1.20; 1.80 and 0.93 when a step is as long as a hundred iterations can solve
+    assert loose < 1.35 * tight
 
 
 @pytest.mark.parametrize("kind", [ValueError, KeyError, ZeroDivisionError, KeyboardInterrupt])

@@ -1,0 +1,35 @@
+"""Compile the kernel before it is needed."""
+
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+from integrators.kernel.implicit.engine import solver
+from integrators.kernel.line.engine import line
+from integrators.kernel.step.engine import steps
+
+ENGINES = {"steps": steps, "implicit solvers": solver, "line integrals": line}
+
+
+def compile_ahead(processes: int = 1) -> dict[str, float | None]:
+    """Compile what every system needs, and keep it on disk: what is left is a part of a second per system.
+
+    Parameters
+    ----------
+    processes : int
+        How many compile at once. More than one start Python again, so a script that asks
+        for them must be importable (``if __name__ == "__main__":``).
+
+    Returns
+    -------
+    dict
+        Seconds for each part of the kernel; ``None`` where it was on disk already.
+    """
+    if processes == 1:
+        return dict(map(_compile, ENGINES))
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        return dict(pool.map(_compile, ENGINES))
+
+
+def _compile(name: str) -> tuple[str, float | None]:
+    code = ENGINES[name].code()
+    return name, None if code.from_cache else code.seconds

@@ -1,0 +1,73 @@
+"""A trajectory by steps of one length."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.kernel.context import DENSE, LAND, SIDE
+from integrators.kernel.stepper import HBVMStepper
+from integrators.one_thread import one_thread
+from integrators.protocol import Array, Samples, Status, check_state
+from integrators.times import Counts, plan
+
+
+class FixedStepper(HBVMStepper):
+    """A trajectory of HBVM(k, s) by steps of one length; see `HBVMStepper`.
+
+    The present time is ``t0 + n h`` with an integer n, never an accumulated sum.
+    """
+
+    @one_thread
+    def single(self, y: ArrayLike, t0: float, t: float) -> Samples:
+        """Begin anew at (t0, y) and return the state at ``t``, made by a single step of that length.
+
+        The counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If ``y`` is not finite or not of the system's length.
+        """
+        start = check_state(y, self._dim)
+        if self._context.h != self._program.h:
+            self._set_step(self._program.h)
+        self._begin(start, t0)
+        self._status, self._reason, self.error = Status.RUNNING, "", None
+        return self._make(LAND, np.array([t]), np.zeros(1, dtype=np.int64), np.array([t - t0]))
+
+    @one_thread
+    def take(self, count: int) -> Samples:
+        """Take ``count`` own steps and return them."""
+        ctx = self._context
+        targets = ctx.n + np.arange(1, count + 1)
+        times = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
+        return self._make(SIDE, times, targets, np.zeros(count))
+
+    def _advance(self, grid: Array, sample: str) -> Samples:
+        ctx = self._context
+        t0, n, h = ctx.t0, ctx.n, ctx.h
+        turn = (grid[-1] - self.t) * h < 0.0
+        if turn:  # steps are counted from here
+            t0, n, h = self.t, 0, -h
+        between = {"land": LAND, "dense": DENSE}.get(sample, SIDE)
+        bases = np.full(grid.size, t0)
+        if sample == "land":
+            bases[1:] = grid[:-1]
+        targets, parts = plan(grid, bases, h)
+        if sample == "steps":
+            targets = np.arange(n + (grid[0] != self.t), targets[-1] + 1)
+            grid, parts = t0 + targets * h, np.zeros(targets.size)
+        if turn:
+            self._turn(t0)
+        return self._make(between, grid, targets, parts)
+
+    def _turn(self, t0: float) -> None:
+        """Reverse the direction, here, at time ``t0``; what lay ahead lies behind and is forgotten."""
+        ctx = self._context
+        ctx.t0, ctx.n = t0, 0
+        self._set_step(-ctx.h)
+        self._forget()
+
+    def _make(self, between: int, times: Array, targets: Counts, parts: Array) -> Samples:
+        """Make the samples that are ``parts`` beyond the steps number ``targets``."""
+        states, outcome, why = self._fill(between, times, targets, parts)
+        return self._samples(times[: len(states)], states, outcome, why)

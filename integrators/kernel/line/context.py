@@ -1,0 +1,41 @@
+"""The memory of a trajectory along which a line integral is kept: a `Context` and what it needs besides."""
+
+from integrators.kernel.context import Context
+from integrators.kernel.native.memory import Array, Integer, Real, Table
+
+# Whose line integrals vanish: those of several invariants, or that of a Poisson system's energy.
+INVARIANTS, POISSON = range(2)
+
+
+class LineContext(Context):
+    """A trajectory of a line integral.
+
+    The function behind `Context.field` writes `every` rows for a block of stages: the field
+    and the gradients, dim (1 + n) of them; or grad H and B, dim (1 + dim).
+    """
+
+    mode = Integer()  # INVARIANTS, POISSON
+    invariants = Integer()  # how many
+    every = Integer()  # rows of `found`
+    measure = Integer()  # address of what writes the gradients and then the invariants themselves
+    found = Array("calls", "every", "lanes")  # in the layout of stage memory
+    rest = Array("calls", "every", "lanes")  # what their first s coefficients leave of the rows
+    legendre = Array("coefficient_groups", "every", 8)  # these coefficients
+    coefficient_groups = Integer()  # of 8
+    onto = Array()  # values -> coefficients
+    back = Array()  # coefficients -> values at the stages
+    metric = Array("rows")  # the diagonal of W
+    active = Array("invariants", of=int)  # 0 for an invariant that follows from others
+    order = Array(of=int)  # in which components are summed up
+    ends = Array(of=int)  # 1 where a partial sum of that order ends
+    terms = Array("rows")  # of such a sum
+    gram = Table("invariants", "invariants")
+    lower = Table("invariants", "invariants")
+    pivots = Array("invariants")
+    right = Array("invariants")
+    alpha = Array("invariants")
+    reference = Array("invariants")  # what the invariants are to be
+    owed = Array("invariants")  # what the step ahead is to take back of what rounding took from them
+    lost = Integer()  # times that an invariant had moved by more than rounding accounts for
+    culprit = Integer()  # the invariant that is none,
+    defect = Real()  # and its rate of change beside the terms of that

@@ -1,0 +1,157 @@
+"""What a line integral keeps: the functions and the memory that a program needs for it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel.context import Context, Shape
+from integrators.kernel.line.context import INVARIANTS, POISSON, LineContext
+from integrators.kernel.line.dependence import independent
+from integrators.kernel.line.engine import line
+from integrators.kernel.native.field import compile_field
+from integrators.kernel.tables import Constants, packed
+from integrators.protocol import Array
+from problems import emit
+from problems.errors import InputError
+from problems.problem import System
+from problems.trace.graph import T
+
+
+class Kept:
+    """Several invariants of a system, or the energy of a Poisson system.
+
+    Parameters
+    ----------
+    system : System
+        What is integrated.
+    constants : Constants
+        The method's.
+    invariants : sequence of str
+        What is kept, by name; ``name[i]`` for one component of a vector. None for
+        a Poisson system's own energy, by coefficients of its own.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an invariant that the system does not have, or that depends on time.
+    """
+
+    def __init__(self, system: System, constants: Constants, invariants: Sequence[str]):
+        from integrators.legendre import legendre  # 50 digits, which take their time to be imported
+
+        self.system = system
+        self.names = [part for name in invariants for part in components(system, name)]
+        n, dim = len(self.names), system.dim
+        gradients = [f"gradient:{name}" for name in self.names]
+        self.values = ", ".join(["field", *gradients]) if n else "gradient, structure"
+        self._measure = ", ".join([*gradients, *(f"invariant:{name}" for name in self.names)])
+        self.code = [line.code()]
+        if n:
+            self.code.append(compile_field(system, self._measure, constants.lanes))
+        basis = legendre(constants.arrays["nodes"].reshape(-1), constants.s)
+        order, ends = order_of_sums(system)
+        self._tables: dict[str, NDArray[Any]] = {
+            "onto": packed(constants.arrays["projection"]), "back": packed(basis, repeat=True),
+            "order": order, "ends": ends,
+        }  # fmt: skip
+        self._numbers = {
+            "line": self.code[0].address,
+            "measure": self.code[-1].address,
+            "mode": INVARIANTS if n else POISSON,
+            "invariants": n,
+            "every": dim * n + max(dim, n) if n else dim * (1 + dim),
+            "coefficient_groups": -(-constants.s // 8),
+        }
+
+    @property
+    def description(self) -> str:
+        """What is kept, as text."""
+        return f"invariants={self.names!r}" if self.names else "Poisson form"
+
+    def context(self, shape: Shape, tables: dict[str, Array]) -> LineContext:
+        """Return fresh memory for a trajectory."""
+        return LineContext(shape, {**tables, **self._tables}, self._numbers)
+
+    def share(self, own: Context, side: Context) -> None:
+        """Let partial steps keep what the own steps do."""
+        for name in ("active", "owed", "metric") if self.names else ():
+            side.point({name: getattr(own, name)})
+
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """What a checkpoint holds of it, by the names in `LineContext`."""
+        return ("reference", "owed", "active", "found", "alpha", "legendre") if self.names else ()
+
+    def report(self, context: Any) -> dict[str, Any]:
+        """Return what `stats.extra` says of a trajectory."""
+        if not self.names:
+            return {}
+        left_out = [name for name, on in zip(self.names, context.active, strict=True) if not on]
+        return {"lost": context.lost, "left_out": left_out}
+
+    def refusal(self, contexts: tuple[Any, Any], t: float) -> str:
+        """Return why the step from t has ended as `NOT_KEPT`: the step of a pair of contexts, or a part."""
+        found = next(context for context in contexts if context.defect != 0.0)
+        return (
+            f"{self.names[found.culprit]} is not an invariant: in the step from t = {t!r} the terms of its "
+            f"rate of change do not cancel, but leave {found.defect:.1e} of their size; leave it out."
+        )
+
+    def load(self, contexts: tuple[Any, Any], y: Array, par: Array, t0: float) -> None:
+        """Put into a pair of contexts what follows from the start (t0, y) and from the parameters."""
+        own, side = contexts
+        own.lost = own.defect = side.defect = 0
+        if self.names:
+            own.metric[:] = metric_of(self.system, par)
+            own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
+
+
+def components(system: System, name: str) -> list[str]:
+    """Return the scalars that an invariant consists of, as ``name`` or ``name[0]``, ``name[1]``, ...
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none of this name, or it depends on time.
+    """
+    function = system.function(f"invariant:{name}")
+    if any(term.node.flags & T for terms in function.outputs for term in terms):
+        raise InputError(f"the invariant {name!r} of {system.name} depends on time; leave it out.")
+    if len(function.outputs) == 1:
+        return [name]
+    return [f"{name}[{i}]" for i in range(len(function.outputs))]
+
+
+def metric_of(system: System, par: Array) -> Array:
+    """Return the diagonal of W: for H = sum c p^2/2 + V, c with q and 1/c with p; otherwise 1.
+
+    With masses m, c = 1/m: corrections are then accelerations of one size for light
+    and heavy bodies alike. W does not depend on the state, so the method is symmetric.
+    """
+    if system.separable and system.dof is not None:
+        c = emit.numpy(system, "velocity_scale")(0.0, np.zeros(system.dim), par)
+        if np.isfinite(c).all() and (c > 0.0).all():
+            return np.concatenate([c, 1.0 / c])
+    return np.ones(system.dim)
+
+
+def order_of_sums(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the order in which components are summed up, and where its partial sums end.
+
+    The same coordinate of all bodies, body by body, makes a partial sum: in an
+    odd sum over two bodies that mirror each other it is exactly 0. Without bodies,
+    positions and momenta make one each.
+    """
+    places = np.arange(system.dim)
+    if system.bodies is not None and system.dof is not None:
+        groups = list(
+            places.reshape(2, -1, system.bodies.dimension)
+            .transpose(0, 2, 1)
+            .reshape(2 * system.bodies.dimension, -1)
+        )
+    else:
+        groups = np.array_split(places, 1 if system.dof is None else 2)
+    ends = [np.arange(group.size) == group.size - 1 for group in groups]
+    return np.concatenate(groups).astype(np.int64), np.concatenate(ends).astype(np.int64)

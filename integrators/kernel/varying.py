@@ -1,0 +1,204 @@
+"""A trajectory by steps of varying length."""
+
+import math
+import sys
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from integrators.kernel.context import BUDGET, DENSE, DONE, KINKS_KEPT, LAND, SIDE, UNDERFLOW
+from integrators.kernel.native import engine
+from integrators.kernel.stepper import Ended, HBVMStepper, Program
+from integrators.one_thread import one_thread
+from integrators.options import SHORTEST
+from integrators.protocol import Array, Samples, Stats, Status
+from integrators.watchdog import Crawl
+
+RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
+
+
+class VaryingProgram(Program, Protocol):
+    """The same of one whose steps vary."""
+
+    tol: float
+    max_step: float | None
+    max_steps: int | None
+    breakpoints: Array
+
+
+class AdaptiveStepper(HBVMStepper):
+    """A trajectory whose steps vary; satisfies `integrators.protocol.Stepper`.
+
+    The present time is a sum of two doubles. ``advance`` offers every sampling of
+    `HBVMStepper`, with the same meaning. The step that would pass a time asked for
+    is solved and kept; after a time reached with ``"land"`` a step of the same
+    length is tried again from there.
+    """
+
+    _program: VaryingProgram
+
+    @property
+    def stats(self) -> Stats:
+        """Counters of the work done, as `HBVMStepper.stats`; ``extra`` has the method's k and s too.
+
+        And, where the field jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a
+        step had to be cut for and the length at which it was found, of the first 64 places.
+        """
+        stats, c, context = super().stats, self._program.constants, self._context
+        extra = {**stats.extra, "k": c.k, "s": c.s}
+        if found := context.kinks:
+            kept = context.kink_places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
+            extra["kinks"] = [(float(t), float(h)) for t, h in kept]
+        return replace(stats, extra=extra)
+
+    @one_thread
+    def take(self, count: int) -> Samples:
+        """Take ``count`` own steps and return them."""
+        ahead = self._context.next_length > 0.0
+        return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
+
+    def _advance(self, grid: Array, sample: str) -> Samples:
+        if sample == "steps":
+            return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
+        self._face(float(grid[-1]))
+        return self._to(grid, {"land": LAND, "dense": DENSE}.get(sample, SIDE))
+
+    def _stop(self) -> float:
+        """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
+        ctx, points = self._context, self._program.breakpoints
+        ahead = ctx.next_length > 0.0
+        if not points.size:
+            return math.inf if ahead else -math.inf
+        points = points[[not self._is_at(point) for point in points.tolist()]]
+        found = points[points > self.t] if ahead else points[points < self.t][::-1]
+        stop = float(found[0]) if found.size else math.inf if ahead else -math.inf
+        ctx.stop = stop
+        return stop
+
+    def _is_at(self, t: float) -> bool:
+        """Whether a breakpoint is reached; as `integrators.kernel.step.vary.remaining`."""
+        ctx = self._context
+        rest = (t - self.t) - ctx.time_low
+        return abs(rest) <= SHORTEST * max(abs(t), abs(self.t), abs(ctx.length_behind))
+
+    def _restart(self, t: float) -> None:
+        """Begin anew at a breakpoint: what is known from before it says nothing about what follows."""
+        ctx = self._context
+        ctx.t0, ctx.time_low = t, 0.0
+        ctx.length = ctx.length_behind = 0.0
+        # The step that ended here may have been too short to be followed by one of its length.
+        length = ctx.next_length
+        ctx.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
+        ctx.solved = ctx.age = 0
+
+    def _take_implicit(self) -> None:
+        """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""
+        super()._take_implicit()
+        self._context.held = 0
+        self._context.length_limit = np.inf
+
+    def _face(self, end: float) -> None:
+        """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
+        ctx = self._context
+        if not np.sign(end - self.t) * ctx.next_length < 0.0:
+            return
+        ctx.next_length *= -1.0
+        self._forget()
+
+    def _to(self, times: Array, between: int) -> Samples:
+        """Make the samples, piece by piece from one breakpoint to the next."""
+        self._watch = Crawl(self.t, float(times[-1]))
+        if not self._program.breakpoints.size:
+            states, outcome, why = self._fill(between, times)
+            return self._samples(times[: len(states)], states, outcome, why)
+        out = np.empty((times.size, self._dim))
+        made, outcome, why = 0, DONE, None
+        while made < times.size and outcome == DONE and why is None:
+            stop = self._stop()
+            beyond = np.flatnonzero((times - stop) * self._context.next_length > 0.0)
+            last = int(beyond[0]) if beyond.size and beyond[0] >= made else times.size
+            piece = times[made:last]
+            meets = last < times.size or times[-1] == stop
+            grid = np.append(piece, stop) if meets and (not piece.size or piece[-1] != stop) else piece
+            states, outcome, why = self._fill(between, grid)
+            n = min(len(states), piece.size)
+            out[made : made + n] = states[:n]
+            made += n
+            if meets and outcome == DONE and why is None:
+                self._restart(stop)
+        return self._samples(times[:made], out[:made], outcome, why)
+
+    def _budget(self, most: int | None = None) -> int:
+        """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
+        most = min(self._watch.patience if most is None else most, self._pace.steps)
+        if self._program.max_steps is None:
+            return most
+        return max(0, min(most, self._program.max_steps - self._taken))
+
+    def _ended(self, steps: int) -> Ended | None:
+        most = self._program.max_steps
+        if most is not None and self._taken >= most and not self._wants_solver:
+            return Status.MAX_STEPS, (
+                f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
+            )
+        crawl = self._watch.sees(self.t, steps, float(np.abs(self.y).max()))
+        return (Status.STALLED, crawl) if crawl else None
+
+    @one_thread
+    def walk(
+        self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
+    ) -> Samples:
+        """Take own steps, none beyond the time ``end``, and return them.
+
+        Parameters
+        ----------
+        end : float
+            The time to walk to; the step that would pass it is solved, kept and not taken.
+        limit : int, optional
+            The largest number of steps.
+        longest : float
+            Length that no step exceeds, > 0. A finite one costs a call of the kernel for each step.
+        present : bool
+            Whether the present state is to come first.
+        """
+        pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
+        self._face(end)
+        outcome, steps, why, ctx = BUDGET, 0, None, self._context
+        self._watch = Crawl(self.t, end)
+        while outcome == BUDGET and (limit is None or steps < limit) and why is None:
+            # fewer come where the implicit solver is made
+            n = self._budget(None if limit is None else limit - steps)
+            if longest < math.inf:
+                n = min(n, 1)
+                ctx.next_length = np.clip(ctx.next_length, -longest, longest)
+            stop = self._stop()
+            passes = (end - stop) * ctx.next_length >= 0.0
+            times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
+            outcome = self._call(engine.WALK, SIDE, times, out, 0, n)
+            made = self._context.made
+            steps += made
+            pieces.append((times[:made], out[:made]))
+            if math.isfinite(stop) and self._is_at(stop):
+                if outcome == DONE and stop != end:
+                    outcome = BUDGET
+                times[made - 1 : made] = stop
+                self._restart(stop)
+            elif outcome == BUDGET and (n == 0 or (limit is None and self._budget(1))):
+                why = self._ended(made)
+        t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return self._samples(t, y, DONE if outcome == BUDGET else outcome, why)
+
+    def _failure(self, outcome: int) -> tuple[Status, str]:
+        """Return the status that an outcome stands for, and the reason as a sentence."""
+        longest = self._program.max_step
+        if outcome == UNDERFLOW and longest is not None and longest <= SHORTEST * abs(self.t):
+            return Status.STEP_UNDERFLOW, (
+                f"a step of max_step={longest!r} from t = {self.t!r} cannot be told from none; give more."
+            )
+        if outcome == UNDERFLOW:
+            return Status.STEP_UNDERFLOW, (
+                f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
+                "the solution may end or be singular here."
+            )
+        return super()._failure(outcome)

@@ -1,0 +1,105 @@
+"""Values as JSON and arrays, which a file can keep without pickle, and back again bit for bit."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators import registry
+from integrators.protocol import MethodBase
+from problems.errors import InputError, shown
+from problems.problem import Problem
+from problems.systems.hamiltonian import Hamiltonian
+from problems.systems.poisson import Poisson
+from problems.systems.vector_field import VectorField
+
+_SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Poisson, VectorField)}
+
+
+def packed(value: Any, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Return a value for JSON; arrays go into ``arrays``, under names of their own.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything but numbers, texts, arrays, and lists, tuples and dictionaries of them.
+    """
+    match value:
+        case None | bool() | int() | float() | str():
+            return value if type(value) in (bool, int, float, type(None)) else _number_or_text(value)
+        case np.generic():
+            return packed(value.item(), arrays)
+        case np.ndarray() if not value.dtype.hasobject:
+            name = f"array_{len(arrays)}"
+            arrays[name] = value
+            return {"array": name}
+        case list():
+            return [packed(item, arrays) for item in value]
+        case tuple():
+            return {"tuple": [packed(item, arrays) for item in value]}
+        case Mapping():
+            return {
+                "dict": [[packed(key, arrays), packed(item, arrays)] for key, item in dict(value).items()]
+            }
+    raise InputError(f"{shown(value)} cannot be kept in a file; only numbers, texts and arrays can.")
+
+
+def _number_or_text(value: Any) -> Any:
+    return next(kind(value) for kind in (int, float, str) if isinstance(value, kind))
+
+
+def unpacked(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
+    """Return the value that `packed` was given."""
+    if isinstance(plain, list):
+        return [unpacked(item, arrays) for item in plain]
+    if not isinstance(plain, dict):
+        return plain
+    [(kind, content)] = plain.items()
+    if kind == "array":
+        return arrays[content]
+    items = unpacked(content, arrays)
+    return tuple(items) if kind == "tuple" else dict(items)
+
+
+def packed_problem(problem: Problem, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Return a problem for JSON, its traced graph included; no system for a field that is not traced."""
+    kind, state = type(problem.system).__name__, problem.__getstate__()
+    del state["system"]
+    system = problem.system.__getstate__() if kind in _SYSTEMS else None
+    return {"kind": kind, "system": system, "state": packed(state, arrays)}
+
+
+def unpacked_problem(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Problem | None:
+    """Return the problem that `packed_problem` was given; ``None`` where its field is not traced."""
+    if plain["system"] is None:
+        return None
+    kind = _SYSTEMS[plain["kind"]]
+    system = kind.__new__(kind)
+    system.__setstate__(plain["system"])
+    problem = Problem.__new__(Problem)
+    problem.__setstate__({**unpacked(plain["state"], arrays), "system": system})
+    return problem
+
+
+def packed_method(method: MethodBase, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Return a method for JSON, as its registered name and its options.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a method that is not registered: nobody could make it again from its name.
+    """
+    name = type(method).__name__
+    if name not in registry.names() or registry.get(name) is not type(method):
+        raise InputError(
+            f"{name} is not registered, so that no file can name it; register it as an entry point of "
+            f"{registry.GROUP}, or pickle the solution."
+        )
+    return [name, packed(method.options(), arrays)]
+
+
+def unpacked_method(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> MethodBase:
+    """Return the method that `packed_method` was given."""
+    name, options = plain
+    return registry.create(name, **unpacked(options, arrays))

@@ -1,0 +1,200 @@
+"""A long integration, watched: how far it is, what is kept of it in a file, and Ctrl-C."""
+
+import hashlib
+import json
+import os
+import pickle
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Self
+
+import numpy as np
+
+from integrators.protocol import Array, MethodBase
+from integrators.solution import write_whole
+from problems import emit
+from problems.errors import InputError, shown
+from problems.problem import Problem
+from problems.systems.code_digest import code_digest
+
+MAGIC = b"hbvm-bench checkpoint 1"
+SOON = 0.1  # seconds from one look to the next, about
+FIRST = 1e-5  # of the way: the first piece, when nothing is known of its cost ...
+UNSEEN = 1e-3  # ... and where nobody wants to know of it
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far an integration is.
+
+    Attributes
+    ----------
+    t : float
+        Where it is.
+    fraction : float
+        Of the way, from 0 to 1; a search for events is the first half of it.
+    steps : int
+        Own steps until now.
+    seconds, left : float
+        Since it began, or was resumed; and until its end, if it goes on as fast.
+    """
+
+    t: float
+    fraction: float
+    steps: int
+    seconds: float
+    left: float
+
+
+Report = Callable[[Progress], object]
+
+
+class Watch:
+    """Looks at an integration between its pieces.
+
+    Parameters
+    ----------
+    t0, end : float
+        The way.
+    phases : int
+        How often it is gone: once, or twice with events.
+    report : callable or None
+        Called with a `Progress`.
+    path : Path or None
+        Where to keep what the continuation depends on.
+    every : float
+        Seconds from one file to the next.
+    identity : mapping
+        What is integrated, and how, as `identity` returns it.
+    """
+
+    def __init__(
+        self, t0: float, end: float, phases: int, report: Report | None, path: Path | None, every: float,
+        identity: Mapping[str, str],
+    ):  # fmt: skip
+        self._t0, self._end, self._phases = t0, end, phases
+        self._report, self._path, self._every, self._identity = report, path, every, identity
+        self._began = self._written = perf_counter()
+        self._first: float | None = None
+        self._kept: dict[str, Any] | None = None
+        self.phase = 0
+        self.looks = report is not None or path is not None
+        """Whether anybody wants to know of the way between two samples."""
+
+    def look(self, t: float, steps: Callable[[], int], kept: Callable[[], dict[str, Any]]) -> None:
+        """Take note that the integration is at ``t`` after ``steps()``, from where ``kept()`` goes on."""
+        now = perf_counter()
+        if self._path is not None:
+            self._kept = kept()
+            if now - self._written >= self._every:
+                self.write()
+        if self._report is not None:
+            way = (t - self._t0) / (self._end - self._t0) if self._end != self._t0 else 1.0
+            fraction = (self.phase + min(max(way, 0.0), 1.0)) / self._phases
+            self._first = fraction if self._first is None else self._first
+            seconds, made = now - self._began, fraction - self._first
+            left = seconds * (1.0 - fraction) / made if made > 0.0 else float("inf")
+            self._report(Progress(t, fraction, steps(), seconds, left))
+
+    def write(self) -> None:
+        """Write the file now, if there is one and anything to keep."""
+        if self._path is None or self._kept is None:
+            return
+        kept = pickle.dumps(self._kept, protocol=5)
+        head = json.dumps(self._identity).encode()
+        parts = [MAGIC, head, hashlib.sha256(kept).hexdigest().encode(), kept]
+        write_whole(self._path, lambda file: file.write(b"\n".join(parts)))
+        self._written = perf_counter()
+
+
+class Pieces:
+    """Lengths of time that take about `SOON` to integrate, as measured.
+
+    Attributes
+    ----------
+    length : float
+        Of the next piece, in units of the problem's time.
+    """
+
+    def __init__(self, way: float, watch: Watch):
+        self.length = (FIRST if watch.looks else UNSEEN) * abs(way)
+
+    def __enter__(self) -> Self:
+        self._began = perf_counter()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        took = perf_counter() - self._began
+        self.length *= 4.0 if took < SOON / 4.0 else 0.5 if took > 2.0 * SOON else 1.0
+
+
+def identity(
+    problem: Problem, method: MethodBase, times: Array, sample: str | None, events: Mapping[str, Any]
+) -> dict[str, str]:
+    """Return what a checkpoint belongs to, by name, as texts."""
+    start = np.concatenate([[problem.t0], problem.y0])
+    return {
+        "problem": repr(problem),
+        "system": emit.fingerprint(problem.system),
+        "start": hashlib.sha256(start.tobytes()).hexdigest(),
+        "parameters": hashlib.sha256(problem.par.tobytes()).hexdigest(),
+        "method": repr(method),
+        "times": f"{times.size} times, {hashlib.sha256(times.tobytes()).hexdigest()}",
+        "sample": str(sample),
+        "events": ", ".join(
+            f"{name} {code_digest(event.g, event.direction, str(event.last))}"
+            for name, event in events.items()
+        ),
+    }
+
+
+def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, Any]:
+    """Return what was kept of the same integration.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is no such file, it is damaged, or it is another integration's.
+    """
+    try:
+        magic, head, digest, kept = Path(path).read_bytes().split(b"\n", 3)
+        whole = magic == MAGIC and hashlib.sha256(kept).hexdigest().encode() == digest
+        found = json.loads(head) if whole else {}
+    except FileNotFoundError:
+        raise InputError(f"there is no checkpoint {path} to resume; leave out resume=.") from None
+    except (OSError, ValueError):
+        whole, found, kept = False, {}, b""
+    if not whole:
+        raise InputError(f"{path} is not a checkpoint of integrate, or is damaged; leave out resume=.")
+    for what, value in wanted.items():
+        if found.get(what) != value:
+            other = f"{found.get('method')} on {found.get('problem')}"
+            raise InputError(
+                f"{path} is a checkpoint of {other}, with other {what} than here ({shown(value)}); "
+                "resume that integration, or leave out resume=."
+            )
+    return pickle.loads(kept)
+
+
+class Bar:
+    """A bar of progress on a terminal; nothing where there is none."""
+
+    def __enter__(self) -> Report:
+        rich = import_module("rich.progress")
+        console = import_module("rich.console").Console(file=sys.stderr)
+        columns = ["t = {task.fields[t]:.6g}", rich.BarColumn(), rich.TaskProgressColumn()]
+        columns += ["{task.fields[steps]:,} steps", rich.TimeElapsedColumn(), rich.TimeRemainingColumn()]
+        self._bar = rich.Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._bar.add_task("", total=1.0, t=0.0, steps=0)
+        self._bar.start()
+        return self._show
+
+    def _show(self, progress: Progress) -> None:
+        self._bar.update(self._task, completed=progress.fraction, t=progress.t, steps=progress.steps)
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()

@@ -1,0 +1,32 @@
+"""Each example script runs, and says what it says it shows."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPTS = Path(__file__).parents[2] / "examples"
+
+SAYS = {
+    "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
+    "solution.py": ["the same from a file: True True", "the same from another process: True"],
+}
+
+
+def test_every_script_has_its_words():
+    assert sorted(path.name for path in SCRIPTS.glob("*.py")) == sorted(SAYS)
+
+
+@pytest.mark.parametrize("name", SAYS)
+def test_a_script_runs(name, tmp_path):
+    path = os.pathsep.join(filter(None, [str(SCRIPTS.parent), os.environ.get("PYTHONPATH")]))
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(SCRIPTS / name)],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    for words in SAYS[name]:
+        assert words in done.stdout
