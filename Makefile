@@ -5,10 +5,15 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: bench test lint format venv lock clean
+REPORTS ?= sitnikov
 
-bench: venv  ## run Sitnikov through every integrator and write reports/sitnikov/
-	$(BIN)/hbvm-bench run sitnikov --report reports/sitnikov
+.PHONY: bench reports test lint format venv lock clean
+
+bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
+	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
+
+reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
+	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done
 
 test: venv  ## the test suite
 	$(BIN)/python -m pytest

@@ -11,6 +11,7 @@ from typer.exceptions import TyperException
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.commands import listing
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable, write_all
@@ -124,7 +125,7 @@ def show(
         find(key)
     store = Store(directory)
     index = store.index()
-    records = store.records()
+    records = reading.records(store)
     if as_json:
         terminal.print_json(listing.as_json(index, records))
         return

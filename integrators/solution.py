@@ -14,8 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators import plain
 from integrators.caveats import unseen
+from integrators.plain import (
+    packed,
+    packed_method,
+    packed_problem,
+    unpacked,
+    unpacked_method,
+    unpacked_problem,
+)
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, as_numbers
 from problems.errors import InputError, MissingLibraryError, shown
 from problems.problem import Problem
@@ -297,9 +304,9 @@ class Solution:
             arrays |= {f"event_{key}:{name}": value for key, value in vars(found).items()}
         words = {
             "format": FORMAT,
-            "problem": plain.packed_problem(self.problem, arrays),
-            "method": plain.packed_method(self.method, arrays),
-            "stats": plain.packed(asdict(self.stats), arrays),
+            "problem": packed_problem(self.problem, arrays),
+            "method": packed_method(self.method, arrays),
+            "stats": packed(asdict(self.stats), arrays),
             "events": list(self.events),
             "status": str(self.status),
             "error": None if self.error is None else [type(self.error).__name__, str(self.error)],
@@ -336,7 +343,7 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
         words = json.loads(arrays["words"].tobytes())
         if words["format"] != FORMAT:
             raise InputError(f"{path} is of format {words['format']}, which this version does not read.")
-        found = plain.unpacked_problem(words["problem"], arrays) or problem
+        found = unpacked_problem(words["problem"], arrays) or problem
         if found is None:
             raise InputError(
                 f"the field of the solution in {path} is code, which the file does not hold; "
@@ -347,9 +354,9 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
             t=arrays["t"],
             y=arrays["y"],
             status=Status(words["status"]),
-            stats=Stats(**plain.unpacked(words["stats"], arrays)),
+            stats=Stats(**unpacked(words["stats"], arrays)),
             problem=found,
-            method=plain.unpacked_method(words["method"], arrays),
+            method=unpacked_method(words["method"], arrays),
             events={name: Occurrences(*(arrays[key] for key in keys)) for name, keys in kinds.items()},
             error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
             **{key: words[key] for key in _AS_THEY_ARE},

@@ -30,19 +30,10 @@ from problems.errors import InputError
 from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
-# What makes numbers of a solution; a worker process does nothing else with it.
-MEASURES = tuple(
-    f"hbvm_bench.measure.{name}"
-    for name in ("solve", "measured", "metrics", "checks", "ensemble", "timing", "together")
-)
+WORKER = "hbvm_bench.run.worker"  # what it imports of the room measure makes the numbers of a case
+MEASURE = "hbvm_bench.measure."
 # They say, name and keep what is run; all that a number can depend on of it is in the key.
-BOOKKEEPING = frozenset(
-    f"hbvm_bench.{name}"
-    for name in (
-        *("campaign.entries", "campaign.file", "campaign.grid", "campaign.identity", "campaign.spec"),
-        *("campaign.sweep", "store.files", "store.records", "store.store"),
-    )
-) | {"problems.picture"}
+BOOKKEEPING = ("hbvm_bench.campaign.", "hbvm_bench.store.", "integrators.plain", "problems.picture")
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
@@ -85,7 +76,7 @@ def resolve(case: Case) -> Resolved:
         For an unknown name or option, with the nearest names, or a value that
         the problem or the method refuses.
     """
-    problem = _problem(case.problem)
+    problem = make_problem(case.problem)
     method = make_method(case.method)
     case.grid.times(problem)
     # not repr(method), which is a third party's own
@@ -97,13 +88,8 @@ def resolve(case: Case) -> Resolved:
 
 
 @lru_cache(maxsize=64)
-def _problem(text: str) -> Problem:
-    # a campaign has the same few problems again and again, and tracing one takes a while
-    return make_problem(text)
-
-
 def make_problem(text: str) -> Problem:
-    """Make the problem that ``text`` specifies."""
+    """Make the problem that ``text`` specifies; the last ones are kept, for a campaign has them often."""
     spec = parse_spec(text)
     return problems.load(spec.name, **spec.arguments)
 
@@ -165,14 +151,22 @@ def is_ours(method: MethodBase) -> bool:
 def source_digest(method: MethodBase, case: Case) -> str:
     """Return the sha256 of the sources that decide about the measured numbers of a case.
 
-    They are those of `MEASURES`, of the method and of the problem, and what these import, at
-    their heads or anywhere below, of our packages and of the method's and the problem's own. So
+    They are those that measure in a worker process, of the method and of the problem, and what these
+    import, at their heads or anywhere below, of our packages and of the method's and the problem's own. So
     a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
-    nor any because of a report. Comments, docstrings, the layout and
-    what a problem's decorator says do not count.
+    nor any because of a metric, which is evaluated when a record is read, or of a report. Comments,
+    docstrings, the layout and what a problem's decorator says do not count.
     """
     problem = problems.registry.factory(parse_spec(case.problem).name)
-    return digest_of((*MEASURES, type(method).__module__, problem.__module__))
+    return digest_of((*measures(), type(method).__module__, problem.__module__))
+
+
+@cache
+def measures() -> tuple[str, ...]:
+    """Return the modules that a worker process measures with."""
+    path = _file_of(WORKER)
+    assert path is not None
+    return tuple(name for name in _read(WORKER, path)[1] if name.startswith(MEASURE))
 
 
 @cache
@@ -188,7 +182,7 @@ def sources(modules: Iterable[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     while left:
         name = left.pop()
-        if name in found or name in BOOKKEEPING or (path := _file_of(name)) is None:
+        if name in found or name.startswith(BOOKKEEPING) or (path := _file_of(name)) is None:
             continue
         found[name], imported = _read(name, path)
         left += [other for other in imported if other.partition(".")[0] in packages]
@@ -265,6 +259,7 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
     return found
 
 
+@lru_cache(maxsize=64)
 def _reference_digest(problem: Problem) -> str:
     stored = solutions.find_file(problem)
     if stored is None:

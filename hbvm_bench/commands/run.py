@@ -11,17 +11,19 @@ import typer
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.commands.live import Live
+from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
 from hbvm_bench.run import executors, loop, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError
+from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
 
 UNFINISHED = 1
 INTERRUPTED = 130
+PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 
 
 def run(
@@ -56,8 +58,9 @@ def run(
     command = _command(name, problem, method, step)
     out = out or Path("runs") / campaign.name
     store = carry_out(campaign, out, command, executor=executor, jobs=jobs, timing=timing)
-    records = store.records()
-    terminal.print_results(records)
+    records = reading.records(store)
+    if len(records) <= PRINTED:
+        terminal.print_results(records)
     terminal.print_goals(campaign, records)
     if report_to is not None:
         from hbvm_bench.commands.publishing import publish
@@ -118,7 +121,7 @@ def _measure(
             _run(campaign, cases, store, pool, timing)
         except (KeyboardInterrupt, InterruptedRunError):
             raise _given_up("interrupted", cases, store, INTERRUPTED) from None
-        except loop.UnfinishedRunError as error:
+        except UnfinishedRunError as error:
             raise _given_up(str(error), cases, store, UNFINISHED) from None
 
 
@@ -193,7 +196,9 @@ def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
 
 def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -> None:
     visits = timing_pass.missing_visits(cases, store, campaign.timing)
-    known = {case.id: record.seconds for case in cases if (record := store.load(case.id)) is not None}
+    if not visits:
+        return
+    known = {key: record.seconds for key in set(visits) if (record := store.load(key)) is not None}
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()

@@ -173,6 +173,8 @@ def restore(
         trajectories=result.trajectories,
         laws=result.laws,
         drift=named("drift."),
+        reversal=result.reversal.why if result.reversal.value is None else result.reversal.value,
+        peak_gib=result.peak_gib,
         extra=named("extra."),
     )
 

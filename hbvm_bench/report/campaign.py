@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import overview, provenance, words
 from hbvm_bench.report.document import (
@@ -42,6 +43,7 @@ Series = dict[str, NDArray[np.float64]]
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
 BRIEF_CASES = 150
+DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
 
 FEW = 3  # problems whose summaries all stand at the top
 LISTED = 12  # cases without a rank that are listed at once; more are folded away
@@ -97,7 +99,7 @@ def gather(stores: Sequence[Store]) -> Gathered:
     indices = [store.index() for store in stores]
     furthest: dict[str, tuple[Record, Store]] = {}
     for store in stores:
-        for record in store.records():
+        for record in reading.records(store):
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
                 furthest[record.id] = (record, store)
     if not furthest:
@@ -116,7 +118,11 @@ def gather(stores: Sequence[Store]) -> Gathered:
         )
         for index in indices
     ]
-    return Gathered(runs, [_read(record, store) for record, store in furthest.values()])
+    found = [
+        _read(record, store) if number < DRAWN_CASES else (record, {})
+        for number, (record, store) in enumerate(furthest.values())
+    ]
+    return Gathered(runs, found)
 
 
 def document(stores: Store | Sequence[Store]) -> Document:
@@ -244,7 +250,11 @@ def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequenc
 
 def _fairness(records: Sequence[Record]) -> Section:
     """Return the rules, the settings of each method, and what was excluded."""
-    rules = (*words.RULES, *fairness.sentences(records), *provenance.processors(records))
+    drawn = f"Drawn are the first {DRAWN_CASES} of {len(records)} cases; tables and data have all of them."
+    rules = (
+        *([drawn] if len(records) > DRAWN_CASES else []),
+        *(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
+    )
     settings = Table(
         "How many settings each method has",
         ("method", "library", "settings", *KINDS),

@@ -9,18 +9,13 @@ from pathlib import Path
 from hbvm_bench.campaign.file import Campaign, Case, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
-from hbvm_bench.run.task import InterruptedRunError, Reply, execute, task_of
-from hbvm_bench.run.worker import STALE
+from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError, execute, task_of
 from hbvm_bench.store.records import COMPILING, Record, decoded
 from hbvm_bench.store.store import Store, damage, is_of
 from problems.errors import InputError
 
 ATTEMPTS = 2  # an executor may lose a case once, with the machine that had it
 PATIENCE = 1.0  # seconds between two looks at how many slots there are
-
-
-class UnfinishedRunError(Exception):
-    """Some cases could not be run at all; what finished is in the store."""
 
 
 def plan(campaign: Campaign) -> list[Resolved]:
@@ -142,10 +137,7 @@ def run_accuracy(
                     if attempts[resolved.id] < ATTEMPTS:
                         waiting.append(resolved)
                     else:
-                        known = isinstance(error, UnfinishedRunError)
-                        failures.append(
-                            str(error) if known else f"{type(error).__name__}: {error}".rstrip(": ")
-                        )
+                        failures.append(f"{type(error).__name__}: {error}".rstrip(": "))
                     continue
                 yield record
     finally:
@@ -157,10 +149,6 @@ def run_accuracy(
         raise UnfinishedRunError(f"{count} could not be run: {reasons}")
 
 
-def _sentence(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}".rstrip(": ")
-
-
 def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
     try:
         return pool.executor.submit(execute, task)
@@ -170,11 +158,7 @@ def _submitted(pool: Pool, task: bytes) -> Future[tuple[bytes, bytes]]:
         ) from None
 
 
-def _stored(store: Store, reply: bytes, series: bytes) -> Record:
-    answer = decoded(reply, Reply)
-    if answer.why == STALE:
-        raise InputError(STALE)
-    if answer.record is None:
-        raise UnfinishedRunError(answer.why)
-    store.save(answer.record, series or None)
-    return answer.record
+def _stored(store: Store, record: bytes, series: bytes) -> Record:
+    made = decoded(record, Record)
+    store.save(made, series or None)
+    return made

@@ -7,6 +7,7 @@ all are killed when they pass the limit together, whatever they are doing.
 
 import contextlib
 import os
+import select
 import signal
 import subprocess
 import threading
@@ -15,7 +16,9 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Literal
+from typing import Literal, Protocol
+
+import psutil
 
 from hbvm_bench.campaign.file import Limits
 
@@ -24,10 +27,6 @@ POLL = 0.02  # seconds, at first
 LONGEST_POLL = 0.2  # of a case that takes long: the runner needs little of the machine
 WALK = 1.0  # seconds between walks over all processes: they take milliseconds that a timing must not lose
 KEPT_OUTPUT = 64  # chunks of at most 4 KiB
-
-_children: set[subprocess.Popen[bytes]] = set()
-_lock = threading.Lock()
-_stopping = threading.Event()
 
 
 @dataclass(frozen=True)
@@ -62,17 +61,75 @@ class Ended:
         return f"ended with exit code {self.code}"
 
 
-def run(
-    command: Sequence[str], environment: Mapping[str, str], limits: Limits, compiled: Path | None = None
-) -> Ended:
-    """Run a command to its end, or to its limits.
+class Process(Protocol):
+    """A process that can be watched.
+
+    Attributes
+    ----------
+    pid : int
+        It leads a session of its own.
+    output : int
+        The file descriptor where what it prints is read.
+    """
+
+    pid: int
+    output: int
+
+    def wait(self, seconds: float | None = None) -> int | None:
+        """Return its exit code, or ``None`` where it still runs after so many seconds."""
+        ...
+
+    def kill(self) -> None:
+        """Kill it and what it has started, unless it has ended."""
+        ...
+
+
+class Fresh:
+    """A process that begins with nothing: a command, whose environment is added to this one's."""
+
+    def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
+        self.output, out = os.pipe()
+        try:
+            self._process = subprocess.Popen(
+                list(command),
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                env={**os.environ, **environment},
+                start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
+            )
+        finally:
+            os.close(out)
+        self.pid = self._process.pid
+        self._handle = os.pidfd_open(self.pid)
+
+    def wait(self, seconds: float | None = None) -> int | None:
+        """Return its exit code, or ``None`` where it still runs after so many seconds."""
+        ended, _, _ = select.select([self._handle], [], [], seconds)
+        if not ended:
+            return None
+        self.kill()  # what it has started and left behind
+        os.close(self._handle)
+        return self._process.wait()
+
+    def kill(self) -> None:
+        """Kill it and what it has started."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, signal.SIGKILL)
+
+
+_children: set[Process] = set()
+_lock = threading.Lock()
+_stopping = threading.Event()
+
+
+def watch(child: Process, limits: Limits, compiled: Path | None = None) -> Ended:
+    """Wait for the end of a process, or end it at its limits.
 
     Parameters
     ----------
-    command : sequence of str
-        The program and its arguments.
-    environment : mapping of str
-        Added to this process's environment.
+    child : Process
+        It has just been started.
     limits : Limits
         Wall seconds and resident memory.
     compiled : Path, optional
@@ -85,49 +142,41 @@ def run(
     """
     start = time.monotonic()
     begun = start if compiled is None else None
-    child = subprocess.Popen(
-        list(command),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        env={**os.environ, **environment},
-        start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
-    )
     with _lock:
         _children.add(child)
     kept: deque[bytes] = deque(maxlen=KEPT_OUTPUT)
-    assert child.stdout is not None
-    reader = threading.Thread(target=_drain, args=(child.stdout, kept), daemon=True)
+    reader = threading.Thread(target=_drain, args=(child.output, kept), daemon=True)
     reader.start()
+    code: int | None = None
     cause: Cause = "exit"
     peak, delay, walked = 0.0, POLL, start
     try:
-        while child.poll() is None:
+        while code is None and cause == "exit":
             peak = max(peak, _peak_gib(child.pid))
             if time.monotonic() - walked > WALK:
                 peak, walked = max(peak, _together_gib(child.pid)), time.monotonic()
+            if begun is None and compiled is not None and compiled.exists():
+                begun = time.monotonic()
             if _stopping.is_set():
                 cause = "stopped"
             elif peak > limits.memory_gib:
                 cause = "memory"
+            elif begun is None and time.monotonic() - start > limits.compile_seconds:
+                cause = "compiling"
             elif begun is not None and time.monotonic() - begun > limits.wall_seconds:
                 cause = "timeout"
-            elif begun is None and compiled is not None:
-                if compiled.exists():
-                    begun = time.monotonic()
-                elif time.monotonic() - start > limits.compile_seconds:
-                    cause = "compiling"
-            if cause != "exit":
-                break
-            _stopping.wait(delay)
+            else:
+                code = child.wait(delay)
             delay = min(1.25 * delay, LONGEST_POLL)
     finally:
-        _kill(child)
+        if code is None:
+            child.kill()
+            code = child.wait()
         with _lock:
             _children.discard(child)
     reader.join(timeout=5.0)
     return Ended(
-        code=child.returncode,
+        code=-signal.SIGKILL if code is None else code,
         cause="stopped" if _stopping.is_set() else cause,
         seconds=time.monotonic() - start,
         peak_gib=peak,
@@ -136,30 +185,23 @@ def run(
 
 
 def stop_all() -> None:
-    """Kill all children; every `run` under way returns with the cause ``"stopped"``."""
+    """Kill all children; every `watch` under way returns with the cause ``"stopped"``."""
     _stopping.set()
     with _lock:
         children = list(_children)
     for child in children:
-        _kill(child)
+        child.kill()
 
 
 def allow() -> None:
-    """Let `run` start children again after `stop_all`."""
+    """Let `watch` wait for children again after `stop_all`."""
     _stopping.clear()
 
 
-def _kill(child: subprocess.Popen[bytes]) -> None:
-    # its session too: a child may have started processes of its own
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(child.pid, signal.SIGKILL)
-    child.wait()
-
-
-def _drain(stream: IO[bytes], kept: deque[bytes]) -> None:
-    with stream:
-        while chunk := os.read(stream.fileno(), 4096):
-            kept.append(chunk)
+def _drain(output: int, kept: deque[bytes]) -> None:
+    while chunk := os.read(output, 4096):
+        kept.append(chunk)
+    os.close(output)
 
 
 def _peak_gib(pid: int) -> float:
@@ -176,12 +218,8 @@ def _peak_gib(pid: int) -> float:
 
 def _together_gib(session: int) -> float:
     """Return what the processes of a session hold together; memory that they share counts once."""
-    members = [pid for pid in _processes() if _session_of(pid) == session]
+    members = [one for one in psutil.process_iter() if _session_of(one.pid) == session]
     return sum(map(_share_gib, members)) if len(members) > 1 else 0.0
-
-
-def _processes() -> list[int]:
-    return [int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()]
 
 
 def _session_of(pid: int) -> int | None:
@@ -190,13 +228,11 @@ def _session_of(pid: int) -> int | None:
     return None
 
 
-def _share_gib(pid: int) -> float:
-    try:
-        rolled = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii", errors="replace")
-    except OSError:  # it has just ended
-        return 0.0
-    sizes = {name: value for name, _, value in (line.partition(":") for line in rolled.splitlines())}
-    return sum(int((sizes.get(name) or "0").split()[0]) for name in ("Pss", "SwapPss")) / 2**20
+def _share_gib(process: psutil.Process) -> float:
+    with contextlib.suppress(psutil.Error):  # it has just ended
+        memory = process.memory_full_info()
+        return (memory.pss + memory.swap) / 2**30
+    return 0.0
 
 
 def _signal_name(number: int) -> str:

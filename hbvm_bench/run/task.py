@@ -1,5 +1,6 @@
 """One case, measured in a process of its own under hard limits: the task that executors run."""
 
+import contextlib
 import os
 import platform
 import sys
@@ -13,8 +14,9 @@ import msgspec
 
 from hbvm_bench.campaign.file import Case, Limits
 from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
-from hbvm_bench.measure import machine
-from hbvm_bench.run import supervise
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.measure import machine, reading
+from hbvm_bench.run import supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, STALE, Request
 from hbvm_bench.store import records
@@ -54,11 +56,8 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
     limits: Limits
 
 
-class Reply(msgspec.Struct, frozen=True, kw_only=True):
-    """The record of a case, or why it could not be run here at all."""
-
-    record: Record | None = None
-    why: str = ""
+class UnfinishedRunError(Exception):
+    """Some cases could not be run at all; what finished is in the store."""
 
 
 def task_of(resolved: Resolved, limits: Limits) -> bytes:
@@ -80,8 +79,8 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
 
     Returns
     -------
-    reply : bytes
-        JSON of a `Reply`. Whatever happens to the process, it is a record with its reason.
+    record : bytes
+        JSON of a `Record`: whatever happens to the process is one, with its reason.
     series : bytes
         As `hbvm_bench.store.store.encode_series` makes them; empty where there are none.
 
@@ -89,23 +88,28 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     ------
     InterruptedRunError
         If the run was stopped meanwhile.
+    UnfinishedRunError
+        If the case could not be run here at all.
+    problems.errors.InputError
+        If the sources changed meanwhile.
     """
     asked = msgspec.json.decode(task, type=Task)
     try:
         resolved = resolve(asked.case)
     except InputError as error:
-        return _refuse(f"{platform.node()} cannot run it: {error}")
+        raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
     if resolved.id != asked.id:
-        return _refuse(_difference(asked, resolved))
+        raise UnfinishedRunError(_difference(asked, resolved))
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         core = getattr(_thread, "core", None)
-        request = Request(case=resolved.case, id=resolved.id, core=core, runner=os.getpid())
-        ended = start(Path(scratch), request, asked.limits)
+        request = Request(case=resolved.case, id=resolved.id, core=core)
+        loads = resolved.method.library, parse_spec(resolved.case.problem).name
+        ended = start(Path(scratch), request, asked.limits, loads)
         result, series = _result(Path(scratch), ended, asked.limits)
     if result.reason == STALE:
-        return _refuse(STALE)
+        raise InputError(STALE)
     if ended.code == NO_ROOM:
-        return _refuse(
+        raise UnfinishedRunError(
             f"there is no room for the results of a case on {platform.node()}; make some in "
             f"{tempfile.gettempdir()} and in the cache, and run the same command again"
         )
@@ -124,7 +128,8 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         machine=machine.describe(),
         finished=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    return msgspec.json.encode(Reply(record=record)), series
+    record = reading.evaluated(record, decode_series(series))
+    return msgspec.json.encode(record), series
 
 
 def stay_on(core: int) -> None:
@@ -132,18 +137,40 @@ def stay_on(core: int) -> None:
     _thread.core = core
 
 
-def start(scratch: Path, request: Request, limits: Limits) -> Ended:
+def start(scratch: Path, request: Request, limits: Limits, loads: tuple[str, str] | None = None) -> Ended:
     """Start the worker process of a request and wait for its end.
+
+    Parameters
+    ----------
+    scratch : Path
+        An empty directory, where it writes.
+    request : Request
+        What it is asked to do.
+    limits : Limits
+        Wall time and memory of the process.
+    loads : (str, str), optional
+        Library and problem of a case that may find loaded what others of both have loaded. By
+        default the process begins with nothing, as whatever is timed does.
 
     Raises
     ------
     InterruptedRunError
         If the run was stopped.
     """
-    path = scratch / "request.json"
+    path, compiled = scratch / "request.json", scratch / COMPILED
     path.write_bytes(msgspec.json.encode(request))
-    command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path)]
-    ended = supervise.run(command, ENVIRONMENT, limits, scratch / COMPILED)
+    ended = None
+    if loads is not None:
+        with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
+            child = nest.start(path, *loads)
+            ended = supervise.watch(child, limits, compiled)
+            if child.lost and ended.cause == "exit":
+                ended = None
+                compiled.unlink(missing_ok=True)
+                raise ConnectionError  # the nest is of no more use
+    if ended is None:
+        command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
+        ended = supervise.watch(supervise.Fresh(command, ENVIRONMENT), limits, compiled)
     if ended.cause == "stopped":
         raise InterruptedRunError
     return ended
@@ -155,10 +182,6 @@ def decoded(path: Path, type_: type[T]) -> T | None:
         return records.decoded(path.read_bytes(), type_)
     except (FileNotFoundError, ValueError):  # msgspec's errors and bad UTF-8 are among the latter
         return None
-
-
-def _refuse(why: str) -> tuple[bytes, bytes]:
-    return msgspec.json.encode(Reply(why=why)), b""
 
 
 def _difference(asked: Task, resolved: Resolved) -> str:

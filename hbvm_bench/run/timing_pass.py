@@ -1,6 +1,5 @@
 """The timing pass: one case at a time, alone and without output, round by round; or a problem's in turn."""
 
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
@@ -153,7 +152,6 @@ def _visit_together(
             mode="interleave",
             plan=plan,
             core=core,
-            runner=os.getpid(),
         )
         together = msgspec.structs.replace(
             limits,
@@ -169,9 +167,7 @@ def _visit_together(
 
 
 def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
-    request = Request(
-        case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core, runner=os.getpid()
-    )
+    request = Request(case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core)
     reply, why = _asked(request, limits, TimingReply)
     if reply is None:
         return msgspec.structs.replace(timing, why=why)

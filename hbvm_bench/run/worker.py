@@ -1,4 +1,4 @@
-"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json``.
+"""The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json PARENT``, or a warm one.
 
 It writes ``result.json`` (and ``series.npz`` or ``timing.json``) beside the
 request and leaves the store alone; whatever happens to it, the runner that
@@ -14,10 +14,11 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -27,12 +28,11 @@ from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
-from hbvm_bench.measure.metrics import evaluate, guard_violation
 from hbvm_bench.measure.solve import solve, solve_with_bare_end
 from hbvm_bench.measure.timing import Run
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, Timing, TimingRound
+from hbvm_bench.store.records import Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import Program, Status
 from integrators.solution import Solution
@@ -44,6 +44,7 @@ NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
 STALE = "the sources or versions changed while the run was under way; start it again."
+Found = Literal["nothing", "libraries", "code"]
 ENVIRONMENT = {
     # one thread each, whatever does the linear algebra
     "OMP_NUM_THREADS": "1",
@@ -72,8 +73,6 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         For the timing pass.
     core : int or None
         The core to stay on.
-    runner : int
-        The process that asks: without it there is nobody to answer.
     """
 
     case: Case
@@ -82,7 +81,13 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     beside: dict[str, Case] = {}
     plan: TimingPlan = TimingPlan()
     core: int | None = None
-    runner: int
+
+
+class _Fork(NamedTuple):
+    """The process that this one is a fork of, and what was found loaded."""
+
+    parent: int
+    found: Found
 
 
 class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
@@ -98,22 +103,32 @@ class InterleavedReply(msgspec.Struct, frozen=True, kw_only=True):
     timings: list[Timing]
 
 
-def main(path: Path) -> None:
-    """Do what the request at ``path`` asks."""
+def work(path: Path, parent: int, found: Found = "nothing") -> None:
+    """Do what a request asks, as the only thing that this process does.
+
+    Parameters
+    ----------
+    path : Path
+        Of the request.
+    parent : int
+        The process that has made this one: without it there is nobody to answer.
+    found : {"nothing", "libraries", "code"}
+        What this process has not loaded itself but found loaded, being a fork of ``parent``.
+    """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
-    _limit_and_die_with(request.runner)
+    _limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
-    work: dict[str, Callable[[Request, Path], msgspec.Struct]] = {
-        "measure": _measure,
+    modes: dict[str, Callable[[Request, Path], msgspec.Struct]] = {
+        "measure": partial(_measure, fork=_Fork(parent, found)),
         "time": _time,
         "interleave": _interleave,
     }
     name = "result.json" if request.mode == "measure" else "timing.json"
     try:
-        reply = work[request.mode](request, path.parent)
+        reply = modes[request.mode](request, path.parent)
         with atomic(path.parent / name) as temporary:
             temporary.write_bytes(msgspec.json.encode(reply))
     except (OSError, InputError) as error:
@@ -122,7 +137,7 @@ def main(path: Path) -> None:
         raise
 
 
-def _limit_and_die_with(runner: int) -> None:
+def _limit_and_die_with(parent: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
@@ -130,11 +145,11 @@ def _limit_and_die_with(runner: int) -> None:
             Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
         pr_set_pdeathsig = 1
         ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
-        if os.getppid() != runner:  # it died while this process was starting
+        if os.getppid() != parent:  # it died while this process was starting
             sys.exit(1)
 
 
-def _measure(request: Request, directory: Path) -> Result:
+def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
     try:
         resolved = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
@@ -144,8 +159,8 @@ def _measure(request: Request, directory: Path) -> Result:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem, getattr(resolved.method, "h", None))
         program = _compiled(resolved, directory)
-        if resolved.case.ensemble is not None:
-            return _measure_ensemble(resolved, program, directory)
+        if (asked := resolved.case.ensemble) is not None:
+            return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
         integrate = solve_with_bare_end if resolved.case.grid.own_steps else solve
         solution = integrate(resolved.problem, resolved.method, program, grid)
     except OSError as error:
@@ -172,17 +187,17 @@ def _measure(request: Request, directory: Path) -> Result:
         drift={"t": checked.t, **checked.errors} if checked.errors else {},
         reversal=checked.reversal,
     )
-    return _stored(measured, solution.status, solution.reason, directory)
+    return _stored(measured, solution.status, solution.reason, directory, fork, solution.warnings)
 
 
-def _measure_ensemble(resolved: Resolved, program: Program, directory: Path) -> Result:
-    asked = resolved.case.ensemble
-    assert asked is not None
-    return _stored(*ensemble.measure(resolved.problem, program, asked), directory)
-
-
-def _stored(measured: Measured, status: Status, reason: str, directory: Path) -> Result:
-    measured = replace(measured, peak_gib=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+def _stored(
+    measured: Measured,
+    status: Status,
+    reason: str,
+    directory: Path,
+    fork: _Fork,
+    said: Sequence[str] = (),
+) -> Result:
     with atomic(directory / "series.npz") as temporary:
         temporary.write_bytes(encode_series(measured.series()))
     return Result(
@@ -190,13 +205,32 @@ def _stored(measured: Measured, status: Status, reason: str, directory: Path) ->
         status=status.value,
         reason=reason,
         t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
-        violation=guard_violation(measured),
         counters=measured.counters,
-        metrics=evaluate(measured),
-        compile=measured.compile,
+        compile=None if fork.found == "code" else measured.compile,  # else the seconds say nothing
         laws=measured.laws,
         trajectories=measured.trajectories,
+        warnings=list(said),
+        reversal=_value(measured.reversal),
+        peak_gib=_peak_gib(fork),
     )
+
+
+def _value(number: float | str) -> Value:
+    if isinstance(number, str):
+        return Value(why=number)
+    return Value(value=number) if np.isfinite(number) else Value(why="not finite")
+
+
+def _peak_gib(fork: _Fork) -> float:
+    """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
+    untouched = 0 if fork.found == "nothing" else _mapped(fork.parent) - _mapped(os.getpid())
+    return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + max(untouched, 0)) / 2**20
+
+
+def _mapped(pid: int) -> int:
+    """Return how much of files is in the resident memory of a process, in KiB."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
 
 
 def _time(request: Request, directory: Path) -> TimingReply:
@@ -272,4 +306,4 @@ def _garbage(solution: Solution, grid: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    work(Path(sys.argv[1]), int(sys.argv[2]))

@@ -373,11 +373,11 @@ def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
 
 
 def _array(content: bytes) -> NDArray[np.float64]:
-    """Read a ``.npy`` file whose header promises no more than follows it, for numpy makes room first."""
+    """Read a ``.npy`` file whose header promises no more than follows it."""
     stream = io.BytesIO(content)
     np.lib.format.read_magic(stream)
-    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
     if math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
         raise ValueError("its header says another size")
-    stream.seek(0)
-    return np.atleast_1d(np.load(stream, allow_pickle=False))
+    array = np.frombuffer(content, dtype, offset=stream.tell())  # refuses what would need pickles
+    return np.atleast_1d(array.reshape(shape, order="F" if fortran else "C").copy())

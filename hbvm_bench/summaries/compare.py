@@ -9,7 +9,7 @@ from statistics import fmean, median, variance
 import msgspec
 
 from hbvm_bench.campaign.file import Case
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.measure.metrics import METRICS, Metric
 from hbvm_bench.store.records import Record, Value
 from hbvm_bench.store.store import Store
@@ -104,7 +104,7 @@ def compare(first: Store, second: Store) -> Comparison:
     problems.errors.InputError
         If a directory holds no run.
     """
-    one, other = _by_case(first.records()), _by_case(second.records())
+    one, other = _by_case(reading.records(first)), _by_case(reading.records(second))
     both = [(record, other[key]) for key, record in one.items() if key in other]
     found = Comparison(
         cases=len(both),

@@ -13,6 +13,7 @@ import numpy as np
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Record
@@ -60,7 +61,7 @@ def export(store: Store, path: Path, table: str = "cases") -> int:
         raise unknown("table", table, TABLES)
     if path.suffix not in FORMATS:
         raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
-    chosen, records, count = TABLES[table], store.records(), 0
+    chosen, records, count = TABLES[table], reading.records(store), 0
     writer = _csv if path.suffix == ".csv" else _parquet
     with atomic(path) as temporary, writer(temporary, chosen.columns) as write:
         for record in records:
@@ -115,6 +116,7 @@ def _case(record: Record, store: Store) -> Iterator[Row]:
         "status": result.status,
         "reason": result.reason,
         "violation": result.violation,
+        "warnings": " ".join(result.warnings),
         "t_stop": result.t_stop,
     }
     for key in METRICS:
@@ -177,7 +179,7 @@ def _json(value: Any) -> str:
 def _case_columns() -> dict[str, type]:
     words = ("problem_name", "problem_arguments", "method_name", "method_options", "settings", "note", "role")
     columns: dict[str, type] = dict.fromkeys(("id", "problem", "method", *words, "library"), str)
-    columns |= {"order": int} | dict.fromkeys(("outcome", "status", "reason", "violation"), str)
+    columns |= {"order": int} | dict.fromkeys(("outcome", "status", "reason", "violation", "warnings"), str)
     columns["t_stop"] = float
     for key in METRICS:
         columns |= {key: float, f"{key}_void": bool, f"{key}_why": str}

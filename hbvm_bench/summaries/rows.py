@@ -67,7 +67,7 @@ class Row:
     cells : dict of Cell
         By metric key.
     remark : str
-        What went otherwise than asked, and the campaign's note.
+        What went otherwise than asked, what the solution warns of, and the campaign's note.
     """
 
     record: Record
@@ -200,6 +200,7 @@ def _remark(record: Record) -> str:
         parts.append(result.violation)
     elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
         parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
+    parts += result.warnings
     if record.case.note:
         parts.append(record.case.note)
     return "; ".join(part.rstrip(". ") for part in parts)

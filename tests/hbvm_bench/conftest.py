@@ -11,6 +11,8 @@ TOYS = (
     "Steady",
     "Waving",
     "Pinned",
+    "Counting",
+    "Cautious",
     "Straying",
     "Stalling",
     "Endless",

@@ -1,17 +1,19 @@
 """Runs that nobody ran: records and series made up, for the tests of the reports."""
 
 import dataclasses
+import sys
+from pathlib import Path
 
 import numpy as np
 
 import problems
-from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry
+from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry, TimingPlan
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate, guard_violation
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.store.store import Index
+from hbvm_bench.store.store import Index, Store
 from integrators.protocol import Stats, Status
 from integrators.solution import Solution
 
@@ -135,7 +137,7 @@ def write(store, texts, count, *, missing=0):
             if len(ids) <= missing:
                 continue
             size, stalled = 10.0 ** rng.uniform(-16, -4), number % 17 == 16
-            y = np.c_[np.sin(t + size), np.cos(t)]
+            y = np.sin(t[:, None] + size * np.arange(1, resolved.problem.system.dim + 1))
             error = size * np.sqrt(t / t[-1]) * (1 + 0.1 * rng.standard_normal(t.size)) ** 2
             values = {"position_end": 30 * size, "energy_max": size, "warm_seconds": 1e-3 / size**0.1}
             metrics = {
@@ -173,6 +175,24 @@ def write(store, texts, count, *, missing=0):
         description="Made up.",
         problems=list(texts),
         methods=[MethodEntry(use=name) for name in names],
+        timing=TimingPlan(rounds=1),
     )
     store.write_index(Index(campaign=campaign, ids=ids, version="0", command="hbvm-bench run large"))
     return store
+
+
+def kepler(count):
+    """Return so many problems."""
+    return [f"kepler(e={0.1 + 0.8 * number / count:.6f})" for number in range(count)]
+
+
+def toml(campaign):
+    """Return the file of a campaign of problems and methods."""
+    entries = "".join(f"[[methods]]\nuse = {entry.use!r}\n" for entry in campaign.methods)
+    return f"name = {campaign.name!r}\nproblems = {campaign.problems!r}\n{entries}[timing]\nrounds = 1\n"
+
+
+if __name__ == "__main__":  # python -m tests.hbvm_bench.made_up_run DIRECTORY CASES
+    folder, cases = Path(sys.argv[1]), int(sys.argv[2])
+    made = write(Store(folder), kepler(cases // 100), 100)
+    (folder / "campaign.toml").write_text(toml(made.index().campaign))

@@ -2,7 +2,9 @@
 
 import os
 import signal
+import subprocess
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,6 +97,33 @@ class Pinned(ToyBase):
 
     def compile(self, system):
         return ToyProgram(self, cores=len(os.sched_getaffinity(0)))
+
+
+_counted = []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counting(ToyBase):
+    """Counts as steps how often it was compiled in this process; may leave a thread or a process behind."""
+
+    h: float = 0.1
+    leaves: str = ""
+
+    def compile(self, system):
+        _counted.append(self)
+        if self.leaves == "thread":
+            threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
+        if self.leaves == "child":
+            subprocess.Popen(["sleep", "60"])
+        return ToyProgram(self, cores=len(_counted))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cautious(ToyBase):
+    """Warns of itself."""
+
+    def caveat(self, problem):
+        return "it is a toy."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RU
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
-from integrators.kernel.step.size import ROUNDING, change, is_rounding, take_sizes
+from integrators.kernel.step.size import ROUNDING, STAGNATION, change, is_rounding, take_sizes
 from integrators.kernel.step.sweep import evaluate, sweep, sweep_measured
 
 MAX_ITERATIONS = 200
@@ -72,7 +72,10 @@ def test(ctx, strict):
     else:
         ctx.stalled += 1
         if is_rounding(change(ctx, ctx.floored), ctx.stalled >= PATIENCE):
-            polish(ctx, ctx.best)
+            if ctx.best <= STAGNATION:
+                polish(ctx, ctx.best)
+            else:  # a block that is nothing beside the others, and may be growing
+                ctx.outcome = DONE
         elif ctx.tried >= MAX_ITERATIONS:
             restart(ctx, DIVERGED)
 

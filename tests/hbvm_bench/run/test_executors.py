@@ -16,7 +16,7 @@ from hbvm_bench import cli
 from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.run import executors, loop
-from hbvm_bench.run.task import Reply, execute, task_of
+from hbvm_bench.run.task import UnfinishedRunError, execute, task_of
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 from tests.hbvm_bench.conftest import SHORT
@@ -44,7 +44,7 @@ def values(store, chosen):
     for case in chosen:
         record = store.load(case.id)
         kept = {key: v for key, v in record.result.metrics.items() if key not in COST}
-        result = msgspec.structs.replace(record.result, metrics=kept, compile=None)
+        result = msgspec.structs.replace(record.result, metrics=kept, compile=None, peak_gib=None)
         found[case.id] = (record.case, result, record.versions, store.series(case.id))
     return found
 
@@ -85,7 +85,7 @@ def test_a_scheduler_that_is_killed_costs_no_finished_case(toys, tmp_path):
         records = loop.run_accuracy(chosen, store, LIMITS, pool)
         first = next(records)
         cluster.kill(cluster.scheduler)
-        with pytest.raises(loop.UnfinishedRunError, match=r"scheduler at .* is gone"):
+        with pytest.raises(UnfinishedRunError, match=r"scheduler at .* is gone"):
             list(records)
     kept = [case for case in chosen if store.load(case.id)]
     assert first.id in [case.id for case in kept]
@@ -114,6 +114,40 @@ def test_a_runner_that_is_killed_costs_no_finished_case(toys, tmp_path):
     done = subprocess.run(again, capture_output=True, text=True, timeout=60, check=True)
     assert "measuring on this machine: 3, 2 already there" in done.stderr
     assert kept.items() <= {path: path.stat().st_mtime_ns for path in folder.iterdir()}.items()
+
+
+TIMED = """
+name = "timed"
+problems = ["{problem}"]
+methods = [{{ use = "Waving(h={{h}}, wait=0.05)", sweep = {{ h = [0.1, 0.2] }} }}]
+[timing]
+rounds = 2
+samples = 1
+shortest = 1e-4
+"""
+
+
+def test_a_runner_that_is_killed_while_it_times_loses_no_round_and_takes_none_twice(toys, tmp_path):
+    file = tmp_path / "timed.toml"
+    file.write_text(TIMED.format(problem=SHORT))
+    store = Store(tmp_path / "run")
+    command = [sys.executable, "-m", "hbvm_bench.cli", "run", str(file), "--out", str(store.directory)]
+
+    def rounds():
+        return {one.id: one.timing.rounds for one in store.everything() if one.timing is not None}
+
+    running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while not rounds() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    kept = rounds()
+    assert 1 <= sum(map(len, kept.values())) < 4
+    subprocess.run(command, capture_output=True, timeout=60, check=True)
+    after = rounds()
+    assert [len(one) for one in after.values()] == [2, 2]
+    assert all(after[key][: len(one)] == one for key, one in kept.items())
 
 
 def test_a_second_run_into_one_directory_is_refused(tmp_path, capsys):
@@ -157,18 +191,17 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
 def test_a_machine_that_would_run_another_case_says_what_differs(toys):
     asked = msgspec.json.decode(task_of(cases(1)[0], LIMITS))
     asked["id"] = "0" * 64
-    reply, series = execute(msgspec.json.encode(asked))
-    assert "other sources" in msgspec.json.decode(reply, type=Reply).why
+    with pytest.raises(UnfinishedRunError, match="other sources"):
+        execute(msgspec.json.encode(asked))
     asked["versions"]["toys"] = "0.9"
-    reply, series = execute(msgspec.json.encode(asked))
-    assert msgspec.json.decode(reply, type=Reply).why.endswith("it has toys 1.0 instead of 0.9")
-    assert series == b""
+    with pytest.raises(UnfinishedRunError, match=r"it has toys 1\.0 instead of 0\.9$"):
+        execute(msgspec.json.encode(asked))
 
 
 def test_a_machine_that_would_run_another_case_ends_the_run(toys, tmp_path):
     foreign = replace(cases(1)[0], id="0" * 64)  # as if made from other sources
     store = store_in(tmp_path / "run")
-    with pytest.raises(loop.UnfinishedRunError, match="it has other sources of hbvm-bench"):
+    with pytest.raises(UnfinishedRunError, match="it has other sources of hbvm-bench"):
         run_on("local", [foreign], store)
     assert list(store.everything()) == []
 
@@ -193,7 +226,7 @@ def test_a_case_that_an_executor_loses_is_tried_twice_and_named_after_all_others
     with Losing(1) as executor:
         records = loop.run_accuracy(chosen, store, LIMITS, executors.of(executor))
         assert next(records).id == chosen[0].id
-        with pytest.raises(loop.UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
+        with pytest.raises(UnfinishedRunError, match="1 case could not be run: OSError: the machine"):
             next(records)
         assert executor.lost == 2
 

@@ -9,11 +9,12 @@ import time
 from pathlib import Path
 
 import msgspec
+import psutil
 import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.run import executors, loop, supervise, timing_pass
+from hbvm_bench.run import executors, loop, supervise, timing_pass, warm
 from hbvm_bench.run import task as execute
 from hbvm_bench.store.store import Store
 from tests.hbvm_bench.conftest import SHORT
@@ -119,7 +120,9 @@ def test_what_eats_memory_is_killed_at_its_limit(toys, store):
 def test_memory_of_processes_that_it_starts_counts_too():
     eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
     start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
-    ended = supervise.run([sys.executable, "-c", start], {}, Limits(wall_seconds=15, memory_gib=0.2))
+    ended = supervise.watch(
+        supervise.Fresh([sys.executable, "-c", start], {}), Limits(wall_seconds=15, memory_gib=0.2)
+    )
     assert ended.cause == "memory"
     assert 0.2 < ended.peak_gib < 0.6  # measured 0.21 to 0.31
     assert ended.seconds < 10
@@ -127,8 +130,8 @@ def test_memory_of_processes_that_it_starts_counts_too():
 
 def test_all_processes_are_walked_over_once_in_a_second_only(monkeypatch):
     walks = []
-    monkeypatch.setattr(supervise, "_processes", lambda: walks.append(time.monotonic()) or [])
-    supervise.run([sys.executable, "-c", "import time; time.sleep(1.6)"], {}, GENEROUS)
+    monkeypatch.setattr(supervise.psutil, "process_iter", lambda: walks.append(time.monotonic()) or [])
+    supervise.watch(supervise.Fresh([sys.executable, "-c", "import time; time.sleep(1.6)"], {}), GENEROUS)
     assert len(walks) == 1  # one at every poll would be more than ten
 
 
@@ -252,26 +255,88 @@ def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
     assert list(store.cases.iterdir()) == []
 
 
-def test_a_worker_dies_with_its_runner(toys, tmp_path):
+def numbers(record):
+    kept = {k: v for k, v in record.result.metrics.items() if "compile" not in k and k != "peak_memory"}
+    return msgspec.structs.replace(record.result, metrics=kept, compile=None, peak_gib=None)
+
+
+@pytest.mark.parametrize(
+    "method", ["Waving(h=0.3)", "HBVM(k=8, s=2, h=0.25)", "IAS15()", "Taylor(tol=1e-12)"]
+)
+def test_a_case_has_the_same_numbers_in_a_fork_as_in_a_process_that_begins_with_nothing(
+    toys, store, monkeypatch, method
+):
+    forks = [run(store, method) for _ in range(2)]  # of the libraries alone, and of a case
+    series = store.series(forks[0].id)
+    monkeypatch.setattr(warm, "nest", lambda environment: (_ for _ in ()).throw(OSError))
+    fresh = run(store, method)
+    assert [numbers(one) for one in forks] == 2 * [numbers(fresh)]
+    assert fresh.result.compile is not None
+    assert {k: v.tolist() for k, v in store.series(fresh.id).items()} == {
+        k: v.tolist() for k, v in series.items()
+    }
+
+
+def test_what_a_case_does_to_its_process_reaches_no_later_one(toys, store):
+    warm.close()
+    methods = ["Steady(h={})", "Crashing(number=11)", "Steady(h={})", "Exiting(code=3)", "Hungry()"]
+    methods += ["Counting(h={})", "Counting(h={})", "Counting(h={})"]
+    limits = Limits(wall_seconds=30, memory_gib=0.4)
+    records = [run(store, method.format(0.1 + i), limits) for i, method in enumerate(methods)]
+    outcomes = ["ok", "crashed", "ok", "crashed", "killed", "ok", "ok", "ok"]
+    assert [record.result.outcome for record in records] == outcomes
+    # all are forks of the first one, and each counts itself alone
+    assert [record.result.counters.steps for record in records[5:]] == [1, 1, 1]
+
+
+def test_a_process_with_threads_or_children_is_not_forked_from(toys, store):
+    warm.close()
+    for what in ("thread", "child"):
+        assert [run(store, f"Counting(h={h}, leaves={what!r})").result.counters.steps for h in (1, 2)] == [
+            1,
+            1,
+        ]
+
+
+def test_a_nest_whose_process_was_killed_is_replaced(toys, store):
+    assert run(store, "Steady(h=0.3)").result.outcome == "ok"
+    for nest in warm._idle:
+        os.kill(nest.process.pid, signal.SIGKILL)
+    assert run(store, "Steady(h=0.4)").result.outcome == "ok"
+    assert run(store, "Steady(h=0.5)").result.outcome == "ok"
+
+
+def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
+    warm.close()
+    before = set(psutil.Process().children())
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        future = pool.submit(loop.run_case, case("Waving(h=0.3, wait=1.0)"), str(store.directory), GENEROUS)
+        while not supervise._children:
+            time.sleep(0.01)
+        for process in set(psutil.Process().children()) - before:
+            process.kill()
+        record = future.result(timeout=30)
+    assert record.result.outcome == "ok"
+    assert record.result.compile is not None  # in a process that began with nothing
+
+
+def test_no_process_outlives_a_runner_that_is_killed(toys, tmp_path):
     code = (
         "import sys; from hbvm_bench.run import loop; from hbvm_bench.campaign.file import *;"
-        f"loop.run_case(Case(problem={SHORT!r}, method='Endless()'), {str(tmp_path)!r}, Limits())"
+        f"[loop.run_case(Case(problem={SHORT!r}, method=method), {str(tmp_path)!r}, Limits())"
+        " for method in ('Steady()', 'Endless()')]"
     )
     (tmp_path / "cases").mkdir()
     parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ)
-    child = None
-    deadline = time.monotonic() + 20
-    while child is None and time.monotonic() < deadline:
+    left = []
+    deadline = time.monotonic() + 60
+    while (
+        len(left) < 3 and time.monotonic() < deadline
+    ):  # of the libraries, of a case done, of the endless one
         time.sleep(0.05)
-        text = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text()
-        child = int(text.split()[0]) if text.split() else None
-    assert child is not None
+        left = psutil.Process(parent.pid).children(recursive=True)
     parent.kill()
     parent.wait()
-    deadline = time.monotonic() + 30  # it may still be starting
-    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
-        if "zombie" in Path(f"/proc/{child}/status").read_text():
-            break
-        time.sleep(0.05)
-    else:
-        assert not Path(f"/proc/{child}").exists()
+    assert len(left) == 3
+    _, alive = psutil.wait_procs(left, timeout=30)
+    assert [process for process in alive if process.status() != psutil.STATUS_ZOMBIE] == []

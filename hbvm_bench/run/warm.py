@@ -1,0 +1,286 @@
+"""Warm processes: a case gets a process of its own by a fork of one that has loaded what it needs.
+
+A fresh interpreter takes half a second to import the libraries, and as long again to load compiled
+code, for a case of milliseconds. A `Nest` is a process that has imported them and, of each library,
+one that has done a case well; the next case of that library on that problem is a fork of the latter.
+Every case has a process, a memory and an end of its own, and none is done in a process that did
+another one: what it finds there was loaded, and no more.
+
+A warm process is asked over a socket::
+
+    runner -> warm process    the path of a request; with it the case's own socket and its output
+    warm process -> runner    on the case's socket: the process of the case, and at its end the exit code
+    case -> runner            on the case's socket: that it is done, and stays to be forked from
+"""
+
+import atexit
+import contextlib
+import gc
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hbvm_bench.run import worker
+
+DONE = b"done"
+LONGEST = 2**16  # bytes of a message: a path
+PATIENCE = 60.0  # seconds for an interpreter to start on a busy machine
+GROWTH = 2**28  # bytes that a process may have grown by and still be forked from
+
+
+@dataclass
+class Nest:
+    """A process that has imported the libraries, and those that have done a case, one of each library.
+
+    Attributes
+    ----------
+    place : object
+        The environment, the directory and the cores of its processes.
+    process : subprocess.Popen
+        The one that has imported the libraries.
+    asked : socket.socket
+        It is asked there.
+    done : dict of (str, socket.socket)
+        By library, the problem that the other process has done, and where to ask it.
+    """
+
+    place: object
+    process: "subprocess.Popen[bytes]"
+    asked: socket.socket
+    done: dict[str, tuple[str, socket.socket]] = field(default_factory=dict)
+
+    def start(self, path: Path, library: str, problem: str) -> "Fork":
+        """Start the process of a request.
+
+        Raises
+        ------
+        OSError
+            If the nest is no more.
+        """
+        if self.done.get(library, ("",))[0] == problem:
+            with contextlib.suppress(OSError):
+                return Fork(self.done[library][1], path)
+        return Fork(self.asked, path, lambda asked: self._keep(library, problem, asked))
+
+    def close(self) -> None:
+        """End its processes."""
+        for asked in (self.asked, *(asked for _, asked in self.done.values())):
+            asked.close()
+        self.process.wait()
+
+    def _keep(self, library: str, problem: str, asked: socket.socket) -> None:
+        if library in self.done:
+            self.done[library][1].close()
+        self.done[library] = problem, asked
+
+
+class Fork:
+    """The process of one case, a fork of a warm one; see `hbvm_bench.run.supervise.Process`.
+
+    Attributes
+    ----------
+    lost : bool
+        Whether it ended because the warm process was killed: that says nothing of the case.
+    """
+
+    def __init__(
+        self, asked: socket.socket, path: Path, keep: Callable[[socket.socket], None] | None = None
+    ) -> None:
+        self._keep = keep
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.output, out = os.pipe()
+        try:
+            socket.send_fds(asked, [os.fsencode(path)], [theirs.fileno(), out])
+            theirs.close()  # or nobody would be seen to be gone
+            self._socket.settimeout(PATIENCE)
+            said, handles, _, _ = socket.recv_fds(self._socket, LONGEST, 1, socket.MSG_CMSG_CLOEXEC)
+            if not handles:
+                raise ConnectionError("the warm process has ended")
+        except OSError:
+            self._socket.close()
+            os.close(self.output)
+            raise
+        finally:
+            theirs.close()
+            os.close(out)
+        self.pid, self._handle = int(said), handles[0]
+        self.lost = False
+
+    def wait(self, seconds: float | None = None) -> int | None:
+        """Return the exit code, or ``None`` where it still runs after so many seconds."""
+        self._socket.settimeout(seconds)
+        try:
+            said = self._socket.recv(LONGEST)
+        except TimeoutError:
+            return None
+        except ConnectionError:
+            said = b""
+        self.lost = not said
+        os.close(self._handle)
+        if said == DONE and self._keep is not None:
+            self._keep(self._socket)
+            return 0
+        self._socket.close()
+        return int(said) if said else -signal.SIGKILL  # with the process that would have said it
+
+    def kill(self) -> None:
+        """Kill it; what it has started is killed by the process that it is a fork of."""
+        with contextlib.suppress(OSError):
+            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+
+
+_idle: list[Nest] = []
+_lock = threading.Lock()
+
+
+@contextmanager
+def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
+    """Yield a nest that nobody else uses, one that is there or a new one; after an error it is ended.
+
+    ``environment`` is added to the one that it inherits.
+    """
+    whole = {**os.environ, **environment}
+    place = whole, Path.cwd(), os.sched_getaffinity(0)
+    with _lock:
+        found = next((one for one in _idle if one.place == place), None)
+        if found is not None:
+            _idle.remove(found)
+    found = found or _new(whole, place)
+    try:
+        yield found
+    except BaseException:
+        found.close()
+        raise
+    with _lock:
+        _idle.append(found)
+
+
+@atexit.register
+def close() -> None:
+    """End the nests that nobody uses."""
+    with _lock:
+        while _idle:
+            _idle.pop().close()
+
+
+def _new(environment: Mapping[str, str], place: object) -> Nest:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    with theirs:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "hbvm_bench.run.warm", str(theirs.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            pass_fds=[theirs.fileno()],
+            start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
+        )
+    return Nest(place, process, ours)
+
+
+def main(asked: socket.socket) -> None:
+    """Be a warm process: what returns from `_fork` is the process of a case, which may become one itself."""
+    cores, size, first = os.sched_getaffinity(0), _size(), True
+    while True:
+        parent, path, runner = _fork(asked)
+        code = _code(path, parent, first)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if code or not (first and _is_alone() and _size() - size < GROWTH):
+            os._exit(code)
+        os.sched_setaffinity(0, cores)
+        for stream in (1, 2):  # its output has ended
+            os.dup2(0, stream)
+        gc.collect()
+        runner.send(DONE)
+        asked, first = runner, False
+
+
+def _fork(asked: socket.socket) -> tuple[int, Path, socket.socket]:
+    """Make a process for every request, and say how it ended; return in each of them, with its parent."""
+    parent = os.getpid()
+    running: dict[int, tuple[int, socket.socket]] = {}
+    poll = select.poll()
+    poll.register(asked, select.POLLIN)
+    while True:
+        for handle, _ in poll.poll():
+            if handle in running:
+                poll.unregister(handle)
+                os.close(handle)
+                _bury(*running.pop(handle))
+                continue
+            path, handles, _, _ = socket.recv_fds(asked, LONGEST, 2)
+            if not path:  # the runner has ended, or needs it no more
+                for pid, _ in running.values():
+                    _kill_session(pid)
+                os._exit(0)
+            runner, out = socket.socket(fileno=handles[0]), handles[1]
+            gate, opens = os.pipe()
+            pid = os.fork()
+            if pid == 0:
+                os.setsid()
+                os.close(opens)
+                os.read(gate, 1)  # until the runner knows it
+                for stream in (1, 2):
+                    os.dup2(out, stream)
+                for inherited in (gate, out, *running):
+                    os.close(inherited)
+                for other in (asked, *(other for _, other in running.values())):
+                    other.close()
+                return parent, Path(os.fsdecode(path)), runner
+            handle = os.pidfd_open(pid)
+            with contextlib.suppress(OSError):
+                socket.send_fds(runner, [str(pid).encode()], [handle])
+            for inherited in (gate, opens, out):
+                os.close(inherited)
+            running[handle] = pid, runner
+            poll.register(handle, select.POLLIN)
+
+
+def _bury(pid: int, runner: socket.socket) -> None:
+    _kill_session(pid)  # before its number may be given to another one
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    with runner, contextlib.suppress(OSError):
+        runner.send(str(code).encode())
+
+
+def _kill_session(pid: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, signal.SIGKILL)
+
+
+def _code(path: Path, parent: int, first: bool) -> int:
+    """Do what the request at ``path`` asks, and return the exit code."""
+    sys.argv[1:] = [str(path)]
+    try:
+        worker.work(path, parent, "libraries" if first else "code")
+    except SystemExit as error:
+        return error.code if isinstance(error.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def _is_alone() -> bool:
+    """Whether this process has one thread and no children: others would not be there in a fork."""
+    tasks = list(Path("/proc/self/task").iterdir())
+    return len(tasks) == 1 and not (tasks[0] / "children").read_text(encoding="ascii")
+
+
+def _size() -> int:
+    """Return the resident memory of this process in bytes."""
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+if __name__ == "__main__":
+    main(socket.socket(fileno=int(sys.argv[1])))
