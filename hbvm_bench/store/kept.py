@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from hbvm_bench.store.files import ensure_writable, write_json
+from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import SCHEMA, Record, decoded
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -82,7 +82,8 @@ def keep(run: Kept, path: Path, name: str) -> None:
         msgspec.structs.replace(one, records=[kept for kept in one.records if kept.case.problem not in again])
         for one in (load(path, name) if path.is_file() else [])
     ]
-    write_json(path, [*(one for one in old if one.records), run])
+    with atomic(path) as temporary:  # in one line: a race has a thousand records
+        temporary.write_bytes(msgspec.json.encode([*(one for one in old if one.records), run]))
 
 
 def load(path: Path, name: str) -> list[Kept]:

@@ -9,7 +9,6 @@ from hbvm_bench.campaign.file import name_of
 from hbvm_bench.commands.race import as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
-from hbvm_bench.store import kept
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.figures import front, work_precision
 from hbvm_bench.studies.race.results import ENERGY, POSITION
@@ -41,7 +40,8 @@ def test_a_file_that_is_no_race_is_refused_by_name(content, name, race, tmp_path
 
 
 def test_a_race_of_another_version_is_refused(race, tmp_path):
-    kept.write_json(tmp_path / "race.json", [msgspec.structs.replace(race.run, schema=0)])
+    other = msgspec.structs.replace(race.run, schema=0)
+    (tmp_path / "race.json").write_bytes(msgspec.json.encode([other]))
     with pytest.raises(InputError, match="another version"):
         results.load(tmp_path)
 
