@@ -10,7 +10,7 @@ from rich.console import Console
 
 from hbvm_bench.commands import measuring
 from hbvm_bench.commands.run import carry_out
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable
@@ -63,7 +63,7 @@ def automatic(
     words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
     command = measuring.command([*words, *(["--avx2"] if avx2 else [])], out)
     store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
-    run = kept.of(store, automatic_.NAME)
+    run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))
     console.print(machine.sentence(run.machine), highlight=False)
     if out is not None:

@@ -29,7 +29,9 @@ def plugins(
         for t, errors in costs.leak(span):
             print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
         return
-    print(costs.markdown(costs.measure(host, rounds)))
+    from hbvm_bench.report.markdown import printed  # what draws costs seconds to import
+
+    print(printed(costs.table(costs.measure(host, rounds))))
     print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
 

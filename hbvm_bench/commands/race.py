@@ -16,7 +16,7 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.commands import measuring
 from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import carry_out
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable, write_json
@@ -67,7 +67,9 @@ def race(
         _declare(campaign, error=True)
         command = _command(problem, quick, rounds, compile_times, avx2, directory)
         store = carry_out(campaign, directory, command)
-        kept.keep(kept.of(store, results.NAME), directory / results.FILE, results.NAME)
+        kept.keep(
+            kept.of(store, results.NAME, reading.records(store)), directory / results.FILE, results.NAME
+        )
         if not quick if compile_times is None else compile_times:
             _probe(campaign, directory)
     races = results.load(directory)

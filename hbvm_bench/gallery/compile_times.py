@@ -7,6 +7,8 @@ from typing import Any
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
+from hbvm_bench.report.markdown import printed
+from hbvm_bench.summaries.table import Table
 from integrators.kernel.native import field
 from problems import emit
 from problems.problem import Problem
@@ -37,8 +39,6 @@ code grows with the term and not with the number of bodies. Processor seconds of
 - compile: by numba, for one state (as SciPy's solvers call it), and of what HBVM calls on {lanes}
   stages at once (the force of a separable system, otherwise the field).
 
-| problem | unknowns | trace (ms) | emit (ms) | lines | compile, one state (s) | compile, {lanes} stages (s) |
-|---|--:|--:|--:|--:|--:|--:|
 """
 
 
@@ -101,12 +101,22 @@ def page() -> str:
         measure(text)  # what is done only once in a process is not the systems'
     rows = [measure(text) for text in CASES]
     here = machine.describe()
-    head = HEAD.format(processor=here["processor"], python=here["python"], lanes=LANES)
-    return head + "".join(
-        f"| `{row.problem}` | {row.unknowns} | {1e3 * row.trace:.1f} | {1e3 * row.emit:.1f} | {row.lines} | "
-        f"{row.scalar:.2f} | {row.lanes:.2f} |\n"
-        for row in rows
+    table = Table(
+        "",
+        (
+            *("problem", "unknowns", "trace (ms)", "emit (ms)", "lines"),
+            *("compile, one state (s)", f"compile, {LANES} stages (s)"),
+        ),
+        [
+            (
+                *(row.problem, str(row.unknowns), f"{1e3 * row.trace:.1f}", f"{1e3 * row.emit:.1f}"),
+                *(str(row.lines), f"{row.scalar:.2f}", f"{row.lanes:.2f}"),
+            )
+            for row in rows
+        ],
     )
+    head = HEAD.format(processor=here["processor"], python=here["python"], lanes=LANES)
+    return f"{head}{printed(table)}\n"
 
 
 def _seconds(action: Callable[[], Any]) -> tuple[float, Any]:

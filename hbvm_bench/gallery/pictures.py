@@ -95,8 +95,7 @@ def _orbits(ax: Any, picture: Orbits, problem: Problem, t: Array, y: Array) -> N
     ax.set(xlabel="x", ylabel="y", aspect="equal")
     if picture.limits is not None:
         left, right, bottom, top = picture.limits
-        ax.set_xlim(left, right)
-        ax.set_ylim(bottom, top)
+        ax.set(xlim=(left, right), ylim=(bottom, top))
     if picture.inset is not None:
         first, last, span, title = picture.inset
         inner = ax.inset_axes((0.66, 0.28, 0.34, 0.5))

@@ -7,7 +7,7 @@ from matplotlib.ticker import PercentFormatter
 
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.report.document import Block, Details, Items
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.over_time import WIDTH
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
@@ -82,6 +82,7 @@ def _sign(state: str, reached: int, settings: int) -> str:
     return SIGNS[state] + (f" {reached}/{settings}" if state == "ok" and reached < settings else "")
 
 
+@styled
 def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | None:
     """Draw the performance profiles; ``None`` for too few problems.
 
@@ -98,69 +99,68 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
     if not found:
         return None
     label = find(work).label
-    with drawing():
-        figure = new(WIDTH, 4.2)
-        figure.subplots_adjust(left=0.06, right=0.86, top=0.92, bottom=0.12, wspace=0.14)
-        grid = figure.subplots(1, len(found), squeeze=False, sharey=True)[0]
-        panels: list[Panel] = []
-        handles = {}
-        for axes, one in zip(grid, found, strict=True):
-            traces = []
-            end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(_worst(one)))))
-            for index, family in enumerate(one.ratios):
-                taus, shares = one.curve(family)
-                if not one.solved(family):
-                    continue
-                x = np.repeat([*taus, end], 2)[1:]
-                y = np.repeat(shares, 2)
-                x, y = x[: y.size], y[: x.size]
-                (line,) = axes.plot(
-                    x,
-                    y,
-                    color=base_colours(family)[0],
-                    marker=MARKERS.get(family, UNKNOWN_MARKER),
-                    markevery=(index % 3, max(3, x.size // 6)),
-                    markersize=4,
-                    linewidth=1.6,
-                    clip_on=False,
-                )
-                dash = DASHES[sum(base_colours(f) == base_colours(family) for f in list(one.ratios)[:index])]
-                if dash:
-                    line.set_dashes(dash)
-                handles.setdefault(family, line)
-                traces.append(Trace(numbers.get(family, 0), family, x, y))
-            log_axis(axes, "x", 0, round(np.log10(end)))
-            axes.set_ylim(-0.02, 1.02)
-            axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-            axes.set_title(one.accuracy.words, color=INK, fontsize=8)
-            axes.set_xlabel("factor behind the fastest")
-            panels.append(
-                Panel(
-                    one.accuracy.words,
-                    Axis("factor behind the best", log=True),
-                    Axis("share of problems"),
-                    traces,
-                )
+    figure = new(WIDTH, 4.2)
+    figure.subplots_adjust(left=0.06, right=0.86, top=0.92, bottom=0.12, wspace=0.14)
+    grid = figure.subplots(1, len(found), squeeze=False, sharey=True)[0]
+    panels: list[Panel] = []
+    handles = {}
+    for axes, one in zip(grid, found, strict=True):
+        traces = []
+        end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(_worst(one)))))
+        for index, family in enumerate(one.ratios):
+            taus, shares = one.curve(family)
+            if not one.solved(family):
+                continue
+            x = np.repeat([*taus, end], 2)[1:]
+            y = np.repeat(shares, 2)
+            x, y = x[: y.size], y[: x.size]
+            (line,) = axes.plot(
+                x,
+                y,
+                color=base_colours(family)[0],
+                marker=MARKERS.get(family, UNKNOWN_MARKER),
+                markevery=(index % 3, max(3, x.size // 6)),
+                markersize=4,
+                linewidth=1.6,
+                clip_on=False,
             )
-        figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
-        said = " ".join(
-            f"{one.accuracy.words}, {len(one.problems)} problems: "
-            + ", ".join(
-                f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
+            dash = DASHES[sum(base_colours(f) == base_colours(family) for f in list(one.ratios)[:index])]
+            if dash:
+                line.set_dashes(dash)
+            handles.setdefault(family, line)
+            traces.append(Trace(numbers.get(family, 0), family, x, y))
+        log_axis(axes, "x", 0, round(np.log10(end)))
+        axes.set_ylim(-0.02, 1.02)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.set_title(one.accuracy.words, color=INK, fontsize=8)
+        axes.set_xlabel("factor behind the fastest")
+        panels.append(
+            Panel(
+                one.accuracy.words,
+                Axis("factor behind the best", log=True),
+                Axis("share of problems"),
+                traces,
             )
-            + "."
-            for one in found
         )
-        return picture(
-            figure,
-            "profiles",
-            "Performance profiles",
-            f"The share of the problems on which the best setting of a family needs at most so many times "
-            f"the {label} of the best of all. Where a line ends on the right is the share it solves at all. "
-            "Dolan and Moré, Mathematical Programming 91 (2002).",
-            said,
-            Plot(panels),
+    figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
+    said = " ".join(
+        f"{one.accuracy.words}, {len(one.problems)} problems: "
+        + ", ".join(
+            f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
         )
+        + "."
+        for one in found
+    )
+    return picture(
+        figure,
+        "profiles",
+        "Performance profiles",
+        f"The share of the problems on which the best setting of a family needs at most so many times "
+        f"the {label} of the best of all. Where a line ends on the right is the share it solves at all. "
+        "Dolan and Moré, Mathematical Programming 91 (2002).",
+        said,
+        Plot(panels),
+    )
 
 
 def _worst(one: Profile) -> float:

@@ -17,7 +17,7 @@ from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
 from hbvm_bench.report.document import Block, Details, Items, Maker, Ranked, Section, attempt
 from hbvm_bench.report.figures import motion, over_time, portraits, views
-from hbvm_bench.report.figures.canvas import Picture, drawing
+from hbvm_bench.report.figures.canvas import Picture, styled
 from hbvm_bench.report.figures.drift import drift_figure
 from hbvm_bench.report.figures.over_time import Drawn, OverTime
 from hbvm_bench.report.figures.style import Look, method_name
@@ -109,9 +109,9 @@ def _figures(
     left = len(cases) - len(main)
     note = f" Drawn: {len(main)} of {len(cases)} cases, the best and the default of each method." * (left > 0)
 
+    @styled
     def finished(make: Callable[[], Any]) -> Picture | None:
-        with drawing():
-            made: Picture | None = make()
+        made: Picture | None = make()
         if made is None:
             return None
         caption = made.caption + ("" if made.key == "work-precision" else note)

@@ -47,8 +47,8 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
         return self.index.command
 
 
-def of(store: Store, name: str) -> Kept:
-    """Return the run of a campaign in a store.
+def of(store: Store, name: str, records: list[Record]) -> Kept:
+    """Return the run of a campaign in a store, with records of it as `hbvm_bench.measure.reading` reads them.
 
     Raises
     ------
@@ -58,7 +58,6 @@ def of(store: Store, name: str) -> Kept:
     index = store.index()
     if index.campaign.name != name:
         raise InputError(f"{str(store.directory)!r} has results of {index.campaign.name!r}, not of {name}.")
-    records = store.records()
     if not records:
         raise InputError(
             f"the run in {str(store.directory)!r} has no finished case yet; run: {index.command}."

@@ -28,6 +28,7 @@ _OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
     "mul": operator.mul,
     "div": operator.truediv,
     "neg": operator.neg,
+    "where": lambda condition, a, b: double_double.where(condition.rounded() > 0.0, a, b),
 }
 
 
@@ -116,6 +117,8 @@ class _Interpreter:
         args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
         if node.op == "pow":
             return args[0] ** node.data
+        if node.op == "table":
+            return node.data.at(args[0])
         return _OPERATIONS[node.op](*args)
 
     def _sum(self, node: Node, loop: Loop) -> DD:

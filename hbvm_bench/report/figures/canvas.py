@@ -3,10 +3,10 @@
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from hbvm_bench.report.figures.plots import Plot, as_csv
 from hbvm_bench.report.figures.png import small, with_small_images
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 FONT = "DejaVu Sans"
 SETTINGS: Any = {
@@ -101,9 +104,15 @@ class Picture:
         return made if self.plot is None else made | {f"data/{self.key}.csv": as_csv(self.plot)}
 
 
-def drawing() -> AbstractContextManager[None]:
-    """Return the context in which figures are made, so that they all look alike."""
-    return mpl.rc_context(SETTINGS)
+def styled(draw: Callable[P, T]) -> Callable[P, T]:
+    """Have a function draw in the style of the reports, so that all figures look alike."""
+
+    @wraps(draw)
+    def in_style(*args: P.args, **kwargs: P.kwargs) -> T:
+        with mpl.rc_context(SETTINGS):
+            return draw(*args, **kwargs)
+
+    return in_style
 
 
 def picture(
@@ -191,6 +200,14 @@ def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
 def new(width: float, height: float) -> Figure:
     """Return an empty figure of ``width`` × ``height`` inches."""
     return Figure(figsize=(width, height))
+
+
+def say(
+    axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float] = (0, 0), **look: object
+) -> None:
+    """Write beside a point, so many points to the right and up."""
+    given = {"fontsize": 8.5, "color": INK, **look}
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **given)  # type: ignore[arg-type]
 
 
 def log_axis(

@@ -112,9 +112,7 @@ def _case(case: Drawn) -> dict[str, Any]:
 
 def _pane(axes: Axes, case: Drawn) -> None:
     axes.set_axis_off()
-    axes.set_aspect("equal")
-    axes.set_xlim(-REACH, REACH)
-    axes.set_ylim(-REACH * 0.8, REACH * 0.8)
+    axes.set(aspect="equal", xlim=(-REACH, REACH), ylim=(-REACH * 0.8, REACH * 0.8))
     angle = np.linspace(0, 2 * math.pi, 80)
     for radius in (1.25, 2.5):
         ring = project(np.c_[radius * np.cos(angle), radius * np.sin(angle), 0 * angle])

@@ -95,8 +95,7 @@ def _grid(
     for axes, (case, x, y) in zip(grid, clouds, strict=False):
         every = max(1, -(-x.size // MOST))
         axes.plot(x[::every], y[::every], ".", color=case.look.light, markersize=1.1, rasterized=True)
-        axes.set_xlim(*reach[0])
-        axes.set_ylim(*reach[1])
+        axes.set(xlim=reach[0], ylim=reach[1])
         axes.set_title(
             f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=8, color=INK
         )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.measure.quantities import PLANETOID_Z
 from hbvm_bench.reference.solutions import Reference
-from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH, options
@@ -45,8 +45,7 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
             truth = reference.high[late, PLANETOID_Z]
             late_truth = (reference.t[late], truth)
             axes.plot(reference.t[late], truth, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
-        axes.set_xlim(start, problem.t_end)
-        axes.set_ylim(-REACH, REACH)
+        axes.set(xlim=(start, problem.t_end), ylim=(-REACH, REACH))
         panel_legend(axes, members)
     ends = "; ".join(
         f"{case.record.case.method}: {case.series['y'][-1, PLANETOID_Z]:.4g}"
@@ -91,9 +90,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
             _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
             _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
             curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::4]))
-        axes.set_xlim(-3.4, 3.4)
-        axes.set_ylim(-3.4, 3.4)
-        axes.set_aspect("equal")
+        axes.set(xlim=(-3.4, 3.4), ylim=(-3.4, 3.4), aspect="equal")
         axes.set_xticks([-2.5, 0, 2.5], labels=[])
         axes.set_yticks([-2.5, 0, 2.5], labels=[])
         axes.tick_params(length=0)
@@ -144,11 +141,11 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
             axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2, markevery=every)
         curves[0].append(trace(case, history[:, 0], dt))
         curves[1].append(trace(case, np.arange(1.0, len(dt) + 1), dt))
-        left.annotate(
+        say(
+            left,
             f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}",
             (history[-1, 0], dt.min()),
-            xytext=(-8, 4),
-            textcoords="offset points",
+            (-8, 4),
             ha="right",
             fontsize=8,
             color=INK,

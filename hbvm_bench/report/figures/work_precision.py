@@ -12,7 +12,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.labels import number_points
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, method_name
+from hbvm_bench.report.figures.style import method_name
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import group_of
 
@@ -48,8 +48,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
             marker = case.look.marker if value <= top else "^"
             axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
         number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
-        axes.set_xlabel("seconds for the whole span (median)")
-        axes.set_title(METRICS[key].label, color=INK)
+        axes.set(xlabel="seconds for the whole span (median)", title=METRICS[key].label)
         clouds = [
             trace(case, np.array([seconds]), np.array([value]))
             for case, seconds, value in zip(shown, times, values, strict=True)

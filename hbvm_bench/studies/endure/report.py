@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.measure import drift, machine
-from hbvm_bench.report.document import Document, Note, Section, attempt
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.document import Document, Note, attempt
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look, looks
+from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 LAW_POINTS = 40
 FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
 METHOD = """
-Every method runs in a process of its own. The energy is evaluated in double-double arithmetic at whole
-years, log-spaced, at the methods' own steps or by means that cost them nothing. Times are of the problem's
-own start without samples and without compilation, all methods in turn in one process on one core. Laws: a
+The methods run one after the other from each start, in one process on one core. The energy is
+evaluated in double-double arithmetic at whole years, log-spaced, at the methods' own steps or by means
+that cost them nothing. The time of a trajectory contains these few samples and no compilation. Laws: a
 floor and a growth are fitted together to the logarithm of the rms over windows of time
 (`hbvm_bench.measure.drift`).
 """
@@ -44,22 +44,11 @@ def document(result: Endurance) -> Document:
             "(`hbvm_bench.measure.starts`).",
         ],
         [
-            Note(machine.sentence(result.run.machine)),
+            Note(machine.sentence(run.machine)),
             *attempt(
-                ("the tables", lambda: tables(result)),
-                PEERS,
-                ("the figure", lambda: over_time(result, look)),
+                ("the tables", lambda: tables(result)), PEERS, ("the figure", lambda: over_time(result, look))
             ),
             Note(METHOD),
-            Section(
-                "Raw data",
-                [
-                    "Every start with every sample is in the store of the run: "
-                    "`hbvm-bench export DIRECTORY --table series` writes it as a table."
-                ],
-                "data-files",
-                nav="Data",
-            ),
             again("endure", run.command, run.started[:10], run.machine, run.versions),
         ],
         list(look.values()),
@@ -106,6 +95,7 @@ def tables(result: Endurance) -> list[Table]:
     return made
 
 
+@styled
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
     t = result.t
@@ -116,33 +106,31 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     positive = values[values > 0.0]
     low = math.floor(math.log10(positive.min())) if positive.size else -17
     high = math.ceil(math.log10(positive.max())) if positive.size else -14
-    with drawing():
-        figure = new(8.4, 5.0)
-        axes = figure.subplots()
-        figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
-        log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
-        log_axis(axes, "y", low, max(high, low + 1))
-        for method, errors in shown:
-            colour, dash = look[method].light, look[method].dash
-            for row in np.abs(errors):
-                axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
-            axes.plot(
-                t,
-                drift.rms(errors),
-                color=colour,
-                dashes=dash or (None, None),
-                marker=look[method].marker,
-                markevery=24,
-                markersize=5,
-                linewidth=1.6,
-                label=method,
-            )
-        guide = t[t >= t[-1] / 1e3]
-        axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
-        axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
-        axes.set_xlabel("years")
-        axes.set_title("relative energy error, root mean square over the starts", color=INK)
-        axes.legend(loc="upper left", handlelength=4.5)
+    figure = new(8.4, 5.0)
+    axes = figure.subplots()
+    figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
+    log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
+    log_axis(axes, "y", low, max(high, low + 1))
+    for method, errors in shown:
+        colour, dash = look[method].light, look[method].dash
+        for row in np.abs(errors):
+            axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
+        axes.plot(
+            t,
+            drift.rms(errors),
+            color=colour,
+            dashes=dash or (None, None),
+            marker=look[method].marker,
+            markevery=24,
+            markersize=5,
+            linewidth=1.6,
+            label=method,
+        )
+    guide = t[t >= t[-1] / 1e3]
+    axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
+    axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
+    axes.set(xlabel="years", title="relative energy error, root mean square over the starts")
+    axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
         for line in lines(result)

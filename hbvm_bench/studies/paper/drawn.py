@@ -1,13 +1,12 @@
 """What all figures on the paper share: colours, sizes, the numbers that a page reads off them."""
 
-from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures import canvas
 from hbvm_bench.report.figures.canvas import Picture, new
 from hbvm_bench.report.figures.read_off import read_off
-from hbvm_bench.report.figures.style import INK, TRUTH, looks
+from hbvm_bench.report.figures.style import TRUTH, looks
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
@@ -39,14 +38,6 @@ def sheet(width: float, height: float) -> Figure:
     figure = new(width, height)
     figure.set_layout_engine("constrained")
     return figure
-
-
-def say(
-    axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float] = (0, 0), **look: object
-) -> None:
-    """Write beside a point, so many points to the right and up."""
-    given = {"fontsize": 8.5, "color": INK, **look}
-    axes.annotate(text, at, xytext=offset, textcoords="offset points", **given)  # type: ignore[arg-type]
 
 
 def picture(

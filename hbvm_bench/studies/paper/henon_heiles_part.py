@@ -45,10 +45,7 @@ def tasks() -> list[Task]:
             for family, method in FAMILIES.items()
             for i, chunk in enumerate(gaps)
         ),
-        *(
-            Task(f"henon-heiles/other {text}", partial(others.on_henon_heiles, text), 8)
-            for text in others.HENON_HEILES
-        ),
+        *others.tasks(KEY, others.on_henon_heiles, others.HENON_HEILES, 8),
     ]
 
 
@@ -224,23 +221,17 @@ def _slope(x: float, y: float) -> Array:
 
 
 def _others(results: Results) -> Table:
-    rows = [results[f"henon-heiles/other {text}"] for text in others.HENON_HEILES]
-    return Table(
-        key="henon-heiles-others",
-        title="The same start with other integrators",
-        head=("method", "energy", "outside by", "agrees until t", "remark"),
-        rows=tuple(
-            (
-                row.method,
-                number(row.numbers.get("energy")),
-                number(row.numbers.get("outside")),
-                f"{row.numbers['agrees']:.0f}" if "agrees" in row.numbers else "–",
-                row.remark,
-            )
-            for row in rows
-        ),
-        words=(0, 4),
-        note=f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
+    return others.table(
+        results,
+        KEY,
+        others.HENON_HEILES,
+        {
+            "energy": ("energy", number),
+            "outside by": ("outside", number),
+            "agrees until t": ("agrees", "{:.0f}".format),
+        },
+        "The same start with other integrators",
+        f"To t = {others.HENON_SPAN:g}. Largest relative energy error; largest distance beyond the "
         f"triangle; time at which the orbit is {experiment.AGREES:g} from that of HBVM(15,10), h = 1/4. "
         "Chaos doubles every error about every five units of time, so no double precision orbit agrees "
         "much longer than two hundred.",

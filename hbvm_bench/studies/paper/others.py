@@ -1,12 +1,16 @@
 """The paper's three problems with the established libraries, at one setting each, chosen for accuracy."""
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.reference import solutions
 from hbvm_bench.studies.paper import henon_heiles, period_annulus, sitnikov
+from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
 from problems import Problem, load
@@ -16,43 +20,17 @@ from problems.errors import InputError
 # Every family has the same number of settings here: one, chosen by us for accuracy; and
 # the paper's two methods, at the paper's steps. heyoka's compact mode compiles in less
 # time; what it costs in a run is not compared here.
+TAYLOR = "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)"
+GLOBAL = 'IAS15(mode="global")'
+MAPS = ("WHFast(h=0.02)", "SemiImplicitEuler(h=0.02)")
+EXPLICIT = ("Dopri8(rtol=1e-13, atol=1e-15)", "DOP853(rtol=3e-14, atol=1e-16)")
+LIBRARIES = (TAYLOR, GLOBAL, "Leapfrog(h=0.05, order=8)", *MAPS, *EXPLICIT)
 SITNIKOV = (
-    "Gauss(s=2, h=0.5)",
-    "HBVM(k=18, s=2, h=0.5)",
-    "HBVM(k=16, s=8, h=0.125)",
-    "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)",
-    "IAS15()",
-    'IAS15(mode="global")',
-    "Leapfrog(h=0.02, order=8)",
-    "WHFast(h=0.02)",
-    "SemiImplicitEuler(h=0.02)",
-    "Dopri8(rtol=1e-13, atol=1e-15)",
-    "DOP853(rtol=3e-14, atol=1e-16)",
+    *("Gauss(s=2, h=0.5)", "HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)"),
+    *(TAYLOR, "IAS15()", GLOBAL, "Leapfrog(h=0.02, order=8)", *MAPS, *EXPLICIT),
 )
-HENON_HEILES = (
-    "Gauss(s=2, h=1.0)",
-    "HBVM(k=4, s=2, h=1.0)",
-    "HBVM(k=12, s=8, h=0.5)",
-    "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)",
-    'IAS15(mode="global")',
-    "Leapfrog(h=0.05, order=8)",
-    "WHFast(h=0.02)",
-    "SemiImplicitEuler(h=0.02)",
-    "Dopri8(rtol=1e-13, atol=1e-15)",
-    "DOP853(rtol=3e-14, atol=1e-16)",
-)
-PERIOD_ANNULUS = (
-    "Gauss(s=2, h=1.0)",
-    "HBVM(k=5, s=2, h=1.0)",
-    "HBVM(k=15, s=6, h=0.25)",
-    "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)",
-    'IAS15(mode="global")',
-    "Leapfrog(h=0.05, order=8)",
-    "WHFast(h=0.02)",
-    "SemiImplicitEuler(h=0.02)",
-    "Dopri8(rtol=1e-13, atol=1e-15)",
-    "DOP853(rtol=3e-14, atol=1e-16)",
-)
+HENON_HEILES = ("Gauss(s=2, h=1.0)", "HBVM(k=4, s=2, h=1.0)", "HBVM(k=12, s=8, h=0.5)", *LIBRARIES)
+PERIOD_ANNULUS = ("Gauss(s=2, h=1.0)", "HBVM(k=5, s=2, h=1.0)", "HBVM(k=15, s=6, h=0.25)", *LIBRARIES)
 HENON_SPAN = 5000.0
 LOOK = 4.0  # time between two looks at a library's orbit; one that departs blows up within it
 
@@ -74,6 +52,55 @@ class Row:
     method: str
     numbers: dict[str, float]
     remark: str
+
+
+Format = Callable[[float], str]
+
+
+def tasks(part: str, run: Callable[[str], Row], methods: Sequence[str], cost: float) -> list[Task]:
+    """Return the computations of a part with every method."""
+    return [Task(f"{part}/other {text}", partial(run, text), cost) for text in methods]
+
+
+def table(
+    results: Results,
+    part: str,
+    methods: Sequence[str],
+    columns: Mapping[str, tuple[str, Format]],
+    title: str,
+    note: str,
+    remark: Callable[[Row], str] = lambda row: "",
+) -> Table:
+    """Return what came out with every method.
+
+    Parameters
+    ----------
+    results : mapping
+        Of `tasks`.
+    part : str
+        The key of the part.
+    methods : sequence of str
+        As written.
+    columns : mapping of str to (str, callable)
+        From the head of a column to the name of its number, and how it is written.
+    title, note : str
+        Of the table.
+    remark : callable
+        What to say of a row that says nothing itself.
+    """
+    rows: list[Row] = [results[f"{part}/other {text}"] for text in methods]
+
+    def cells(row: Row) -> list[str]:
+        return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
+
+    return Table(
+        key=f"{part}-others",
+        title=title,
+        head=("method", *columns, "remark"),
+        rows=[(row.method, *cells(row), row.remark or remark(row)) for row in rows],
+        words=(0, len(columns) + 1),
+        note=note,
+    )
 
 
 def on_sitnikov(text: str) -> Row:

@@ -74,10 +74,7 @@ def tasks() -> list[Task]:
         ),
         Task("period-annulus/drawn", drawn, 3),
         Task("period-annulus/periods", partial(experiment.periods, PERIOD_GAPS), 2),
-        *(
-            Task(f"period-annulus/other {text}", partial(others.on_period_annulus, text), 8)
-            for text in others.PERIOD_ANNULUS
-        ),
+        *others.tasks(KEY, others.on_period_annulus, others.PERIOD_ANNULUS, 8),
     ]
 
 
@@ -280,20 +277,11 @@ def _point(c: float) -> str:
 
 
 def _others(results: Results) -> Table:
-    rows = [results[f"period-annulus/other {text}"] for text in others.PERIOD_ANNULUS]
-    return Table(
-        key="period-annulus-others",
-        title="The same bisection with other integrators",
-        head=("method", "c", "error in H", "remark"),
-        rows=tuple(
-            (
-                row.method,
-                _point(row.numbers["c"]) if "c" in row.numbers else "–",
-                number(row.numbers.get("error"), 3),
-                row.remark,
-            )
-            for row in rows
-        ),
-        words=(0, 3),
-        note=f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
+    return others.table(
+        results,
+        KEY,
+        others.PERIOD_ANNULUS,
+        {"c": ("c", _point), "error in H": ("error", partial(number, digits=3))},
+        "The same bisection with other integrators",
+        f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )

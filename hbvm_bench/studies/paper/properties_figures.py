@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
 from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.properties import Order
@@ -14,73 +14,72 @@ MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))
 Row = tuple[int, int, float]
 
 
+@styled
 def order(rows: Sequence[Order]) -> Picture:
     """Errors against steps for s = 1 .. 5 and several k."""
-    with drawing():
-        figure = sheet(WIDTH * 0.66, 3.8)
-        axes = figure.subplots()
-        for s in sorted({row.s for row in rows}):
-            chosen = [row for row in rows if row.s == s]
-            for row in chosen:
-                axes.plot(
-                    row.h,
-                    row.error,
-                    color=HBVM,
-                    marker=MARKERS[s],
-                    mfc=HBVM if row.k == s else "none",
-                    markersize=3 if row.k == s else 7,
-                    linewidth=0.8,
-                    label=f"_HBVM(k={row.k}, s={row.s})",
-                )
-            axes.annotate(
-                f"s = {s}: {min(r.slope for r in chosen):.2f} … {max(r.slope for r in chosen):.2f}",
-                (chosen[0].h[0], chosen[0].error[0]),
-                xytext=(8, -3),
-                textcoords="offset points",
-                fontsize=8,
-                color=INK,
-                annotation_clip=False,
+    figure = sheet(WIDTH * 0.66, 3.8)
+    axes = figure.subplots()
+    for s in sorted({row.s for row in rows}):
+        chosen = [row for row in rows if row.s == s]
+        for row in chosen:
+            axes.plot(
+                row.h,
+                row.error,
+                color=HBVM,
+                marker=MARKERS[s],
+                mfc=HBVM if row.k == s else "none",
+                markersize=3 if row.k == s else 7,
+                linewidth=0.8,
+                label=f"_HBVM(k={row.k}, s={row.s})",
             )
-        axes.set_xscale("log")
-        log_axis(axes, "y", -16, -2, most=8)
-        axes.set_xticks([0.01, 0.03, 0.1, 0.3, 1], labels=["0.01", "0.03", "0.1", "0.3", "1"])
-        axes.set_xlim(0.008, 2.5)
-        axes.minorticks_off()
-        axes.set_xlabel("step h")
-        axes.set_ylabel("error at t = 6")
-        return picture(
-            figure,
-            "properties-order",
-            "The order is 2s for every k",
-            "HBVM(k,s) on Hénon–Heiles for k = s (small, filled), s + 1, 2s and 3s (open), which lie on one "
-            "another: the silent stages do not change the order. The numbers are the fitted slopes.",
-            f"{len(rows)} pairs (k, s); the largest distance of a fitted order from 2s is "
-            f"{max(abs(row.slope - 2 * row.s) for row in rows):.2f}.",
+        say(
+            axes,
+            f"s = {s}: {min(r.slope for r in chosen):.2f} … {max(r.slope for r in chosen):.2f}",
+            (chosen[0].h[0], chosen[0].error[0]),
+            (8, -3),
+            fontsize=8,
+            color=INK,
+            annotation_clip=False,
         )
+    axes.set_xscale("log")
+    log_axis(axes, "y", -16, -2, most=8)
+    axes.set_xticks([0.01, 0.03, 0.1, 0.3, 1], labels=["0.01", "0.03", "0.1", "0.3", "1"])
+    axes.set_xlim(0.008, 2.5)
+    axes.minorticks_off()
+    axes.set(xlabel="step h", ylabel="error at t = 6")
+    return picture(
+        figure,
+        "properties-order",
+        "The order is 2s for every k",
+        "HBVM(k,s) on Hénon–Heiles for k = s (small, filled), s + 1, 2s and 3s (open), which lie on one "
+        "another: the silent stages do not change the order. The numbers are the fitted slopes.",
+        f"{len(rows)} pairs (k, s); the largest distance of a fitted order from 2s is "
+        f"{max(abs(row.slope - 2 * row.s) for row in rows):.2f}.",
+    )
 
 
+@styled
 def threshold(cubic: Sequence[Row], quintic: Sequence[Row]) -> Picture:
     """Energy error against k for two polynomial Hamiltonians, with the threshold drawn in."""
-    with drawing():
-        figure = sheet(WIDTH, 3.6)
-        panels = figure.subplots(1, 2, sharey=True)
-        for axes, rows, nu, name in zip(
-            panels, (cubic, quintic), (3, 5), ("Hénon–Heiles, degree 3", "the quintic, degree 5"), strict=True
-        ):
-            _threshold(axes, rows, nu)
-            axes.set_title(name, color=INK)
-        panels[0].set_ylabel("largest |H − H₀| / |H₀|")
-        panels[0].legend(loc="upper right", ncols=1)
-        return picture(
-            figure,
-            "properties-threshold",
-            "Conservation from k ≥ νs/2",
-            "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
-            "promises exact conservation. The dips to round-off just below it, at high s, are errors too "
-            "small to see, not conservation.",
-            f"Largest error for k ≥ νs/2: {_kept(cubic, 3):.1e} for degree 3, {_kept(quintic, 5):.1e} for "
-            "degree 5.",
-        )
+    figure = sheet(WIDTH, 3.6)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, rows, nu, name in zip(
+        panels, (cubic, quintic), (3, 5), ("Hénon–Heiles, degree 3", "the quintic, degree 5"), strict=True
+    ):
+        _threshold(axes, rows, nu)
+        axes.set_title(name, color=INK)
+    panels[0].set_ylabel("largest |H − H₀| / |H₀|")
+    panels[0].legend(loc="upper right", ncols=1)
+    return picture(
+        figure,
+        "properties-threshold",
+        "Conservation from k ≥ νs/2",
+        "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
+        "promises exact conservation. The dips to round-off just below it, at high s, are errors too "
+        "small to see, not conservation.",
+        f"Largest error for k ≥ νs/2: {_kept(cubic, 3):.1e} for degree 3, {_kept(quintic, 5):.1e} for "
+        "degree 5.",
+    )
 
 
 def _kept(rows: Sequence[Row], nu: int) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
+from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
@@ -17,49 +17,44 @@ FAMILY_COLOURS = {"gauss": GAUSS, "hbvm": HBVM}
 FRACTIONS = {1 / 32: "1/32", 1 / 16: "1/16", 1 / 12: "1/12", 1 / 8: "1/8", 1 / 4: "1/4", 1 / 2: "1/2"}
 
 
+@styled
 def by_nodes(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> Picture:
     """Draw the energy error of HBVM(k, 2) against k: practical conservation."""
-    with drawing():
-        figure = sheet(WIDTH * 0.62, 3.4)
-        axes = figure.subplots()
-        for (h, rows), marker, shade in zip(
-            sorted(scans.items(), reverse=True), "os", (1.0, 0.5), strict=True
-        ):
-            k = [row[0] for row in rows]
-            axes.plot(
-                k,
-                [row[1] for row in rows],
-                color=HBVM,
-                alpha=shade,
-                marker=marker,
-                markersize=4,
-                label=f"h = {h:g}",
-            )
-            gone = [(row[0], row[1]) for row in rows if row[2] is not None]
-            if gone:
-                axes.plot(*zip(*gone, strict=True), "o", mfc="none", mec=INK, markersize=9, linestyle="")
-        log_axis(axes, "y", -16, 0, most=8)
-        axes.set_xlabel("k, nodes of the quadrature")
-        axes.set_ylabel("largest |H − H₀| / |H₀|")
-        axes.set_xticks(range(2, 25, 2))
-        handles, _ = axes.get_legend_handles_labels()
-        handles.append(
-            Line2D(
-                [], [], marker="o", mfc="none", mec=INK, linestyle="", markersize=8, label="planetoid lost"
-            )
+    figure = sheet(WIDTH * 0.62, 3.4)
+    axes = figure.subplots()
+    for (h, rows), marker, shade in zip(sorted(scans.items(), reverse=True), "os", (1.0, 0.5), strict=True):
+        k = [row[0] for row in rows]
+        axes.plot(
+            k,
+            [row[1] for row in rows],
+            color=HBVM,
+            alpha=shade,
+            marker=marker,
+            markersize=4,
+            label=f"h = {h:g}",
         )
-        axes.legend(handles=handles, loc="upper right")
-        return picture(
-            figure,
-            "sitnikov-nodes",
-            "Beyond the paper · how many nodes make the conservation practical",
-            f"HBVM(k,{DEGREE}) on Sitnikov's problem over [0, {T_END:g}]. The error falls by a constant "
-            f"factor per node down to round-off; k = 2 is the Gauss method. {_enough(scans)}",
-            "; ".join(
-                f"h = {h:g}: {rows[0][1]:.0e} for k = {rows[0][0]}, {rows[-1][1]:.0e} for k = {rows[-1][0]}"
-                for h, rows in scans.items()
-            ),
-        )
+        gone = [(row[0], row[1]) for row in rows if row[2] is not None]
+        if gone:
+            axes.plot(*zip(*gone, strict=True), "o", mfc="none", mec=INK, markersize=9, linestyle="")
+    log_axis(axes, "y", -16, 0, most=8)
+    axes.set(xlabel="k, nodes of the quadrature", ylabel="largest |H − H₀| / |H₀|")
+    axes.set_xticks(range(2, 25, 2))
+    handles, _ = axes.get_legend_handles_labels()
+    handles.append(
+        Line2D([], [], marker="o", mfc="none", mec=INK, linestyle="", markersize=8, label="planetoid lost")
+    )
+    axes.legend(handles=handles, loc="upper right")
+    return picture(
+        figure,
+        "sitnikov-nodes",
+        "Beyond the paper · how many nodes make the conservation practical",
+        f"HBVM(k,{DEGREE}) on Sitnikov's problem over [0, {T_END:g}]. The error falls by a constant "
+        f"factor per node down to round-off; k = 2 is the Gauss method. {_enough(scans)}",
+        "; ".join(
+            f"h = {h:g}: {rows[0][1]:.0e} for k = {rows[0][0]}, {rows[-1][1]:.0e} for k = {rows[-1][0]}"
+            for h, rows in scans.items()
+        ),
+    )
 
 
 def _enough(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> str:
@@ -71,101 +66,90 @@ def _enough(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) ->
     return f"The first to keep the energy to 1e-13: {words}; the paper takes k = 18 with h = 0.5."
 
 
+@styled
 def by_step(rows: Sequence[StepRow]) -> Picture:
     """Draw the sham rotation against h, and the time at which the planetoid is lost."""
-    with drawing():
-        figure = sheet(WIDTH, 3.7)
-        left, right = figure.subplots(1, 2)
-        for s, dash, marker in ((2, "-", "o"), (3, (0, (5, 2)), "s")):
-            for family in ("gauss", "hbvm"):
-                chosen = [r for r in rows if r.family == family and r.s == s and usable(r) and r.h <= 0.6]
-                if not chosen:
-                    continue
-                name = f"Gauss, s = {s}" if family == "gauss" else f"HBVM(18,{s})"
-                face = FAMILY_COLOURS[family] if family == "hbvm" else "none"
-                left.plot(
-                    [r.h for r in chosen],
-                    [abs(r.turn) for r in chosen],
-                    linestyle=dash,
-                    color=FAMILY_COLOURS[family],
-                    marker=marker,
-                    mfc=face,
-                    markersize=5 if family == "hbvm" else 7,
-                    label=name,
-                )
-        h = np.array([1 / 32, 0.6])
-        for s in (2, 3):
-            finest = next(r for r in rows if r.family == "hbvm" and r.s == s)
-            guide = 3.0 * abs(finest.turn) * (h / finest.h) ** (2 * s)
-            left.plot(h, guide, color=TRUTH, linewidth=1.0, zorder=1)
-            left.annotate(
-                f"h{'⁴' if s == 2 else '⁶'}",
-                (h[0], guide[0]),
-                xytext=(2, 6),
-                textcoords="offset points",
-                color=MUTED,
-                fontsize=9,
+    figure = sheet(WIDTH, 3.7)
+    left, right = figure.subplots(1, 2)
+    for s, dash, marker in ((2, "-", "o"), (3, (0, (5, 2)), "s")):
+        for family in ("gauss", "hbvm"):
+            chosen = [r for r in rows if r.family == family and r.s == s and usable(r) and r.h <= 0.6]
+            if not chosen:
+                continue
+            name = f"Gauss, s = {s}" if family == "gauss" else f"HBVM(18,{s})"
+            face = FAMILY_COLOURS[family] if family == "hbvm" else "none"
+            left.plot(
+                [r.h for r in chosen],
+                [abs(r.turn) for r in chosen],
+                linestyle=dash,
+                color=FAMILY_COLOURS[family],
+                marker=marker,
+                mfc=face,
+                markersize=5 if family == "hbvm" else 7,
+                label=name,
             )
-        left.set_xscale("log")
-        ticks = [step for step in FRACTIONS if step != 1 / 12]
-        left.set_xticks(ticks, labels=[FRACTIONS[step] for step in ticks])
-        left.set_xticks([], minor=True)
-        low = int(np.floor(np.log10(min(abs(r.turn) for r in rows if r.family != "truth" and r.h <= 0.6))))
-        log_axis(left, "y", max(low - 1, -9), 1)
-        left.set_xlabel("step h")
-        left.set_ylabel("degrees per revolution, less the true rate")
-        left.set_title("the sham rotation", color=INK)
-        left.legend(loc="lower right")
-        _losses(right, [r for r in rows if r.s == 2])
+    h = np.array([1 / 32, 0.6])
+    for s in (2, 3):
+        finest = next(r for r in rows if r.family == "hbvm" and r.s == s)
+        guide = 3.0 * abs(finest.turn) * (h / finest.h) ** (2 * s)
+        left.plot(h, guide, color=TRUTH, linewidth=1.0, zorder=1)
+        say(left, f"h{'⁴' if s == 2 else '⁶'}", (h[0], guide[0]), (2, 6), color=MUTED, fontsize=9)
+    left.set_xscale("log")
+    ticks = [step for step in FRACTIONS if step != 1 / 12]
+    left.set_xticks(ticks, labels=[FRACTIONS[step] for step in ticks])
+    left.set_xticks([], minor=True)
+    low = int(np.floor(np.log10(min(abs(r.turn) for r in rows if r.family != "truth" and r.h <= 0.6))))
+    log_axis(left, "y", max(low - 1, -9), 1)
+    left.set(xlabel="step h", ylabel="degrees per revolution, less the true rate", title="the sham rotation")
+    left.legend(loc="lower right")
+    _losses(right, [r for r in rows if r.s == 2])
 
-        def rate(h: float) -> float:
-            return next(r.turn for r in rows if (r.family, r.s, r.h) == ("hbvm", 2, h))
+    def rate(h: float) -> float:
+        return next(r.turn for r in rows if (r.family, r.s, r.h) == ("hbvm", 2, h))
 
-        return picture(
-            figure,
-            "sitnikov-steps",
-            "Beyond the paper · what the step costs",
-            "Left: the rate at which the ellipses turn in the numerical solution. It is a property of the "
-            "order, not of the energy: Gauss and HBVM turn alike. Right: how long the planetoid stays, h by "
-            "h. Crosses: neither the fixed-point nor the Newton iteration found a solution of a step.",
-            f"Under HBVM(18,2) the ellipses turn by {rate(1 / 32):.1e} degrees per revolution with h = 1/32 "
-            f"and by {rate(1 / 2):.1f} with h = 1/2. The table below has all numbers.",
-        )
+    return picture(
+        figure,
+        "sitnikov-steps",
+        "Beyond the paper · what the step costs",
+        "Left: the rate at which the ellipses turn in the numerical solution. It is a property of the "
+        "order, not of the energy: Gauss and HBVM turn alike. Right: how long the planetoid stays, h by "
+        "h. Crosses: neither the fixed-point nor the Newton iteration found a solution of a step.",
+        f"Under HBVM(18,2) the ellipses turn by {rate(1 / 32):.1e} degrees per revolution with h = 1/32 "
+        f"and by {rate(1 / 2):.1f} with h = 1/2. The table below has all numbers.",
+    )
 
 
+@styled
 def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
     """Draw |z - true z| over time for several runs: (label, family, t, error)."""
-    with drawing():
-        figure = sheet(WIDTH, 3.4)
-        axes = figure.subplots()
-        dashes = ["-", (0, (6, 2)), (0, (2, 1.6)), (0, (8, 2, 2, 2))]
-        seen: dict[str, int] = {}
-        for label, family, t, error in runs:
-            index = seen.get(family, 0)
-            seen[family] = index + 1
-            axes.plot(
-                t[1:],
-                np.maximum(error[1:], 1e-16),
-                color=FAMILY_COLOURS[family],
-                linestyle=dashes[index],
-                label=label,
-                linewidth=1.2,
-                marker="o",
-                markersize=2.5,
-            )
-        log_axis(axes, "y", -13, 1, most=7)
-        axes.set_xlim(0, T_END)
-        axes.set_xlabel("time")
-        axes.set_ylabel("|z − true z|")
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        return picture(
-            figure,
-            "sitnikov-truth",
-            "Beyond the paper · against the true trajectory",
-            "Conserving the energy is not accuracy: all HBVM runs here keep the energy to 1e-13. The error "
-            "of the height at the times of the stored 128-bit reference.",
-            "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
+    figure = sheet(WIDTH, 3.4)
+    axes = figure.subplots()
+    dashes = ["-", (0, (6, 2)), (0, (2, 1.6)), (0, (8, 2, 2, 2))]
+    seen: dict[str, int] = {}
+    for label, family, t, error in runs:
+        index = seen.get(family, 0)
+        seen[family] = index + 1
+        axes.plot(
+            t[1:],
+            np.maximum(error[1:], 1e-16),
+            color=FAMILY_COLOURS[family],
+            linestyle=dashes[index],
+            label=label,
+            linewidth=1.2,
+            marker="o",
+            markersize=2.5,
         )
+    log_axis(axes, "y", -13, 1, most=7)
+    axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − true z|")
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return picture(
+        figure,
+        "sitnikov-truth",
+        "Beyond the paper · against the true trajectory",
+        "Conserving the energy is not accuracy: all HBVM runs here keep the energy to 1e-13. The error "
+        "of the height at the times of the stored 128-bit reference.",
+        "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
+    )
 
 
 def step_table(rows: Sequence[StepRow]) -> Table:
@@ -223,10 +207,12 @@ def _losses(axes: Axes, rows: Sequence[StepRow]) -> None:
             axes.bar(x, end, 0.36, color=colour, alpha=1.0 if row.lost is None else 0.45)
     axes.set_xticks(range(len(steps)), labels=[FRACTIONS.get(h, f"{h:g}") for h in steps], rotation=55)
     axes.grid(visible=False, axis="x")
-    axes.set_ylim(0, T_END * 1.02)
-    axes.set_ylabel("time until the planetoid is lost")
-    axes.set_xlabel("step h")
-    axes.set_title("who keeps the planetoid to t = 1500", color=INK)
+    axes.set(
+        ylim=(0, T_END * 1.02),
+        ylabel="time until the planetoid is lost",
+        xlabel="step h",
+        title="who keeps the planetoid to t = 1500",
+    )
     handles = [
         Line2D([], [], marker="s", linestyle="", color=GAUSS, label="Gauss, s = 2"),
         Line2D([], [], marker="s", linestyle="", color=HBVM, label="HBVM(18,2)"),

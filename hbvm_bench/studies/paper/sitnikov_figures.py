@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis
+from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
@@ -18,32 +18,30 @@ SHOWN = 350.0  # the span of time that the paper shows z(t) on
 FAMILY_COLOURS = {"gauss": GAUSS, "hbvm": HBVM, "truth": TRUTH}
 
 
+@styled
 def configuration(truth: Orbit) -> Picture:
     """sit_fig1: the three bodies, and the true z(t)."""
-    with drawing():
-        figure = sheet(WIDTH, 4.0)
-        grid = figure.add_gridspec(2, 2, width_ratios=[0.8, 1.2])
-        _configuration(figure.add_subplot(grid[:, 0]), truth)
-        panels = [figure.add_subplot(grid[row, 1]) for row in (0, 1)]
-        for row, (axes, end) in enumerate(zip(panels, (SHOWN, T_END), strict=True)):
-            shown = truth.t <= end
-            axes.plot(truth.t[shown], truth.z[shown], color=INK, linewidth=0.9 if row == 0 else 0.6)
-            axes.set_xlim(0, end)
-            axes.set_ylim(-2, 2)
-            axes.set_ylabel("z")
-            axes.set_title(f"the planetoid's true height, t ≤ {end:g}", color=INK)
-        panels[1].set_xlabel("time")
-        return picture(
-            figure,
-            "sitnikov-1",
-            "Figure 1 · the configuration and the true motion",
-            "Left: two equal masses on ellipses of eccentricity 0.75, a planetoid of mass 1e-5 on the axis "
-            "through their barycentre. Right: its height over time, from a run whose end agrees with "
-            "128-bit arithmetic to nine digits.",
-            f"The planetoid oscillates irregularly but stays within |z| = {np.abs(truth.z).max():.3f}.",
-        )
+    figure = sheet(WIDTH, 4.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=[0.8, 1.2])
+    _configuration(figure.add_subplot(grid[:, 0]), truth)
+    panels = [figure.add_subplot(grid[row, 1]) for row in (0, 1)]
+    for row, (axes, end) in enumerate(zip(panels, (SHOWN, T_END), strict=True)):
+        shown = truth.t <= end
+        axes.plot(truth.t[shown], truth.z[shown], color=INK, linewidth=0.9 if row == 0 else 0.6)
+        axes.set(xlim=(0, end), ylim=(-2, 2), ylabel="z", title=f"the planetoid's true height, t ≤ {end:g}")
+    panels[1].set_xlabel("time")
+    return picture(
+        figure,
+        "sitnikov-1",
+        "Figure 1 · the configuration and the true motion",
+        "Left: two equal masses on ellipses of eccentricity 0.75, a planetoid of mass 1e-5 on the axis "
+        "through their barycentre. Right: its height over time, from a run whose end agrees with "
+        "128-bit arithmetic to nine digits.",
+        f"The planetoid oscillates irregularly but stays within |z| = {np.abs(truth.z).max():.3f}.",
+    )
 
 
+@styled
 def trajectories(
     run: Orbit,
     truth: Orbit,
@@ -58,81 +56,77 @@ def trajectories(
     ``ellipses``: paths (2, n) of one primary in the `REVOLUTIONS`, drawn as lines.
     """
     colour = FAMILY_COLOURS[family]
-    with drawing():
-        figure = sheet(WIDTH, 4.1)
-        left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
-        reach = 3.2
-        for body, shade in ((0, 0.55), (1, 1.0)):
-            x, y = run.primaries[:, body].T
-            left.plot(x, y, ".", color=colour, alpha=shade, markersize=1.6, rasterized=True)
-        for number, (x, y) in zip(REVOLUTIONS, ellipses, strict=False):
-            left.plot(x, y, color=INK, linewidth=0.9)
-            far = int(np.argmax(np.hypot(x, y)))
-            left.annotate(
-                str(number), (1.11 * x[far], 1.11 * y[far]), ha="center", va="center", fontsize=8, color=INK
-            )
-        left.set_xlim(-reach, reach)
-        left.set_ylim(-reach, reach)
-        left.set_aspect("equal")
-        left.set_xlabel("x")
-        left.set_ylabel("y")
-        left.set_title(f"primaries, every step to t = {run.t[-1]:g}", color=INK)
-        shown = run.t <= end
-        if run.lost is None:
-            past = truth.t <= end
-            right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="true motion")
-            right.set_ylim(-2, 2)
-            right.set_title("the planetoid on the axis", color=INK)
-        else:
-            right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
-            _before(right, run, colour)
-        right.plot(run.t[shown], run.z[shown], color=colour, linewidth=0.9, label=run.method)
-        right.set_xlim(0, end)
-        right.set_xlabel("time")
-        right.set_ylabel("z")
-        if run.lost is None:
-            right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
-        name = {"gauss": "Gauss of order four", "hbvm": "HBVM(18,2)"}[family]
-        return picture(
-            figure,
-            f"sitnikov-{figure_number}",
-            f"Figure {figure_number} · {name}, h = {H:g}",
-            caption,
-            f"{run.method}: largest |z| {np.abs(run.z).max():.4g}, distance of the primaries up to "
-            f"{run.distance.max():.4f}.",
+    figure = sheet(WIDTH, 4.1)
+    left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
+    reach = 3.2
+    for body, shade in ((0, 0.55), (1, 1.0)):
+        x, y = run.primaries[:, body].T
+        left.plot(x, y, ".", color=colour, alpha=shade, markersize=1.6, rasterized=True)
+    for number, (x, y) in zip(REVOLUTIONS, ellipses, strict=False):
+        left.plot(x, y, color=INK, linewidth=0.9)
+        far = int(np.argmax(np.hypot(x, y)))
+        left.annotate(
+            str(number), (1.11 * x[far], 1.11 * y[far]), ha="center", va="center", fontsize=8, color=INK
         )
+    left.set(
+        xlim=(-reach, reach),
+        ylim=(-reach, reach),
+        aspect="equal",
+        xlabel="x",
+        ylabel="y",
+        title=f"primaries, every step to t = {run.t[-1]:g}",
+    )
+    shown = run.t <= end
+    if run.lost is None:
+        past = truth.t <= end
+        right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="true motion")
+        right.set(ylim=(-2, 2), title="the planetoid on the axis")
+    else:
+        right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
+        _before(right, run, colour)
+    right.plot(run.t[shown], run.z[shown], color=colour, linewidth=0.9, label=run.method)
+    right.set(xlim=(0, end), xlabel="time", ylabel="z")
+    if run.lost is None:
+        right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
+    name = {"gauss": "Gauss of order four", "hbvm": "HBVM(18,2)"}[family]
+    return picture(
+        figure,
+        f"sitnikov-{figure_number}",
+        f"Figure {figure_number} · {name}, h = {H:g}",
+        caption,
+        f"{run.method}: largest |z| {np.abs(run.z).max():.4g}, distance of the primaries up to "
+        f"{run.distance.max():.4f}.",
+    )
 
 
+@styled
 def distances(runs: Mapping[str, Orbit]) -> Picture:
     """sit_fig4: the distance of the primaries over time."""
-    with drawing():
-        figure = sheet(WIDTH, 3.1)
-        panels = figure.subplots(1, 2, sharey=True)
-        for axes, family in zip(panels, ("gauss", "hbvm"), strict=True):
-            run = runs[family]
-            axes.plot(run.t, run.distance, color=FAMILY_COLOURS[family], linewidth=0.6)
-            axes.axhline(D, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
-            axes.set_xlim(0, T_END)
-            axes.set_xlabel("time")
-            axes.set_title(run.method, color=INK)
-            low, high = apocentres(run)
-            axes.text(
-                0.99, 1.02, f"maxima {low:.4f} … {high:.4f}", transform=axes.transAxes, ha="right", fontsize=8
-            )
-        panels[0].set_ylabel("distance of the primaries")
-        panels[0].set_ylim(0, max(6.0, 1.05 * float(runs["gauss"].distance.max())))
-        return picture(
-            figure,
-            "sitnikov-4",
-            "Figure 4 · distance of the primaries",
-            "Dashed: the true apocentre distance, 5. HBVM keeps it because the energy fixes the length of "
-            "the axis; Gauss does not.",
-            "; ".join(
-                f"{runs[f].method}: maxima between {apocentres(runs[f])[0]:.4f} and "
-                f"{apocentres(runs[f])[1]:.4f}"
-                for f in ("gauss", "hbvm")
-            ),
+    figure = sheet(WIDTH, 3.1)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, family in zip(panels, ("gauss", "hbvm"), strict=True):
+        run = runs[family]
+        axes.plot(run.t, run.distance, color=FAMILY_COLOURS[family], linewidth=0.6)
+        axes.axhline(D, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
+        axes.set(xlim=(0, T_END), xlabel="time", title=run.method)
+        low, high = apocentres(run)
+        axes.text(
+            0.99, 1.02, f"maxima {low:.4f} … {high:.4f}", transform=axes.transAxes, ha="right", fontsize=8
         )
+    panels[0].set(
+        ylabel="distance of the primaries", ylim=(0, max(6.0, 1.05 * float(runs["gauss"].distance.max())))
+    )
+    return picture(
+        figure,
+        "sitnikov-4",
+        "Figure 4 · distance of the primaries",
+        "Dashed: the true apocentre distance, 5. HBVM keeps it because the energy fixes the length of "
+        "the axis; Gauss does not.",
+        "; ".join(
+            f"{runs[f].method}: maxima between {apocentres(runs[f])[0]:.4f} and {apocentres(runs[f])[1]:.4f}"
+            for f in ("gauss", "hbvm")
+        ),
+    )
 
 
 def apocentres(run: Orbit) -> tuple[float, float]:
@@ -144,40 +138,38 @@ def apocentres(run: Orbit) -> tuple[float, float]:
     return float(peaks.min()), float(peaks.max())
 
 
+@styled
 def errors(runs: Mapping[str, Orbit]) -> Picture:
     """sit_fig5: relative errors of H and of the angular momentum."""
-    with drawing():
-        figure = sheet(WIDTH, 3.6)
-        left, right = figure.subplots(1, 2, sharey=True)
-        shown = [runs[key] for key in ("gauss", "hbvm", "both") if key in runs]
-        colours = [GAUSS, HBVM, INK]
-        for run, colour in zip(shown, colours, strict=False):
-            for axes, values in ((left, run.energy), (right, run.momentum)):
-                t, top = envelope(run.t[1:], values[1:], 300)
-                axes.plot(t, np.maximum(top, 1e-17), color=colour, linewidth=1.1, label=run.method)
-        for axes, title in ((left, "|H − H₀| / |H₀|"), (right, "|M − M₀| / |M₀|")):
-            log_axis(axes, "y", -17, 1, most=9)
-            axes.set_xlim(0, T_END)
-            axes.set_xlabel("time")
-            axes.set_title(title, color=INK)
-        left.set_ylabel("relative error")
-        figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-        return picture(
-            figure,
-            "sitnikov-5",
-            "Figure 5 · errors of the energy and of the angular momentum",
-            "Largest value in each of 300 spans of time; evaluated in double-double. Each of the paper's "
-            "methods keeps one of the two laws and not the other"
-            + (
-                "; the line integral method, which the paper does not have, keeps both."
-                if "both" in runs
-                else "."
-            ),
-            "; ".join(
-                f"{run.method}: energy {run.energy.max():.1e}, angular momentum {run.momentum.max():.1e}"
-                for run in shown
-            ),
-        )
+    figure = sheet(WIDTH, 3.6)
+    left, right = figure.subplots(1, 2, sharey=True)
+    shown = [runs[key] for key in ("gauss", "hbvm", "both") if key in runs]
+    colours = [GAUSS, HBVM, INK]
+    for run, colour in zip(shown, colours, strict=False):
+        for axes, values in ((left, run.energy), (right, run.momentum)):
+            t, top = envelope(run.t[1:], values[1:], 300)
+            axes.plot(t, np.maximum(top, 1e-17), color=colour, linewidth=1.1, label=run.method)
+    for axes, title in ((left, "|H − H₀| / |H₀|"), (right, "|M − M₀| / |M₀|")):
+        log_axis(axes, "y", -17, 1, most=9)
+        axes.set(xlim=(0, T_END), xlabel="time", title=title)
+    left.set_ylabel("relative error")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    return picture(
+        figure,
+        "sitnikov-5",
+        "Figure 5 · errors of the energy and of the angular momentum",
+        "Largest value in each of 300 spans of time; evaluated in double-double. Each of the paper's "
+        "methods keeps one of the two laws and not the other"
+        + (
+            "; the line integral method, which the paper does not have, keeps both."
+            if "both" in runs
+            else "."
+        ),
+        "; ".join(
+            f"{run.method}: energy {run.energy.max():.1e}, angular momentum {run.momentum.max():.1e}"
+            for run in shown
+        ),
+    )
 
 
 def _before(axes: Axes, run: Orbit, colour: str) -> None:
@@ -187,8 +179,7 @@ def _before(axes: Axes, run: Orbit, colour: str) -> None:
     falls = run.z[-1] < 0
     inset = axes.inset_axes((0.09, 0.12 if falls else 0.5, 0.42, 0.36), zorder=5)
     inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
-    inset.set_xlim(0, run.lost)
-    inset.set_ylim(-LOST, LOST)
+    inset.set(xlim=(0, run.lost), ylim=(-LOST, LOST))
     inset.tick_params(labelsize=7)
     inset.set_title(f"until |z| > {LOST:g}, at t = {run.lost:g}", color=INK, fontsize=8)
 

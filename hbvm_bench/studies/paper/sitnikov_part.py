@@ -49,7 +49,7 @@ def tasks() -> list[Task]:
             Task(f"sitnikov/stays {i}", partial(axis_motion.stays, es.tolist()), 8)
             for i, es in enumerate(chunks)
         ),
-        *(Task(f"sitnikov/other {text}", partial(others.on_sitnikov, text), 6) for text in others.SITNIKOV),
+        *others.tasks(KEY, others.on_sitnikov, others.SITNIKOV, 6),
     ]
 
 
@@ -174,33 +174,23 @@ def _plainly(results: Results) -> str:
 
 
 def _others(results: Results) -> Table:
-    rows = [results[f"sitnikov/other {text}"] for text in others.SITNIKOV]
-    return Table(
-        key="sitnikov-others",
-        title="The same run with other integrators",
-        head=(
-            "method",
-            "energy",
-            "angular momentum",
-            "off the axis",
-            "z at 1500 off by",
-            "evaluations",
-            "remark",
-        ),
-        rows=tuple(
-            (
-                row.method,
-                *(number(row.numbers.get(key)) for key in ("energy", "momentum", "off_axis", "z")),
-                f"{row.numbers['evaluations']:,.0f}" if "evaluations" in row.numbers else "–",
-                row.remark or _remark(row),
-            )
-            for row in rows
-        ),
-        words=(0, 6),
-        note="One setting per method, chosen by us for accuracy. Evaluations: of the vector "
+    return others.table(
+        results,
+        KEY,
+        others.SITNIKOV,
+        {
+            "energy": ("energy", number),
+            "angular momentum": ("momentum", number),
+            "off the axis": ("off_axis", number),
+            "z at 1500 off by": ("z", number),
+            "evaluations": ("evaluations", "{:,.0f}".format),
+        },
+        "The same run with other integrators",
+        "One setting per method, chosen by us for accuracy. Evaluations: of the vector "
         "field, where the library counts them. `hbvm-bench run sitnikov` has "
         "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
         "nothing.",
+        _remark,
     )
 
 

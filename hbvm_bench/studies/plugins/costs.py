@@ -17,6 +17,7 @@ import integrators
 import problems
 from hbvm_bench.measure.measured import position_error
 from hbvm_bench.measure.timing import interleaved
+from hbvm_bench.summaries.table import Table
 from problems.catalogue.pendulum import exact_state
 from problems.errors import unknown
 from problems.problem import Problem
@@ -76,23 +77,18 @@ def measure(host: str, rounds: int) -> list[Cost]:
     return [Cost(*row) for row in zip(names, energies, positions, seconds, strict=True)]
 
 
-def markdown(rows: list[Cost]) -> str:
-    """Return the table: medians, fastest and slowest rounds, and ratios of the fastest to the first row's.
+def table(rows: list[Cost]) -> Table:
+    """Return medians, fastest and slowest rounds, and ratios of the fastest to the first row's.
 
     What else a machine does only ever adds to a time, so ratios are of the fastest rounds.
     """
-    lines = [
-        "| method | energy | position | median | rounds | to the native kernel |",
-        "|:--|--:|--:|--:|--:|--:|",
-    ]
-    base = float(rows[0].seconds.min())
+    base = 1e3 * float(rows[0].seconds.min())
+    cells = []
     for row in rows:
         low, middle, high = (1e3 * float(f(row.seconds)) for f in (np.min, np.median, np.max))
-        lines.append(
-            f"| {row.name} | {row.energy:.1e} | {row.position:.1e} | {middle:.3g} ms "
-            f"| {low:.3g} .. {high:.3g} | {low / (1e3 * base):.3g} |"
-        )
-    return "\n".join(lines)
+        errors = f"{row.energy:.1e}", f"{row.position:.1e}"
+        cells.append((row.name, *errors, f"{middle:.3g} ms", f"{low:.3g} .. {high:.3g}", f"{low / base:.3g}"))
+    return Table("", ("method", "energy", "position", "median", "rounds", "to the native kernel"), cells)
 
 
 def _native(problem: Problem, method: Any) -> tuple[str, Run]:
@@ -304,4 +300,4 @@ def leak(span: float, parts: int = 10) -> Iterator[tuple[float, dict[str, float]
         )
 
 
-__all__ = ["Cost", "leak", "markdown", "measure"]
+__all__ = ["Cost", "leak", "measure", "table"]

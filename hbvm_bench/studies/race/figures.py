@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hbvm_bench.report.figures.canvas import Picture, drawing, log_axis, new, picture
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look
+from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.results import ENERGY, OURS, POSITION, Race, counts
@@ -21,6 +21,7 @@ FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn her
 TOP = 1
 
 
+@styled
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     """Draw errors against time; ``None`` without a setting that may be compared.
 
@@ -34,30 +35,26 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     shown = [record for record in race.records if counts(record)]
     if not shown:
         return None
-    with drawing():
-        figure = new(10.4, 4.6)
-        left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
-        times = [_seconds(record) for record in shown]
-        low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
-        levels = race.asked
-        panels: list[Panel] = []
-        figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
-        for axes, title, level, key in (
-            (left, "energy error", levels[0], ENERGY),
-            (right, "position error at the end", levels[1], POSITION),
-        ):
-            log_axis(axes, "x", low, max(high, low + 1))
-            worst = max(_height(record, key) for record in shown)
-            log_axis(
-                axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9
-            )
-            axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-            for family in race.families:
-                _draw(axes, among(shown, family), key, look)
-            axes.set_xlabel("seconds for the whole span (median)")
-            axes.set_title(f"{title}, relative", color=INK)
-            panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
-        _legend(side, [f for f in race.families if among(shown, f)], look)
+    figure = new(10.4, 4.6)
+    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
+    times = [_seconds(record) for record in shown]
+    low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
+    levels = race.asked
+    panels: list[Panel] = []
+    figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
+    for axes, title, level, key in (
+        (left, "energy error", levels[0], ENERGY),
+        (right, "position error at the end", levels[1], POSITION),
+    ):
+        log_axis(axes, "x", low, max(high, low + 1))
+        worst = max(_height(record, key) for record in shown)
+        log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
+        axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
+        for family in race.families:
+            _draw(axes, among(shown, family), key, look)
+        axes.set(xlabel="seconds for the whole span (median)", title=f"{title}, relative")
+        panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
+    _legend(side, [f for f in race.families if among(shown, f)], look)
     energy, position = (power(level) for level in levels)
     return picture(
         figure,

@@ -16,31 +16,17 @@ MAX_ITERATIONS = 200
 PATIENCE = 5
 # A change that is going to be no larger is not waited for, if the last two say so by falling this steeply.
 # One steep fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
-# average fall, from a first change as large as the state, must promise three times that too.
+# average fall, from a first change as large as the state to 1e-15, must promise three times that too.
+# From LOG_GOAL on, these are binary logarithms.
 GOAL = 3e-17
-STEEP = 0.15
+LOG_GOAL, STEEP = log2(GOAL), log2(0.15)
+LOG_PROMISE, FALL = log2(3.0 * GOAL), log2(1e15)
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
 # than rounding adds. With 3e-18 it still was 1e-20 (h = .5); with 1e-18 nothing is seen of it.
 LOG_REST = log2(1e-18)
-FASTEST, SLOWEST = (
-    -10.0,
-    -1.0,
-)  # binary logarithms of the iteration's contraction, as far as they are believed
+FASTEST, SLOWEST = -10.0, -1.0  # contraction, as far as it is believed
 MOST_EXTRA = 16
-
-
-@compiled
-def falls(strict, tried):
-    """Whether falls as steep as ``tried`` equal ones from 1 to 1e-15 would bring ``strict`` to 3 GOAL."""
-    # strict * 1e-15 ** (1 / tried) <= 3 GOAL
-    part = strict / (3.0 * GOAL)
-    power = 1.0
-    for _ in range(tried):
-        power *= part
-        if power > 1e15:
-            return False
-    return True
 
 
 @compiled
@@ -55,7 +41,12 @@ def test(ctx, strict):
     ctx.tests += 1
     if ctx.age == 0:
         take_sizes(ctx)
-    note_rate(ctx, last, strict)
+    size = binary_log(max(strict, GOAL))
+    rate = size - binary_log(last)
+    # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
+    follows = last < 1.0
+    if follows and (strict > ROUNDING or rate < ctx.rate):  # if it is rounding, it falls that fast at least
+        ctx.rate = min(max(rate, FASTEST), SLOWEST)
     if not strict < INFINITY:
         # Growing changes overflow in the end; a NaN out of the blue is the field's own.
         restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
@@ -63,9 +54,8 @@ def test(ctx, strict):
         polish(ctx, ctx.tolerance)
     elif strict < ctx.best:
         ctx.best, ctx.stalled = strict, 0
-        # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
-        steep = last < 1.0 and strict <= STEEP * last and strict * strict <= GOAL * last
-        if steep and falls(strict, ctx.tried):
+        nothing = follows and rate <= STEEP and size + rate <= LOG_GOAL
+        if nothing and ctx.tried * (size - LOG_PROMISE) <= FALL:
             polish(ctx, strict)
         elif ctx.tried >= MAX_ITERATIONS:
             restart(ctx, DIVERGED)
@@ -81,15 +71,6 @@ def test(ctx, strict):
 
 
 @compiled
-def note_rate(ctx, last, strict):
-    """Learn from two changes in a row how fast they fall: if they are rounding, how fast at least."""
-    if last < 1.0:
-        rate = binary_log(max(strict, GOAL) / last)
-        if strict > ROUNDING or rate < ctx.rate:
-            ctx.rate = min(max(rate, FASTEST), SLOWEST)
-
-
-@compiled
 def polish(ctx, change):
     """Iterate until next to nothing is left of a change, without a test, and let the step be solved.
 
@@ -99,9 +80,9 @@ def polish(ctx, change):
     more = int((LOG_REST - binary_log(change)) / ctx.rate)
     last = ctx.last
     sweep(ctx, min(max(more, 0), MOST_EXTRA))
-    ctx.last = last
     evaluate(ctx)
     ctx.tried += 1
+    ctx.last = last
     ctx.outcome = DONE
 
 

@@ -30,7 +30,7 @@ from hbvm_bench.report.document import (
     pieces,
 )
 from hbvm_bench.report.figures import canvas
-from hbvm_bench.report.figures.canvas import Picture, drawing, new, picture
+from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.html import Place
@@ -69,13 +69,13 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
+@styled
 def drawn(text="a figure") -> Picture:
-    with drawing():
-        figure = new(3.0, 2.0)
-        figure.subplots().plot([0.0, 1.0], [1.0, 2.0])
-        trace = Trace(1, text, np.array([0.0, 1.0]), np.array([1.0, 2.0]))
-        plot = Plot([Panel("panel", Axis("x"), Axis("y"), [trace])])
-        return picture(figure, "drawn", text, f"caption of {text}", f"summary of {text}", plot)
+    figure = new(3.0, 2.0)
+    figure.subplots().plot([0.0, 1.0], [1.0, 2.0])
+    trace = Trace(1, text, np.array([0.0, 1.0]), np.array([1.0, 2.0]))
+    plot = Plot([Panel("panel", Axis("x"), Axis("y"), [trace])])
+    return picture(figure, "drawn", text, f"caption of {text}", f"summary of {text}", plot)
 
 
 @pytest.fixture(scope="module")

@@ -61,7 +61,8 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
     pytest.importorskip("heyoka")
     monkeypatch.chdir(tmp_path)
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
-    run = kept.of(Store(tmp_path / "runs" / "automatic"), "automatic")
+    store = Store(tmp_path / "runs" / "automatic")
+    run = kept.of(store, "automatic", store.records())
     (duel,) = runs.duels(run)
     for side in (duel.ours, duel.theirs):
         metrics = side.result.metrics
