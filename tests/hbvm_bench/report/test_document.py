@@ -9,7 +9,9 @@ from typing import get_args
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from msgspec.structs import replace
 
+from hbvm_bench.campaign.file import Goal
 from hbvm_bench.report import html, markdown
 from hbvm_bench.report.campaign import document
 from hbvm_bench.report.document import (
@@ -182,6 +184,17 @@ def test_a_figure_of_a_campaign_that_fails_loses_no_other(tmp_path, monkeypatch)
     made = document(store)
     assert [part.title for part in made.failed] == ["Drift of the energy, pendulum(q=0.0, p=1.0)"]
     assert [p.key for p in made.pictures] == [p.key for p in whole.pictures if p.key != "drift"]
+
+
+def test_the_goals_of_a_campaign_stand_in_its_report(tmp_path):
+    store = made_up_run.write(Store(tmp_path), ["pendulum(p=1.0)"], 3)
+    assert "Goals declared" not in markdown.markdown(document(store))
+    index = store.index()
+    asked = [Goal(metric="energy_max", at=1.0), Goal(metric="energy_max", at=0.0, method="nobody")]
+    store.write_index(replace(index, campaign=replace(index.campaign, goals=asked)))
+    text = markdown.markdown(document(store))
+    rows = [line for line in text.splitlines() if line.startswith("| pendulum | energy error of ")]
+    assert [row.split(" | ")[-1] for row in rows] == ["reached |", "missed |"]
 
 
 def stored_document(name: str) -> Document:
