@@ -166,7 +166,7 @@ def tables(k: int, s: int) -> Tables:
     if not k >= s >= 1:
         raise InputError(f"HBVM needs k >= s >= 1, not k={k}, s={s}.")
     half = _mp.mpf(1) / 2
-    xis = [_mp.mpf(0)] + [half / _mp.sqrt(4 * i * i - 1) for i in range(1, s + 1)]
+    xis = _xis(s)
     nodes, weights = _gauss(k)
 
     basis = [polynomials(c, s + 1, xis.__getitem__) for c in nodes]
@@ -194,6 +194,32 @@ def tables(k: int, s: int) -> Tables:
         double_integrals=Table.of([v for row in double_integrals for v in row], (k, s)),
         position_weights=Table.of(position_weights, (k,)),
     )
+
+
+def beyond_two(k: int, modes: int) -> Array:
+    """Return what takes values at the k nodes of two steps to the nodes of the next one, shape (k, 2 k).
+
+    By least squares over ``modes`` polynomials, 2 k at most. The longer the stretch that is known, the less
+    far the next step is beyond it: for a field that oscillates by one radian a step, k = 8, what is
+    found is 1400 times as near as from the last step alone. Entries are of the size of 1e6: in
+    double precision they would be wrong in the tenth digit.
+    """
+    nodes, _ = _gauss(k)
+    modes = min(modes, 2 * k)
+    xis = _xis(modes)
+
+    def at(points: list[Any]) -> Any:
+        return _mp.matrix([polynomials(c, modes, xis.__getitem__) for c in points])
+
+    known = at([c / 2 for c in nodes] + [(1 + c) / 2 for c in nodes])
+    found = at([1 + c / 2 for c in nodes]) * _mp.inverse(known.T * known) * known.T
+    return np.array(found.tolist(), dtype=np.float64)
+
+
+def _xis(s: int) -> list[Any]:
+    """Return ``xi_0 .. xi_s`` with 50 digits."""
+    half = _mp.mpf(1) / 2
+    return [_mp.mpf(0)] + [half / _mp.sqrt(4 * i * i - 1) for i in range(1, s + 1)]
 
 
 def _times_x(row: list[Any], xis: list[Any], half: Any) -> list[Any]:

@@ -56,7 +56,7 @@ class Constants:
         ``matrix`` + ``matrix_low`` (k, k), or (k, s) on the route THROUGH; ``projection``
         (s, k) and ``into_modes`` (modes, k) onto coefficients; ``beyond`` (k, modes), the
         modes at the nodes of the next step; ``beyond_two`` (k, 2 k), from two steps' values to the
-        nodes of the next one; ``basis`` (k, moments); and vectors (k,).
+        nodes of the next one, on the route of eight columns; ``basis`` (k, moments); and vectors (k,).
     """
 
     k: int
@@ -117,7 +117,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
 def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
     modes = min(k, MODES_VARYING)
     inner = s if route == THROUGH else k
-    extrapolations = [(modes, k), (k, modes), (k, 2 * k)]
+    extrapolations = [(modes, k), (k, modes), (k, 2 * k if route == 8 else 0)]
     return [(k, 1)] * 6 + [(k, inner)] * 2 + [(s, k), *extrapolations, (k, min(MOMENTS, k))]
 
 
@@ -143,24 +143,9 @@ def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
         "projection": keep_moments(t.projection.hi, t.projection.lo, basis[:, : min(MOMENTS, k)]),
         "into_modes": (basis[:, :modes] * t.weights.hi[:, None]).T,
         "beyond": legendre.legendre(1.0 + t.nodes.hi, modes),
-        "beyond_two": beyond_two(t.nodes.hi),
+        "beyond_two": legendre.beyond_two(k, MODES) if route == 8 else np.empty((k, 0)),
         "basis": basis[:, : min(MOMENTS, k)],
     }
-
-
-def beyond_two(nodes: Array) -> Array:
-    """Return what takes values at the nodes of two steps to the nodes of the next one, by least squares.
-
-    The longer the stretch that is known, the less far the next step is beyond it. For a field
-    that oscillates by one radian a step, k = 8, the start is 1400 times as near as one from the last
-    step alone.
-    """
-    from integrators.legendre import legendre
-
-    k = nodes.size
-    modes = min(2 * k, MODES)
-    known = np.concatenate([0.5 * nodes, 0.5 + 0.5 * nodes])
-    return legendre(1.0 + 0.5 * nodes, modes) @ np.linalg.pinv(legendre(known, modes))
 
 
 def keep_moments(high: Array, low: Array, basis: Array) -> Array:
@@ -226,9 +211,9 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         where no factor follows.
     """
     a = constants.arrays
-    high, low = _times(a["matrix"], a["matrix_low"], h)
+    high, low = times(a["matrix"], a["matrix_low"], h)
     if squared:
-        high, low = _times(high, low, h)
+        high, low = times(high, low, h)
     projection, modes = a["projection"], slice(MODES)
     beyond = a["beyond"][:, modes]
     if constants.route == THROUGH:
@@ -284,7 +269,8 @@ def _recurrence(modes: int) -> Array:
     )
 
 
-def _times(high: Array, low: Array, h: float) -> tuple[Array, Array]:
+def times(high: Array, low: Array, h: float) -> tuple[Array, Array]:
+    """Return (high + low) * h as a sum of two doubles."""
     product = DD(high, low) * h
     return product.hi, product.lo
 

@@ -207,6 +207,7 @@ def call(
     dim: int,
     layout: Layout,
     what: str,
+    second: str = "p",
 ) -> Any:
     """Run a user's function on symbols, with the arguments that it names.
 
@@ -222,6 +223,8 @@ def call(
         Offset and length of each parameter in ``par``.
     what : str
         What the function is, for messages: ``"H"``, ``"invariant 'L'"``.
+    second : {"p", "v"}
+        What the second half of the state is called: momenta, or velocities in a Lagrangian.
 
     Raises
     ------
@@ -239,7 +242,9 @@ def call(
     if graph.dof is not None:
         dof = graph.dof
         offered["q"] = lambda: Vector(graph, "q", "y", 0, dof)
-        offered["p"] = lambda: Vector(graph, "p", "y", dof, dof)
+        offered[second] = lambda: Vector(graph, second, "y", dof, dof)
+        if second != "p":
+            del offered["y"]
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

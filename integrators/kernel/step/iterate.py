@@ -14,19 +14,18 @@ MAX_ITERATIONS = 200
 # far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
 # s = 2, h = 1; with five 3e-18).
 PATIENCE = 5
-# A change that is going to be no larger is not waited for, if the last two say so by falling this steeply.
-# One steep fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the
-# average fall, from a first change as large as the state to 1e-15, must promise three times that too.
-# From LOG_GOAL on, these are binary logarithms.
-GOAL = 3e-17
-LOG_GOAL, STEEP = log2(GOAL), log2(0.15)
-LOG_PROMISE, FALL = log2(3.0 * GOAL), log2(1e15)
+# Once a change is small, how fast it has fallen tells how fast the rest will, if that is steep. One steep
+# fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the average
+# fall, from a first change as large as the state to 1e-15, must promise next to nothing. Binary logarithms.
+LOG_TRUSTED, STEEP = log2(1e-11), log2(0.15)
+LEAST = 3e-17  # smaller changes are rounding
+LOG_PROMISE, FALL = log2(3.0 * LEAST), log2(1e15)
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
 # than rounding adds. With 3e-18 it still was 1e-20 (h = .5); with 1e-18 nothing is seen of it.
 LOG_REST = log2(1e-18)
 FASTEST, SLOWEST = -10.0, -1.0  # contraction, as far as it is believed
-MOST_EXTRA = 16
+MOST_EXTRA = 16  # sweeps of `polish`
 
 
 @compiled
@@ -34,14 +33,14 @@ def test(ctx, strict):
     """Apply the stopping rule to the change of the last sweep; `Context.outcome` says what came of it.
 
     The iteration has converged when the change, relative to its block, is at most the tolerance, or
-    when it has stopped decreasing where rounding accounts for it, or when the next one is going to be
-    nothing. Then `polish` takes it on.
+    when it has stopped decreasing where rounding accounts for it, or when it is small and falls so
+    steeply that the rest is known. Then `polish` takes it on.
     """
     last, ctx.last = ctx.last, strict
     ctx.tests += 1
     if ctx.age == 0:
         take_sizes(ctx)
-    size = binary_log(max(strict, GOAL))
+    size = binary_log(max(strict, LEAST))
     rate = size - binary_log(last)
     # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
     follows = last < 1.0
@@ -54,8 +53,8 @@ def test(ctx, strict):
         polish(ctx, ctx.tolerance)
     elif strict < ctx.best:
         ctx.best, ctx.stalled = strict, 0
-        nothing = follows and rate <= STEEP and size + rate <= LOG_GOAL
-        if nothing and ctx.tried * (size - LOG_PROMISE) <= FALL:
+        steep = follows and rate <= STEEP and size <= LOG_TRUSTED
+        if steep and ctx.tried * (size - LOG_PROMISE) <= FALL:
             polish(ctx, strict)
         elif ctx.tried >= MAX_ITERATIONS:
             restart(ctx, DIVERGED)
@@ -123,7 +122,7 @@ def close(ctx):
         if ctx.predicted:
             # Two tests tell how the changes fall, or that they do not any more; more mean that the
             # first came early. It came late where nothing was left to fall.
-            late = ctx.stalled > 0 or ctx.last <= ctx.tolerance
+            late = ctx.stalled > 0 or ctx.last <= ROUNDING
             ctx.free = max(ctx.free + ctx.tests - (3 if late and ctx.tests <= 2 else 2), 0)
     else:
         ctx.length = 0.0
