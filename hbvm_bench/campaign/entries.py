@@ -1,5 +1,6 @@
 """What the entries of a campaign file say: problems, methods, ensembles, limits, timing, checks."""
 
+import re
 from typing import Annotated, Literal
 
 import msgspec
@@ -16,6 +17,7 @@ Role = Literal["ours", "peer"]
 Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
 Count = Annotated[int, Meta(ge=1)]
 Accuracy = dict[str, Positive]
+FILE_NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 
 
 class Limits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -175,6 +177,12 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None
+
+    def __post_init__(self) -> None:
+        if self.name and not re.fullmatch(FILE_NAME, self.name):
+            raise InputError(
+                f"problem name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
+            )
 
 
 class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

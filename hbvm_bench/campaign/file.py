@@ -11,6 +11,7 @@ from typing import Any, get_args
 import msgspec
 
 from hbvm_bench.campaign.entries import (
+    FILE_NAME,
     Checks,
     Ensemble,
     EnsembleEntry,
@@ -64,7 +65,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     quick: bool = False
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}", self.name):
+        if not re.fullmatch(FILE_NAME, self.name):
             raise InputError(
                 f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )

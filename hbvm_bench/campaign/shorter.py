@@ -44,7 +44,7 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
     )
 
 
-def quick(campaign: Campaign, rounds: int) -> Campaign:
+def quick_run(campaign: Campaign, rounds: int) -> Campaign:
     """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds."""
     return replace(
         campaign,

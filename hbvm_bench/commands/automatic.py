@@ -10,7 +10,7 @@ from rich.console import Console
 
 from hbvm_bench.commands import measuring
 from hbvm_bench.commands.run import carry_out
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable
@@ -51,6 +51,8 @@ def automatic(
     if general:
         _general(console, problems or [], limit)
         return
+    from hbvm_bench.studies.automatic import report
+
     if redraw:
         _publish(out or Path("reports/automatic"))
         return
@@ -61,9 +63,7 @@ def automatic(
     words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
     command = measuring.command([*words, *(["--avx2"] if avx2 else [])], out)
     store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
-    run = kept.of(store, automatic_.NAME)
-    from hbvm_bench.studies.automatic import report
-
+    run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))
     console.print(machine.sentence(run.machine), highlight=False)
     if out is not None:

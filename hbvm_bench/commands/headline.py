@@ -9,8 +9,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.studies.automatic import report as automatic
 from hbvm_bench.studies.automatic.runs import by_kind
-from hbvm_bench.studies.race import report, results, tables
-from hbvm_bench.studies.race.contests import CONTESTS
+from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
 
 
@@ -22,7 +21,7 @@ def headline(
     For every kind of processor the ratios, the goals with what was measured, and the settings
     that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.
     """
-    races = results.by_kind(reports / "race", list(CONTESTS))
+    races = results.by_kind(reports / "race")
     duels = by_kind(reports / "automatic")
     if not races and not duels:
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
@@ -31,7 +30,6 @@ def headline(
         parts += [f"**{plain(kind)}**", *map(plain, machine.sentences(race.machine for race in found))]
         shown = [tables.headline(found), tables.goals(found), tables.behind(found)]
         parts += [printed(table) for table in shown if table.rows]
-        parts += dict.fromkeys(plain(said) for race in found for said in report.earlier_definition(race))
     parts += [printed(tables.kinds(races))] if len(races) > 1 else []
     if duels:
         parts += [printed(automatic.ratios(duels))]

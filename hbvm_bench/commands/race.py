@@ -1,25 +1,31 @@
 """``hbvm-bench race``."""
 
-import sys
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import msgspec
 import typer
+from msgspec.structs import replace
 from rich.text import Text
 
+from hbvm_bench.campaign.file import Campaign, Case, name_of
+from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.campaign.shorter import chosen, quick_run
+from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.commands import measuring
-from hbvm_bench.measure import machine
+from hbvm_bench.commands.listing import as_json as run_as_json
+from hbvm_bench.commands.run import carry_out
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable
-from hbvm_bench.studies.race import results, standings, tables
-from hbvm_bench.studies.race.child import Request
-from hbvm_bench.studies.race.contests import CONTESTS, chosen
-from hbvm_bench.studies.race.results import Contest, Race
-from hbvm_bench.studies.race.settings import FAMILIES, settings
+from hbvm_bench.store import kept
+from hbvm_bench.store.files import ensure_writable, write_json
+from hbvm_bench.studies.race import results, tables
+from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes, probe
+from hbvm_bench.studies.race.results import OURS, Race
+from hbvm_bench.summaries import goals
 
-ROUNDS = 9
 QUICK_ROUNDS = 3
 
 
@@ -27,9 +33,7 @@ def race(
     problem: Annotated[
         list[str] | None, typer.Option("-p", "--problem", help="Only this problem; may be repeated.")
     ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A tenth of the spans, few settings; under a minute.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A tenth of the spans and few settings.")] = False,
     rounds: Annotated[int | None, typer.Option(min=2, help="Interleaved rounds of timing.")] = None,
     compile_times: Annotated[
         bool | None,
@@ -48,110 +52,92 @@ def race(
     ] = False,
 ) -> None:
     """Time our integrators against the peers, side by side, at equal energy and position error."""
-    contests = chosen(problem)
+    campaign = chosen(results.declared(), problem or [])
+    keys = [name_of(entry) for entry in campaign.entries()]
     directory = out or Path("runs") / ("race" + "-quick" * quick + "-avx2" * avx2)
+    campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
+    if rounds:
+        campaign = replace(campaign, timing=replace(campaign.timing, rounds=rounds))
     if declare:
-        _declare(contests, quick, error=False)
+        _declare(campaign, error=False)
         return
-    failed: list[str] = []
     if not redraw:
-        environment = machine.restricted_to_avx2() if avx2 else {}
+        os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
         ensure_writable(directory)
-        _declare(contests, quick, error=True)
-        request = Request(
-            contests=[contest.key for contest in contests],
-            out=str(directory),
-            quick=quick,
-            rounds=rounds or (QUICK_ROUNDS if quick else ROUNDS),
-            probes=not quick if compile_times is None else compile_times,
-            command=_command(problem, quick, rounds, compile_times, avx2, directory),
+        _declare(campaign, error=True)
+        command = _command(problem, quick, rounds, compile_times, avx2, directory)
+        store = carry_out(campaign, directory, command)
+        kept.keep(
+            kept.of(store, results.NAME, reading.records(store)), directory / results.FILE, results.NAME
         )
-        failed = _run(request, environment)
-    races = results.load(directory, list(CONTESTS))
+        if not quick if compile_times is None else compile_times:
+            _probe(campaign, directory)
+    races = results.load(directory)
     if as_json:
         terminal.print_json(as_data(races))
     else:
-        _show([one for one in races if one.contest.key in {contest.key for contest in contests}])
+        _show([one for one in races if one.key in keys])
     from hbvm_bench.commands.publishing import publish
     from hbvm_bench.studies.race import report
 
-    if failed:
-        print(f"hbvm-bench: these did not end and have no result: {', '.join(failed)}.", file=sys.stderr)
-    publish(report.document(races, results.by_kind(directory, list(CONTESTS))), directory)
-    if failed:
-        raise typer.Exit(1)
+    publish(report.document(races, results.by_kind(directory)), directory)
 
 
 def as_data(races: Sequence[Race]) -> dict[str, Any]:
     """Return the results with what is read off them, as plain data for JSON."""
-    verdicts = [(race, standings.verdict(race, goal)) for race in races for goal in race.contest.goals]
     return {
-        "schema": results.SCHEMA,
-        "goals": [
-            {
-                "contest": race.contest.key,
-                "peer": verdict.goal.family,
-                "energy": verdict.goal.energy,
-                "position": verdict.goal.position,
-                "goal": verdict.goal.ratio,
-                **_ratio(verdict.comparison),
-                "reached": verdict.reached,
-            }
-            for race, verdict in verdicts
-        ],
+        "goals": goals.as_data([verdict for race in races for verdict in race.goals]),
         "ratios": [
             {
-                "contest": race.contest.key,
+                "problem": race.key,
                 "peer": family,
                 "energy": energy,
                 "position": position,
-                **_ratio(standings.at(race, family, energy, position)),
+                **goals.ratio_data(race.at(family, energy, position)),
             }
             for race in races
-            for family in standings.present(race)
-            if family != tables.OURS
+            for family in race.families
+            if family != OURS
             for energy, position in [
-                tables.asked(race),
-                *((level, level * standings.POSITION_OVER_ENERGY) for level in standings.LEVELS),
+                race.asked,
+                *((level, level * tables.POSITION_OVER_ENERGY) for level in tables.LEVELS),
             ]
         ],
-        "races": [msgspec.to_builtins(race) for race in races],
+        "races": [
+            {"problem": race.key, **run_as_json(race.run.index, race.records), "goals": []} for race in races
+        ],
     }
 
 
-def _ratio(found: standings.Comparison) -> dict[str, Any]:
-    ratio = found.ratio
-    return {
-        "ratio": ratio.median if ratio else None,
-        "low": ratio.low if ratio else None,
-        "high": ratio.high if ratio else None,
-        "ours": found.ours.setting.method if found.ours else None,
-        "ours_seconds": found.ours.median if found.ours else None,
-        "theirs": found.theirs.setting.method if found.theirs else None,
-        "theirs_seconds": found.theirs.median if found.theirs else None,
-    }
+def _probe(campaign: Campaign, directory: Path) -> None:
+    """Measure compile times, and keep them beside those of problems that were not run this time."""
+    path = directory / PROBES
+    fresh: list[Probe] = []
+    for entry in campaign.entries():
+        part = chosen(campaign, [name_of(entry)])
+        cases = part.cases()
+        families = list(dict.fromkeys(_family(case) for case in cases))
+        ours = next(case for case in cases if _family(case) == OURS)
+        h = float(parse_spec(ours.method).arguments["h"])
+        fresh += probe(name_of(entry), ours.problem, h, families)
+    names = {one.problem for one in fresh}
+    old = load_probes(path) if path.is_file() else []
+    write_json(path, [*(one for one in old if one.problem not in names), *fresh])
 
 
-def _run(request: Request, environment: Mapping[str, str]) -> list[str]:
-    """Run the contests, each in a process of its own (all in one with ``--quick``); return what failed."""
-    keys = request.contests
-    failed: list[str] = []
-    for group in [keys] if request.quick else [[key] for key in keys]:
-        asked = msgspec.structs.replace(request, contests=group)
-        kept = f"the problems that had ended are kept in {request.out}"
-        if measuring.measure("hbvm_bench.studies.race.child", asked, environment, kept) != 0:
-            failed += group
-    return failed
+def _family(case: Case) -> str:
+    name = parse_spec(case.method).name
+    return name if name in FAMILIES else OURS
 
 
-def _declare(contests: Sequence[Contest], quick: bool, *, error: bool) -> None:
+def _declare(campaign: Campaign, *, error: bool) -> None:
     console = terminal.console(stderr=error)
     console.print("Settings, declared before the run:")
-    for contest in contests:
-        console.print(Text(f"{contest.key}: {contest.problem}", style="bold"))
-        chosen_settings = settings(contest.key, quick=quick)
-        for family in dict.fromkeys(setting.family for setting in chosen_settings):
-            methods = [setting.method for setting in chosen_settings if setting.family == family]
+    for entry in campaign.entries():
+        cases = chosen(campaign, [name_of(entry)]).cases()
+        console.print(Text(f"{name_of(entry)}: {cases[0].problem}", style="bold"))
+        for family in dict.fromkeys(map(_family, cases)):
+            methods = [resolve(case).case.method for case in cases if _family(case) == family]
             console.print(Text(f"  {FAMILIES[family].title}, {len(methods)}: {'  '.join(methods)}"))
 
 

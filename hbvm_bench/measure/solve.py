@@ -52,16 +52,16 @@ def solve_with_bare_end(
     problem, method, program, times
         As of `solve`; the last time is the problem's end.
     """
-    sampled = solve(problem, method, program, times[:-1])
+    sampled = solve(problem, method, program, times)
     if sampled.status is not Status.FINISHED:
         return sampled
     _, end = Run.of(problem, method, program).seconds()
-    finished = end.status is Status.FINISHED
+    before = sampled.t[:-1]
     return replace(
         sampled,
-        t=np.append(sampled.t, end.t),
-        y=np.vstack([sampled.y, end.y]),
+        t=np.append(before, end.t),
+        y=np.vstack([sampled.y[:-1], end.y]),
         status=end.status,
         reason=end.reason,
-        t_stop=problem.t_end if finished else sampled.t_stop,
+        t_stop=sampled.t_stop if end.status is Status.FINISHED else float(before[-1]),
     )

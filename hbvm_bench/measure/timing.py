@@ -175,11 +175,6 @@ class Spread:
         return cls(median(samples), low, high)
 
 
-def ratios(seconds: Sequence[float | None], base: Sequence[float | None]) -> list[float]:
-    """Return ``seconds`` over ``base`` within each interleaved round that has both."""
-    return [a / b for a, b in zip(seconds, base, strict=True) if a is not None and b is not None]
-
-
 def repeats_for(seconds: float, shortest: float) -> int:
     """Return how many runs of ``seconds`` make a sample that lasts ``shortest``, with a reserve."""
     return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1

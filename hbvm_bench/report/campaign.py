@@ -33,7 +33,7 @@ from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store.files import csv_of, json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, again, damage, progress
-from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries import fairness, goals
 from hbvm_bench.summaries.rows import columns, group_of, status_of, tasks
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
@@ -133,7 +133,8 @@ def document(stores: Store | Sequence[Store]) -> Document:
     problems.errors.InputError
         See `gather`.
     """
-    gathered = gather([stores] if isinstance(stores, Store) else stores)
+    stores = [stores] if isinstance(stores, Store) else stores
+    gathered = gather(stores)
     runs, records = gathered.runs, gathered.records
     series = {record.id: (record, series) for record, series in gathered.found}
     look = looks(record.case.method for record in records)
@@ -160,6 +161,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
         title,
         [runs[0].description] if one else [],
         [
+            *attempt(("the goals", partial(_goals, stores, records))),
             *(overall if len(parts) > 1 else []),
             _results(parts, runs, records),
             *(overall if len(parts) == 1 else []),
@@ -177,6 +179,12 @@ def document(stores: Store | Sequence[Store]) -> Document:
         list(look.values()),
         name="report.md",
     )
+
+
+def _goals(stores: Sequence[Store], records: Sequence[Record]) -> Table | None:
+    """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
+    found = [one for store in stores for one in goals.verdicts(store.index().campaign, records)]
+    return goals.table(found) if found else None
 
 
 def _read(record: Record, store: Store) -> tuple[Record, Series]:

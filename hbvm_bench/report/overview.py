@@ -14,7 +14,7 @@ from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, UNKNOWN_MARKER
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import laws, needs, outcomes
 from hbvm_bench.summaries.points import work_of
-from hbvm_bench.summaries.profiles import GOALS, Profile, profile
+from hbvm_bench.summaries.profiles import ACCURACIES, Profile, profile
 from hbvm_bench.summaries.table import Table
 
 FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
@@ -94,7 +94,7 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
         By family, the number of its first case: its colour in the page.
     """
     work = work_of(records)
-    found = [profile(records, goal, work) for goal in GOALS]
+    found = [profile(records, accuracy, work) for accuracy in ACCURACIES]
     found = [one for one in found if len(one.problems) >= FEWEST_PROBLEMS]
     if not found:
         return None
@@ -132,14 +132,19 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
         log_axis(axes, "x", 0, round(np.log10(end)))
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.set_title(one.goal.words, color=INK, fontsize=8)
+        axes.set_title(one.accuracy.words, color=INK, fontsize=8)
         axes.set_xlabel("factor behind the fastest")
         panels.append(
-            Panel(one.goal.words, Axis("factor behind the best", log=True), Axis("share of problems"), traces)
+            Panel(
+                one.accuracy.words,
+                Axis("factor behind the best", log=True),
+                Axis("share of problems"),
+                traces,
+            )
         )
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
-        f"{one.goal.words}, {len(one.problems)} problems: "
+        f"{one.accuracy.words}, {len(one.problems)} problems: "
         + ", ".join(
             f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
         )

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from hbvm_bench.store.files import write_json
+from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import SCHEMA, Record, decoded
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -47,8 +47,8 @@ class Kept(msgspec.Struct, frozen=True, kw_only=True):
         return self.index.command
 
 
-def of(store: Store, name: str) -> Kept:
-    """Return the run of a campaign in a store.
+def of(store: Store, name: str, records: list[Record]) -> Kept:
+    """Return the run of a campaign in a store, with records of it as `hbvm_bench.measure.reading` reads them.
 
     Raises
     ------
@@ -58,7 +58,6 @@ def of(store: Store, name: str) -> Kept:
     index = store.index()
     if index.campaign.name != name:
         raise InputError(f"{str(store.directory)!r} has results of {index.campaign.name!r}, not of {name}.")
-    records = store.records()
     if not records:
         raise InputError(
             f"the run in {str(store.directory)!r} has no finished case yet; run: {index.command}."
@@ -66,9 +65,24 @@ def of(store: Store, name: str) -> Kept:
     return Kept(index=index, records=records)
 
 
-def save(kept: list[Kept], path: Path) -> None:
-    """Write runs into one file, all of them or nothing."""
-    write_json(path, kept)
+def keep(run: Kept, path: Path, name: str) -> None:
+    """Write a run into one file, beside the problems in it that were not run this time.
+
+    Those keep the machine, the versions, the command and the date that they were measured with.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the directory cannot be written, or what lies there is something else.
+    """
+    ensure_writable(path.parent)
+    again = {one.case.problem for one in run.records}
+    old = [
+        msgspec.structs.replace(one, records=[kept for kept in one.records if kept.case.problem not in again])
+        for one in (load(path, name) if path.is_file() else [])
+    ]
+    with atomic(path) as temporary:  # in one line: a race has a thousand records
+        temporary.write_bytes(msgspec.json.encode([*(one for one in old if one.records), run]))
 
 
 def load(path: Path, name: str) -> list[Kept]:

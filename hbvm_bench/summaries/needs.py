@@ -1,7 +1,7 @@
 """Which integrator for which need: the answers of a run, in rows of text.
 
-A need is a goal and a number to be small. On every problem the settings that reach the
-goal are compared, and each family stands for its best; families are then ordered by on
+A need is an accuracy and a number to be small. On every problem the settings that reach the
+accuracy are compared, and each family stands for its best; families are then ordered by on
 how many problems they come near the best, and among equals by how far they are from it
 in the median.
 """
@@ -14,7 +14,7 @@ from statistics import median
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number, problems_of, work_of
-from hbvm_bench.summaries.profiles import Goal, reaches
+from hbvm_bench.summaries.profiles import Accuracy, reaches
 from hbvm_bench.summaries.rows import group_of
 
 SHOWN = 3
@@ -106,8 +106,8 @@ def answers(records: Sequence[Record]) -> list[Answer]:
 def needs_of(records: Sequence[Record]) -> list[Need]:
     """Return the needs, with the measure of work that the run has."""
     work = work_of(records)
-    right, accurate, there = _reaching(Goal(1e-4)), _reaching(Goal(1e-8)), _reaching(Goal(1.0))
-    exact = _reaching(Goal(1e-8, 1e-13))
+    right, accurate, there = _reaching(Accuracy(1e-4)), _reaching(Accuracy(1e-8)), _reaching(Accuracy(1.0))
+    exact = _reaching(Accuracy(1e-8, 1e-13))
     timed = work == "warm_seconds"
     cheaply = "in little time" if timed else "with few evaluations (a method that counts none takes no part)"
     wanted = [
@@ -130,8 +130,8 @@ def needs_of(records: Sequence[Record]) -> list[Need]:
     )
 
 
-def _reaching(goal: Goal) -> Callable[[Record], bool]:
-    return lambda record: reaches(record, goal)
+def _reaching(accuracy: Accuracy) -> Callable[[Record], bool]:
+    return lambda record: reaches(record, accuracy)
 
 
 def _on(record: Record) -> bool:

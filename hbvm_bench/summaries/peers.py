@@ -12,7 +12,7 @@ import msgspec
 
 from hbvm_bench.campaign.identity import digest_of, make_method
 from hbvm_bench.measure import machine
-from hbvm_bench.measure.timing import Spread, ratios
+from hbvm_bench.measure.timing import Spread
 from hbvm_bench.summaries.rows import seconds as in_words
 from hbvm_bench.summaries.table import Table
 
@@ -58,7 +58,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def ratio(self) -> Spread:
         """Harness over library within each round."""
-        return Spread.of(ratios(self.seconds, self.alone))
+        return Spread.of([a / b for a, b in zip(self.seconds, self.alone, strict=True)])
 
     @property
     def beyond(self) -> bool:

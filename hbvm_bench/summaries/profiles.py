@@ -1,7 +1,7 @@
 """Performance profiles: how often a family is within a factor of the best, over all problems.
 
 For each problem the cost of a family is the least work of those of its settings that
-reach a goal in position and energy. The profile of a family at tau is the share of the
+reach an accuracy in position and energy. The profile of a family at tau is the share of the
 problems on which its cost is at most tau times the least cost of all families.
 
 E. D. Dolan, J. J. More, "Benchmarking optimization software with performance profiles",
@@ -18,7 +18,7 @@ from hbvm_bench.summaries.rows import group_of
 
 
 @dataclass(frozen=True)
-class Goal:
+class Accuracy:
     """What a setting must reach to count as a solution.
 
     Attributes
@@ -34,22 +34,22 @@ class Goal:
 
     @property
     def words(self) -> str:
-        """The goal in words."""
+        """The accuracy in words."""
         text = f"position to {self.position:g}"
         return text if math.isinf(self.energy) else f"{text}, energy to {self.energy:g}"
 
 
-GOALS = (Goal(1e-4), Goal(1e-8), Goal(1e-8, 1e-13))
+ACCURACIES = (Accuracy(1e-4), Accuracy(1e-8), Accuracy(1e-8, 1e-13))
 """Loose, accurate, and accurate with the energy at round-off."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The profiles of all families for one goal.
+    """The profiles of all families for one accuracy.
 
     Attributes
     ----------
-    goal : Goal
+    accuracy : Accuracy
         What was asked.
     work : str
         Key of the metric of cost.
@@ -61,10 +61,10 @@ class Profile:
         By problem: the family with the least work, and its case.
     ratios : dict of list of float
         By family: its work over the least, problem by problem; infinite where it does not
-        reach the goal.
+        reach the accuracy.
     """
 
-    goal: Goal
+    accuracy: Accuracy
     work: str
     problems: list[str]
     unsolved: list[str]
@@ -82,7 +82,7 @@ class Profile:
         return taus, [self.share(family, tau) for tau in taus]
 
     def solved(self, family: str) -> int:
-        """Return on how many problems a family reaches the goal."""
+        """Return on how many problems a family reaches the accuracy."""
         return sum(math.isfinite(ratio) for ratio in self.ratios[family])
 
     def wins(self, family: str) -> int:
@@ -90,24 +90,24 @@ class Profile:
         return sum(winner == family for winner, _ in self.best.values())
 
 
-def reaches(record: Record, goal: Goal) -> bool:
-    """Whether a case reaches a goal."""
+def reaches(record: Record, accuracy: Accuracy) -> bool:
+    """Whether a case is as accurate."""
     if group_of(record) != "on" or record.case.ensemble:
         return False
     position, energy = number(record, "position_end"), number(record, "energy_max")
-    if position is None or position > goal.position:
+    if position is None or position > accuracy.position:
         return False
-    return math.isinf(goal.energy) or (energy is not None and energy <= goal.energy)
+    return math.isinf(accuracy.energy) or (energy is not None and energy <= accuracy.energy)
 
 
-def profile(records: Sequence[Record], goal: Goal, work: str) -> Profile:
-    """Return the profiles of all families for a goal.
+def profile(records: Sequence[Record], accuracy: Accuracy, work: str) -> Profile:
+    """Return the profiles of all families for an accuracy.
 
     Parameters
     ----------
     records : sequence of Record
         Of a run.
-    goal : Goal
+    accuracy : Accuracy
         What a setting must reach.
     work : str
         Key of the metric of cost; a family without it (a Taylor method has no count of
@@ -126,7 +126,7 @@ def profile(records: Sequence[Record], goal: Goal, work: str) -> Profile:
         cheapest: dict[str, tuple[float, Record]] = {}
         for record in here:
             cost = number(record, work)
-            if not cost or not reaches(record, goal):
+            if not cost or not reaches(record, accuracy):
                 continue
             family = family_of(record)
             if family not in cheapest or cost < cheapest[family][0]:
@@ -140,4 +140,4 @@ def profile(records: Sequence[Record], goal: Goal, work: str) -> Profile:
         best[problem] = (winner, cheapest[winner][1])
         for family in families:
             ratios[family].append(cheapest[family][0] / least if family in cheapest else math.inf)
-    return Profile(goal, work, solved, unsolved, best, ratios)
+    return Profile(accuracy, work, solved, unsolved, best, ratios)

@@ -93,8 +93,15 @@ def by_round(record: Record) -> dict[int, float]:
 
 
 def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Comparison:
-    """Compare a peer at its defaults with the fastest of ours that is as accurate, in these errors."""
-    defaults = [one for one in among(records, family) if one.case.settings == "default"]
+    """Compare a peer at its defaults with the fastest of ours that is as accurate, in these errors.
+
+    Its defaults are what is called so, or has no arguments.
+    """
+    defaults = [
+        one
+        for one in among(records, family)
+        if one.case.settings == "default" or not parse_spec(one.case.method).arguments
+    ]
     theirs = best(defaults, dict.fromkeys(errors, math.inf))
     if theirs is None:
         return Comparison(None, None)

@@ -13,9 +13,9 @@ from hbvm_bench.store.store import Store
 from hbvm_bench.studies.automatic import report
 from hbvm_bench.studies.automatic import runs as automatic
 from hbvm_bench.studies.race import results
-from hbvm_bench.studies.race.contests import CONTESTS
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
+from tests.hbvm_bench.studies.race.conftest import save
 from tests.hbvm_bench.studies.test_automatic import made as a_duel
 from tests.hbvm_bench.studies.test_endure import made as an_endurance
 
@@ -76,8 +76,8 @@ def stored_results(directory):
         "machine": {"processor": HOSTILE, "llvm_processor": HOSTILE},
         "versions": {HOSTILE: HOSTILE},
     }
-    said |= {"command": f"{HOSTILE}\n```\n{HOSTILE}", "started": HOSTILE}
-    results.save(msgspec.structs.replace(a_race(), **said), directory / "race")
+    said["command"] = f"{HOSTILE}\n```\n{HOSTILE}"
+    save(a_race(**said), directory / "race")
     an_endurance(directory / "endure", years=1e4, starts=3)
     store = Store(directory / "endure")
     for record in store.records():
@@ -88,7 +88,7 @@ def stored_results(directory):
     records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
     index = msgspec.structs.replace(run.index, command=said["command"])
     (directory / "automatic").mkdir()
-    kept.save([kept.Kept(index=index, records=records)], directory / "automatic" / "one.json")
+    kept.keep(kept.Kept(index=index, records=records), directory / "automatic" / "one.json", "automatic")
 
 
 @pytest.mark.parametrize(
@@ -122,13 +122,13 @@ def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
     assert not any(re.search(r"(?<!\\)<script", line) for line in page.splitlines())
 
 
-def test_a_race_whose_contest_is_not_its_file_is_refused(tmp_path):
-    """Its key names the files of the report."""
-    contest = msgspec.structs.replace(a_race().contest, key="../../elsewhere")
-    path = tmp_path / "outer_solar_system.json"
-    path.write_bytes(msgspec.json.encode(msgspec.structs.replace(a_race(), contest=contest)))
-    with pytest.raises(InputError, match="result of another contest"):
-        results.load(tmp_path, list(CONTESTS))
+def test_a_race_whose_problem_is_no_file_name_is_refused(tmp_path):
+    """It names the files of the report."""
+    save(a_race(), tmp_path)
+    path = tmp_path / "race.json"
+    path.write_bytes(path.read_bytes().replace(b'"outer_solar_system"', b'"../../elsewhere"'))
+    with pytest.raises(InputError, match="must be a file name"):
+        results.load(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"\xff", b'"\xff"', b"[" * 100_000])
@@ -136,7 +136,7 @@ def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
     for name in ("kepler.json", "campaign.json", "one.json"):
         (tmp_path / name).write_bytes(content)
     for read in (
-        lambda: results.load(tmp_path, list(CONTESTS)),
+        lambda: results.load(tmp_path),
         lambda: Store(tmp_path).index(),
         lambda: kept.load(tmp_path / "one.json", "automatic"),
     ):

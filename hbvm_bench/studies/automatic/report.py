@@ -49,7 +49,7 @@ def _run(run: Kept) -> list[Block]:
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     return [
         Note(machine.sentence(run.machine)),
-        *attempt(("errors and times", lambda: sides(duels(run)))),
+        *attempt(("errors and times", partial(sides, duels(run)))),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
     ]
 

@@ -17,7 +17,6 @@ from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store import kept
-from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
@@ -97,14 +96,7 @@ def keep(run: Kept, directory: Path) -> None:
     problems.errors.InputError
         If the directory cannot be written, or what lies there is no result.
     """
-    ensure_writable(directory)
-    path = directory / f"{machine.kind(run.machine)}.json"
-    again = {one.case.problem for one in run.records}
-    old = [
-        replace(one, records=[record for record in one.records if record.case.problem not in again])
-        for one in (kept.load(path, NAME) if path.is_file() else [])
-    ]
-    kept.save([*(one for one in old if one.records), run], path)
+    kept.keep(run, directory / f"{machine.kind(run.machine)}.json", NAME)
 
 
 def by_kind(directory: Path) -> dict[str, list[Kept]]:

@@ -14,6 +14,7 @@ from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance
+from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -89,16 +90,8 @@ def tables(result: Endurance) -> list[Table]:
             words=(0, 2 + len(heads)),
         )
     ]
-    asked = goals(result)
-    if asked:
-        made.append(
-            Table(
-                "Goals declared before the run",
-                ("goal", "measured", "verdict"),
-                [(goal.words, goal.measured, "reached" if goal.reached else "missed") for goal in asked],
-                words=(0, 1, 2),
-            )
-        )
+    if asked := goals(result):
+        made.append(goals_table(asked))
     return made
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.starts import PERTURBATION
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
@@ -92,7 +93,7 @@ def read(directory: Path) -> Endurance:
         If there is none, or another campaign's.
     """
     store = Store(directory)
-    run = kept.of(store, NAME)
+    run = kept.of(store, NAME, reading.records(store))
     series = {one.case.method: store.series(one.id) for one in run.records}
     times = [one["drift.t"] for one in series.values() if "drift.t" in one]
     return Endurance(

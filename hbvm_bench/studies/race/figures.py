@@ -7,14 +7,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
-from hbvm_bench.studies.race import standings
-from hbvm_bench.studies.race.results import Outcome, Race
-from hbvm_bench.studies.race.settings import FAMILIES, OURS
-from hbvm_bench.studies.race.tables import asked, power
+from hbvm_bench.store.records import Record
+from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.results import ENERGY, OURS, POSITION, Race, counts
+from hbvm_bench.studies.race.tables import power
+from hbvm_bench.summaries.points import family_of, number
+from hbvm_bench.summaries.standings import TIME, among
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
@@ -31,34 +32,34 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     look : mapping of str to Look
         By a method's name.
     """
-    shown = [outcome for outcome in race.outcomes if outcome.counts]
+    shown = [record for record in race.records if counts(record)]
     if not shown:
         return None
     figure = new(10.4, 4.6)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
-    times = [outcome.median or 1.0 for outcome in shown]
+    times = [_seconds(record) for record in shown]
     low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
-    levels = asked(race)
+    levels = race.asked
     panels: list[Panel] = []
     figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
     for axes, title, level, key in (
-        (left, "energy error", levels[0], "energy"),
-        (right, "position error at the end", levels[1], "position"),
+        (left, "energy error", levels[0], ENERGY),
+        (right, "position error at the end", levels[1], POSITION),
     ):
         log_axis(axes, "x", low, max(high, low + 1))
-        worst = max(_height(outcome, key) for outcome in shown)
+        worst = max(_height(record, key) for record in shown)
         log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
         axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-        for family in standings.present(race):
-            _draw(axes, [o for o in shown if o.setting.family == family], key, look)
+        for family in race.families:
+            _draw(axes, among(shown, family), key, look)
         axes.set(xlabel="seconds for the whole span (median)", title=f"{title}, relative")
         panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
-    _legend(side, [f for f in standings.present(race) if any(o.setting.family == f for o in shown)], look)
+    _legend(side, [f for f in race.families if among(shown, f)], look)
     energy, position = (power(level) for level in levels)
     return picture(
         figure,
-        f"work-precision-{race.contest.key}",
-        f"Work and precision: {race.contest.title}",
+        f"work-precision-{race.key}",
+        f"Work and precision: {race.title}",
         "Every setting is a mark, lower left is better. Lines join the settings of a family that none of its "
         f"others beats in both time and this error. Dashed: what is asked for, {energy} and {position}. Only "
         "settings on the trajectory that was asked for are drawn.",
@@ -68,21 +69,21 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
 
 
 def _panel(
-    race: Race, shown: Sequence[Outcome], title: str, level: float, key: str, look: Mapping[str, Look]
+    race: Race, shown: Sequence[Record], title: str, level: float, key: str, look: Mapping[str, Look]
 ) -> Panel:
     traces = []
-    for outcome in shown:
-        text = outcome.setting.method
-        spot = np.array([outcome.median or 0.0]), np.array([getattr(outcome, key)])
-        traces.append(Trace(look[parse_spec(text).name].number, text, *spot))
-    for family in standings.present(race):
-        line = front([o for o in shown if o.setting.family == family], key)
+    for record in shown:
+        text = record.case.method
+        spot = np.array([_seconds(record)]), np.array([_error(record, key)])
+        traces.append(Trace(look[family_of(record)].number, text, *spot))
+    for family in race.families:
+        line = front(among(shown, family), key)
         if len(line) > 1:
-            x, y = np.array([(o.median or 0.0, _height(o, key)) for o in line]).T
-            number = look[parse_spec(line[0].setting.method).name].number
+            x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
+            number = look[family_of(line[0])].number
             note = "none of the family's settings is better in both"
             traces.append(Trace(number, f"best of {FAMILIES[family].title}", x, y, "law", note))
-    times = [outcome.median or 1.0 for outcome in shown]
+    times = [_seconds(record) for record in shown]
     asked_for = np.array([min(times), max(times)]), np.array([level, level])
     traces.append(Trace(0, "what is asked for", *asked_for, "law"))
     return Panel(
@@ -93,37 +94,45 @@ def _panel(
     )
 
 
-def front(outcomes: Sequence[Outcome], key: str) -> list[Outcome]:
+def front(records: Sequence[Record], key: str) -> list[Record]:
     """Return the settings that none other beats in both time and error, by ascending time."""
-    best: list[Outcome] = []
+    best: list[Record] = []
     least = math.inf
-    for outcome in sorted(outcomes, key=lambda o: (o.median or 0.0, getattr(o, key))):
-        if getattr(outcome, key) < least:
-            best.append(outcome)
-            least = getattr(outcome, key)
+    for record in sorted(records, key=lambda o: (_seconds(o), _error(o, key))):
+        if _error(record, key) < least:
+            best.append(record)
+            least = _error(record, key)
     return best
 
 
-def _draw(axes: Axes, outcomes: Sequence[Outcome], key: str, look: Mapping[str, Look]) -> None:
-    if not outcomes:
+def _draw(axes: Axes, records: Sequence[Record], key: str, look: Mapping[str, Look]) -> None:
+    if not records:
         return
-    line = front(outcomes, key)
-    lead = look[parse_spec(outcomes[0].setting.method).name].light
-    axes.plot([o.median or 0.0 for o in line], [_height(o, key) for o in line], color=lead, linewidth=1.1)
-    for outcome in outcomes:
-        own = look[parse_spec(outcome.setting.method).name]
+    line = front(records, key)
+    lead = look[family_of(records[0])].light
+    axes.plot([_seconds(o) for o in line], [_height(o, key) for o in line], color=lead, linewidth=1.1)
+    for record in records:
+        own = look[family_of(record)]
         axes.plot(
-            [outcome.median or 0.0],
-            [_height(outcome, key)],
+            [_seconds(record)],
+            [_height(record, key)],
             own.marker,
             color=own.light,
-            markersize=5.0 if outcome in line else 3.6,
+            markersize=5.0 if record in line else 3.6,
             clip_on=False,
         )
 
 
-def _height(outcome: Outcome, key: str) -> float:
-    return min(max(getattr(outcome, key), 10.0**FLOOR), 10.0**TOP)
+def _height(record: Record, key: str) -> float:
+    return min(max(_error(record, key), 10.0**FLOOR), 10.0**TOP)
+
+
+def _seconds(record: Record) -> float:
+    return number(record, TIME) or 1.0
+
+
+def _error(record: Record, key: str) -> float:
+    return number(record, key) or 0.0
 
 
 def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> None:
@@ -140,13 +149,13 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
 
 
 def _summary(race: Race) -> str:
-    energy, position = asked(race)
+    energy, position = race.asked
     said = []
-    for family in standings.present(race):
-        found = standings.best(race, family, energy, position)
+    for family in race.families:
+        found = race.best(family, energy, position)
         said.append(
             f"{FAMILIES[family].title} does not reach it"
             if found is None
-            else f"{FAMILIES[family].title} takes {found.median:.3g} s"
+            else f"{FAMILIES[family].title} takes {_seconds(found):.3g} s"
         )
     return f"With an energy error of {energy:.0e} and a position error of {position:.0e}: {'; '.join(said)}."

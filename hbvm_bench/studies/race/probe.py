@@ -15,21 +15,54 @@ from pathlib import Path
 import msgspec
 
 from hbvm_bench.run.worker import ENVIRONMENT
-from hbvm_bench.studies.race.results import Contest, Probe
-from hbvm_bench.studies.race.settings import OURS
+from hbvm_bench.store.records import decoded
+from problems.errors import InputError
 
+PROBES = "compile_times.json"
+OURS = ""
 TIMES = 3
 SLOW = 5.0  # seconds; what takes longer is measured once
 LIMIT = 180.0  # seconds
 SHARE = 1e-3
-OTHER = "pendulum(t_end=1.0)"  # fills the kernel's cache without the contest's vector field
+OTHER = "pendulum(t_end=1.0)"  # fills the kernel's cache without the problem's vector field
 
 METHODS: dict[str, Sequence[str]] = {
     OURS: ("Gauss(s=8, h={h})",),
-    "heyoka": ("Taylor(tol=1e-14)", "Taylor(tol=1e-14, compact_mode=True)"),
-    "ias15": ("IAS15(epsilon=1e-05, mode='global')",),
-    "dop853": ("DOP853(rtol=1e-12, atol=1e-12)",),
+    "Taylor": ("Taylor(tol=1e-14)", "Taylor(tol=1e-14, compact_mode=True)"),
+    "IAS15": ("IAS15(epsilon=1e-05, mode='global')",),
+    "DOP853": ("DOP853(rtol=1e-12, atol=1e-12)",),
 }
+
+
+class Probe(msgspec.Struct, frozen=True, kw_only=True):
+    """What a fresh process pays before its first result.
+
+    Attributes
+    ----------
+    problem : str
+        The name of the problem in the race.
+    family, method : str
+        Of the setting that was compiled.
+    caches : {"empty", "kernel", "full"}
+        What was on disk before: nothing; our kernel but not this problem; everything.
+    compile_seconds : list of float
+        The method's own ``compile``.
+    process_seconds : list of float
+        From the start of Python to the first integrated state, imports included.
+    from_cache : bool or None
+        What the method says of the compilation.
+    reason : str
+        Why there are no seconds.
+    """
+
+    problem: str
+    family: str
+    method: str
+    caches: str
+    compile_seconds: list[float] = []
+    process_seconds: list[float] = []
+    from_cache: bool | None = None
+    reason: str = ""
 
 
 class Answer(msgspec.Struct, frozen=True):
@@ -40,27 +73,41 @@ class Answer(msgspec.Struct, frozen=True):
     refused: str = ""
 
 
-def probe(contest: Contest, h: float, families: Sequence[str]) -> list[Probe]:
-    """Measure the compile times of a contest.
+def load_probes(path: Path) -> list[Probe]:
+    """Read the compile times that were measured.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the file is something else.
+    """
+    try:
+        return decoded(path.read_bytes(), list[Probe])
+    except (OSError, msgspec.MsgspecError, ValueError) as error:
+        raise InputError(f"{str(path)!r} is not the result of a race: {error}.") from None
+
+
+def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Probe]:
+    """Measure the compile times of a problem.
 
     Parameters
     ----------
-    contest : Contest
-        The problem.
+    name, problem : str
+        What the race calls it, and as it prints.
     h : float
         A step for our method.
     families : sequence of str
         Which families; those that compile nothing are left out.
     """
-    made: list[Probe] = []
-    for family in families:
-        for template in METHODS.get(family, ()):
-            method = template.format(h=h)
-            made += _probes(contest.problem, family, method)
-    return made
+    return [
+        made
+        for family in families
+        for template in METHODS.get(family, ())
+        for made in _probes(name, problem, family, template.format(h=h))
+    ]
 
 
-def _probes(problem: str, family: str, method: str) -> list[Probe]:
+def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
     empty: list[tuple[float, Answer]] = []
     kernel: list[tuple[float, Answer]] = []
     full: list[tuple[float, Answer]] = []
@@ -77,9 +124,10 @@ def _probes(problem: str, family: str, method: str) -> list[Probe]:
                 break
     except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
         reason = f"the process that compiles {method} failed: {type(error).__name__}"
-        return [Probe(family=family, method=method, caches="empty", reason=reason)]
+        return [Probe(problem=name, family=family, method=method, caches="empty", reason=reason)]
     return [
         Probe(
+            problem=name,
             family=family,
             method=method,
             caches=caches,

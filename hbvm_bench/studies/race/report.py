@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.campaign.file import name_of
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Details, Document, Files, Items, Maker, Note, Section, attempt
@@ -11,20 +11,18 @@ from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.race import tables
-from hbvm_bench.studies.race.accuracy import SAMPLES
-from hbvm_bench.studies.race.contests import CONTESTS
+from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
-from hbvm_bench.studies.race.results import SCHEMA, Race
-from hbvm_bench.studies.race.rounds import SHORTEST
-from hbvm_bench.studies.race.settings import FAMILIES
-from hbvm_bench.studies.race.standings import calibrated, present
+from hbvm_bench.studies.race.results import Race, calibrated, declared
+from hbvm_bench.summaries.points import family_of
 
+DECLARED = declared()
 BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful
 
 RULES_TEXT = f"""
-Every family has the same number of settings on every problem, declared in hbvm_bench/studies/race/settings.py
-before the run. The fastest setting that is accurate enough is picked afterwards, by the same rule for
-every family.
+Every family has the same number of settings on every problem, declared before the run in
+hbvm_bench/campaign/shipped/race.toml. The fastest setting that is accurate enough is picked afterwards, by
+the same rule for every family.
 
 Energy is never ranked without position: a setting counts only if both errors are small enough. A run
 that leaves the trajectory which a symmetry prescribes is void.
@@ -36,11 +34,11 @@ One process, one thread, one core. All settings of a problem are timed in interl
 in an order shuffled anew, with garbage collection off; all samples are kept. Timed is the call that
 integrates from the start to the end time and returns the end state, without output; compiling and
 setting up are not in it. A sample is as many such runs one after the other as last
-{SHORTEST * 1e3:.0f} ms. The overhead of one call is in the tables.
+{DECLARED.timing.shortest * 1e3:.0f} ms. The overhead of one call is in the tables.
 
-The energy error is the largest at some {SAMPLES} times, one in each equal part of the span and at no
-common phase, at the methods' own steps where the step is fixed, else by the means that cost the method
-nothing; it is evaluated in double-double arithmetic.
+The energy error is the largest at some {DECLARED.grid.count} times, one in each equal part of the span
+and at no common phase, at the methods' own steps where the step is fixed, else by the means that cost
+the method nothing; it is evaluated in double-double arithmetic.
 
 The position error is that of the end state of the very run that is timed. {POSITION}
 
@@ -60,7 +58,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
     others : mapping of str to sequence of Race, optional
         All that was measured, by the kind of processor.
     """
-    look = looks(parse_spec(o.setting.method).name for race in races for o in race.outcomes)
+    look = looks(family_of(one) for race in races for one in race.records)
     in_order = sorted(races, key=lambda race: race.started)
     last = in_order[-1]
     top: list[Maker] = [
@@ -69,9 +67,6 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
     ]
     if others is not None and len(others) > 1:
         top.insert(1, ("the kinds of processor", partial(tables.kinds, others)))
-    stored: dict[str, bytes | None] = {f"{race.contest.key}.json": None for race in races}
-    # older results were timed in another way than the one that was checked
-    comparable = all(race.schema == SCHEMA for race in races)
     return Document(
         "The race: who is how fast at which accuracy",
         [
@@ -86,7 +81,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
                 "The rules",
                 [
                     Items(RULES, "numbered"),
-                    *(attempt(PEERS) if comparable else []),
+                    *attempt(PEERS),
                     "What machine code runs:",
                     Items([f"{family.title}: {family.code}" for family in FAMILIES.values()]),
                 ],
@@ -97,7 +92,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
                 "Raw data",
                 [
                     *attempt(("the settings as a file", partial(settings_csv, races))),
-                    Files("With all timing samples", stored),
+                    Files("With all timing samples", {race.file: None for race in races}),
                 ],
                 "data-files",
                 nav="Data",
@@ -107,7 +102,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
                 commands(in_order),
                 ", ".join(sorted({race.started[:10] for race in races})),
                 last.machine,
-                last.versions,
+                last.run.versions,
             ),
         ],
         list(look.values()),
@@ -117,7 +112,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
 
 def section(race: Race, look: Mapping[str, Look]) -> Section:
     """Return what the report says about one contest."""
-    title = race.contest.title
+    title = race.title
     shown = (tables.fastest, tables.levels, tables.defaults, tables.compiling)
     return Section(
         title,
@@ -129,26 +124,23 @@ def section(race: Race, look: Mapping[str, Look]) -> Section:
                 *((f"{title}: {table.__name__}", partial(table, race)) for table in shown),
             ),
             Details(
-                f"All {len(race.outcomes)} settings",
+                f"All {len(race.records)} settings",
                 attempt((f"all settings of {title}", partial(tables.everything, race))),
             ),
         ],
-        race.contest.key,
-        code=race.contest.problem,
+        race.key,
+        code=race.records[0].case.problem,
         nav=title.split(",")[0],
     )
 
 
 def remarks(race: Race) -> list[str]:
     """Return what a reader must know about how a contest was run."""
-    said = [race.contest.note] if race.contest.note else []
-    per_family = {
-        f: sum(o.setting.family == f for o in race.outcomes if o.status != "refused") for f in present(race)
-    }
+    said = [race.entry.note] if race.entry.note else []
+    per_family = {f: sum(one.result.outcome != "refused" for one in race.of(f)) for f in race.families}
     absent = [FAMILIES[f].title for f, n in per_family.items() if not n]
     if absent:
         said.append(f"Does not apply: {', '.join(absent)}.")
-    said += earlier_definition(race)
     if race.quick:
         said.append("This is the quick run: a tenth of the span and few settings; its ratios mean little.")
     calibration = calibrated(race)
@@ -167,30 +159,20 @@ def remarks(race: Race) -> list[str]:
     return said
 
 
-def earlier_definition(race: Race) -> list[str]:
-    """Return what to know of a race's position errors where the definition has changed since."""
-    if race.schema == SCHEMA:
-        return []
-    return [
-        "The position errors are of an earlier definition: in the 2-norm over all bodies, relative to "
-        "that of the true positions at the end."
-    ]
-
-
 def commands(races: Sequence[Race]) -> str:
     """Return the commands the contests came from; one if together they are all contests, run alike."""
-    words = [race.command.split(" ") for race in races]
+    words = [race.run.command.split(" ") for race in races]
     alike = {
         " ".join(w for i, w in enumerate(ws) if "--problem" not in (w, ws[max(i - 1, 0)])) for ws in words
     }
-    if len(alike) == 1 and {race.contest.key for race in races} == set(CONTESTS):
+    if len(alike) == 1 and {race.key for race in races} == {name_of(entry) for entry in DECLARED.entries()}:
         return alike.pop()
-    return "\n".join(dict.fromkeys(race.command for race in races))
+    return "\n".join(dict.fromkeys(race.run.command for race in races))
 
 
 def settings_csv(races: Sequence[Race]) -> Files:
     """Return all settings of all contests as one table of text."""
-    found = [(race.contest.key, tables.everything(race)) for race in races]
+    found = [(race.key, tables.everything(race)) for race in races]
     head = ("contest", *found[0][1].head)
     text = csv_of([head, *((key, *row) for key, table in found for row in table.rows)])
     return Files("Every setting of every contest", {"data/settings.csv": text})

@@ -5,12 +5,22 @@ from statistics import median
 
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.studies.race import standings
-from hbvm_bench.studies.race.results import Outcome, Probe, Race
-from hbvm_bench.studies.race.settings import FAMILIES, OURS
-from hbvm_bench.studies.race.standings import LEVELS, POSITION_OVER_ENERGY, Comparison
-from hbvm_bench.summaries.rows import seconds
+from hbvm_bench.store.records import Record
+from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.probe import Probe
+from hbvm_bench.studies.race.results import ERRORS, OURS, Race, counts
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.goals import ratio_text
+from hbvm_bench.summaries.goals import table as goals_table
+from hbvm_bench.summaries.rows import format_metric, group_of, seconds, status_of
+from hbvm_bench.summaries.standings import Comparison
 from hbvm_bench.summaries.table import NONE, Table
+
+LEVELS = tuple(10.0**-digits for digits in range(8, 15))
+POSITION_OVER_ENERGY = 1e3
+"""At each level the position error may be this much larger than the energy error, as in the targets."""
+
+SHOWN = (*ERRORS, "steps", "evaluations")
 
 CACHES = {
     "empty": "nothing",
@@ -21,17 +31,17 @@ CACHES = {
 
 def headline(races: Sequence[Race]) -> Table:
     """Return every contest at the accuracy it asks for: the peers' best times over ours."""
-    peers = [f for f in FAMILIES if f != OURS and any(f in standings.present(race) for race in races)]
+    peers = [f for f in FAMILIES if f != OURS and any(f in race.families for race in races)]
     rows = []
     for race in races:
-        energy, position = asked(race)
-        ours = standings.best(race, OURS, energy, position)
+        energy, position = race.asked
+        ours = race.best(OURS, energy, position)
         rows.append(
             (
-                race.contest.title,
+                race.title,
                 f"{power(energy)}, {power(position)}",
                 time_of(ours) if ours else "not reached",
-                *(_headline_cell(race, peer, standings.at(race, peer, energy, position)) for peer in peers),
+                *(_headline_cell(race, peer, race.at(peer, energy, position)) for peer in peers),
             )
         )
     return Table(
@@ -45,13 +55,11 @@ def headline(races: Sequence[Race]) -> Table:
 
 def behind(races: Sequence[Race]) -> Table:
     """Return the settings whose times `headline` compares."""
-    peers = [
-        f for f in FAMILIES if f != OURS and any(standings.best(race, f, *asked(race)) for race in races)
-    ]
+    peers = [f for f in FAMILIES if f != OURS and any(race.best(f, *race.asked) for race in races)]
     rows = []
     for race in races:
-        best = (standings.best(race, family, *asked(race)) for family in (OURS, *peers))
-        rows.append((race.contest.title, *(NONE if one is None else one.setting.method for one in best)))
+        best = (race.best(family, *race.asked) for family in (OURS, *peers))
+        rows.append((race.title, *(NONE if one is None else one.case.method for one in best)))
     return Table(
         "The settings behind these ratios",
         ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
@@ -62,21 +70,21 @@ def behind(races: Sequence[Race]) -> Table:
 
 def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
     """Return the peers' best times over ours, one column for each kind of processor."""
-    keys = dict.fromkeys(race.contest.key for races in by_kind.values() for race in races)
+    keys = dict.fromkeys(race.key for races in by_kind.values() for race in races)
     rows = []
     for key in keys:
-        of_kind = {kind: race for kind, races in by_kind.items() for race in races if race.contest.key == key}
-        shown = {peer: None for race in of_kind.values() for peer in standings.present(race) if peer != OURS}
+        of_kind = {kind: race for kind, races in by_kind.items() for race in races if race.key == key}
+        shown = {peer: None for race in of_kind.values() for peer in race.families if peer != OURS}
         for peer in shown:
             cells = [
-                _headline_cell(race, peer, standings.at(race, peer, *asked(race)))
+                _headline_cell(race, peer, race.at(peer, *race.asked))
                 if (race := of_kind.get(kind)) is not None
                 else "not run"
                 for kind in by_kind
             ]
             if any(cell.endswith((")", "×")) for cell in cells):
                 first = next(iter(of_kind.values()))
-                rows.append((first.contest.title, FAMILIES[peer].short, *cells))
+                rows.append((first.title, FAMILIES[peer].short, *cells))
     return Table(
         "The same ratios by kind of processor",
         ("problem", "peer", *by_kind),
@@ -89,37 +97,17 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
 
 
 def goals(races: Sequence[Race]) -> Table:
-    """Return what the project asked of itself before, and what was measured."""
-    rows = []
-    for race in races:
-        for goal in race.contest.goals:
-            found = standings.verdict(race, goal)
-            position = "no worse than the peer's" if goal.position is None else power(goal.position)
-            rows.append(
-                (
-                    race.contest.title,
-                    FAMILIES[goal.family].short,
-                    f"{power(goal.energy)}, {position}",
-                    f"≥ {goal.ratio:g}",
-                    ratio_text(found.comparison.ratio),
-                    "reached" if found.reached else "missed",
-                )
-            )
-    return Table(
-        "Goals declared before the race",
-        ("problem", "peer", "energy, position", "goal", "measured", "verdict"),
-        rows,
-        words=(0, 1, 5),
-    )
+    """Return what was asked for before, and what was measured."""
+    return goals_table([verdict for race in races for verdict in race.goals])
 
 
 def fastest(race: Race) -> Table:
     """Return the fastest setting of every family at the accuracy asked for."""
-    energy, position = asked(race)
-    ours = standings.best(race, OURS, energy, position)
+    energy, position = race.asked
+    ours = race.best(OURS, energy, position)
     rows = []
-    for family in standings.present(race):
-        found = standings.best(race, family, energy, position)
+    for family in race.families:
+        found = race.best(family, energy, position)
         name = FAMILIES[family].title
         if found is None:
             rows.append((name, _why_none(race, family), *[NONE] * 6))
@@ -128,12 +116,9 @@ def fastest(race: Race) -> Table:
         rows.append(
             (
                 name,
-                found.setting.method,
+                found.case.method,
                 time_of(found),
-                error(found.energy),
-                error(found.position),
-                count(found.steps),
-                count(found.evaluations),
+                *(format_metric(found, key) for key in SHOWN),
                 ratio,
             )
         )
@@ -147,17 +132,17 @@ def fastest(race: Race) -> Table:
 
 def levels(race: Race) -> Table:
     """Return the same at looser and tighter accuracy."""
-    peers = [family for family in standings.present(race) if family != OURS]
+    peers = [family for family in race.families if family != OURS]
     rows = []
     for level in LEVELS:
         position = level * POSITION_OVER_ENERGY
-        ours = standings.best(race, OURS, level, position)
+        ours = race.best(OURS, level, position)
         rows.append(
             (
                 f"{power(level)}, {power(position)}",
-                ours.setting.method if ours else "not reached",
+                ours.case.method if ours else "not reached",
                 time_of(ours) if ours else NONE,
-                *(_level_cell(standings.at(race, peer, level, position)) for peer in peers),
+                *(_level_cell(race.at(peer, level, position)) for peer in peers),
             )
         )
     return Table(
@@ -171,18 +156,17 @@ def levels(race: Race) -> Table:
 def defaults(race: Race) -> Table | None:
     """Return the peers at their defaults beside the fastest of ours that is as accurate; ``None`` without."""
     rows = []
-    for family in standings.present(race):
-        found = standings.untuned(race, family)
+    for family in race.families:
+        found = standings.untuned(race.records, family, ERRORS)
         if found.theirs is None:
             continue
         ours = found.ours
         rows.append(
             (
-                found.theirs.setting.method,
+                found.theirs.case.method,
                 time_of(found.theirs),
-                error(found.theirs.energy),
-                error(found.theirs.position),
-                ours.setting.method if ours else "none is as accurate",
+                *(format_metric(found.theirs, key) for key in ERRORS),
+                ours.case.method if ours else "none is as accurate",
                 time_of(ours) if ours else NONE,
                 ratio_text(found.ratio),
             )
@@ -217,18 +201,16 @@ def compiling(race: Race) -> Table | None:
 def everything(race: Race) -> Table:
     """Return every setting that was declared."""
     rows = []
-    for outcome in race.outcomes:
-        remark = outcome.void or outcome.reason or outcome.untimed
-        status = "" if outcome.status == "finished" else outcome.status.replace("_", " ")
+    for record in race.records:
+        result, timing = record.result, record.timing
+        remark = result.violation or result.reason or (timing.why if timing is not None else "did not finish")
+        status = "" if group_of(record) != "ended" else status_of(record)
         rows.append(
             (
-                outcome.setting.method,
-                time_of(outcome),
-                error(outcome.energy, void=bool(outcome.void)),
-                error(outcome.position, void=bool(outcome.void)),
-                count(outcome.steps),
-                count(outcome.evaluations),
-                seconds(outcome.call_seconds) if outcome.call_seconds else NONE,
+                record.case.method,
+                time_of(record),
+                *(format_metric(record, key) for key in SHOWN),
+                seconds(timing.call) if timing is not None and timing.call else NONE,
                 ": ".join(part for part in (status, remark) if part),
             )
         )
@@ -242,53 +224,23 @@ def everything(race: Race) -> Table:
     )
 
 
-def asked(race: Race) -> tuple[float, float]:
-    """Return the energy and position errors that a contest asks for."""
-    return race.contest.energy, race.contest.position
-
-
-def ratio_text(ratio: Spread | None) -> str:
-    """Write a ratio with its quartiles."""
-    if ratio is None:
-        return NONE
-    spread = "" if ratio.low is None or ratio.high is None else f" ({number(ratio.low)}–{number(ratio.high)})"
-    return f"{number(ratio.median)}×{spread}"
-
-
-def number(value: float) -> str:
-    """Write a ratio with two or three digits."""
-    return f"{value:.0f}" if value >= 99.5 else f"{value:.1f}" if value >= 9.95 else f"{value:.2f}"
-
-
 def power(value: float) -> str:
     """Write an error level: ``1e-13``."""
     return f"{value:.0e}"
 
 
-def error(value: float | None, *, void: bool = False) -> str:
-    """Write an error; void ones in brackets."""
-    if value is None:
-        return NONE
-    text = "0" if value == 0 else f"{value:.1e}"
-    return f"({text})" if void else text
-
-
-def count(value: int | None) -> str:
-    """Write a counter in groups of three digits."""
-    return NONE if value is None else f"{value:,}".replace(",", "\u202f")
-
-
-def time_of(outcome: Outcome) -> str:
+def time_of(record: Record) -> str:
     """Write the median time of a run with its quartiles."""
-    time = outcome.time
-    if time is None:
+    taken = record.timing.samples if record.timing is not None else []
+    if not taken:
         return NONE
+    time = Spread.of(taken)
     spread = "" if time.low is None or time.high is None else f" ({seconds(time.low)} – {seconds(time.high)})"
     return f"{seconds(time.median)}{spread}"
 
 
 def _headline_cell(race: Race, peer: str, found: Comparison) -> str:
-    if peer not in standings.present(race):
+    if peer not in race.families:
         return NONE
     if found.theirs is None:
         return _why_none(race, peer)
@@ -302,10 +254,10 @@ def _level_cell(found: Comparison) -> str:
 
 
 def _why_none(race: Race, family: str) -> str:
-    outcomes = [o for o in race.outcomes if o.setting.family == family]
-    if outcomes and all(o.status == "refused" for o in outcomes):
+    records = race.of(family)
+    if records and all(one.result.outcome == "refused" for one in records):
         return "does not apply"
-    if outcomes and all(not o.counts for o in outcomes):
+    if records and not any(counts(one) for one in records):
         return "no valid run"
     return "not reached"
 

@@ -142,3 +142,20 @@ def test_a_case_that_hit_a_limit_runs_again_under_a_larger_one():
 
 def test_times_are_doubles():
     assert Grid(count=3).times(problems.load("sitnikov")).dtype == np.float64
+
+
+def test_a_method_may_be_a_list_of_settings_of_which_a_quick_run_takes_some():
+    text = 'use = ["Gauss(s=2, h={h})", "Gauss(s=3, h={h})"]\nsweep = { h = [0.5, 0.25] }\nquick = [1, 2]\n'
+    whole = campaign.parse(GOOD + "[[methods]]\n" + text)
+    settings = ["Gauss(s=2, h=0.5)", "Gauss(s=2, h=0.25)", "Gauss(s=3, h=0.5)", "Gauss(s=3, h=0.25)"]
+    assert [case.method for case in whole.cases()] == settings
+    quick = msgspec.structs.replace(whole, quick=True)
+    assert [case.method for case in quick.cases()] == settings[1:3]
+
+
+def test_a_problem_is_called_by_its_name_in_the_campaign():
+    text = 'name = "x"\n[[problems]]\nuse = "fput(n=8)"\nname = "short"\n[[problems]]\nuse = "fput(n=16)"\n'
+    made = campaign.parse(text + METHOD + 'only = ["short"]\n')
+    assert [case.problem for case in made.cases()] == ["fput(n=8)"]
+    with pytest.raises(InputError, match="must be a file name"):
+        campaign.parse(text.replace("short", "../short") + METHOD)

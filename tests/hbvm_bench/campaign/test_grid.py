@@ -56,3 +56,23 @@ def test_an_uneven_grid_runs_backwards_with_its_problem():
 def test_a_grid_that_makes_no_sense_is_refused(options):
     with pytest.raises(InputError):
         Grid(**options).times(problems.load("kepler"))
+
+
+def test_further_times_lie_within_the_span_and_all_may_be_whole_ones():
+    problem = problems.load("outer_solar_system", t_end=2000.0)
+    grid = Grid(spacing="log", count=20, first=10.0, also=[100.0, 5000.0], multiple_of=1.0)
+    t = grid.times(problem)
+    assert np.array_equal(t, np.rint(t))
+    assert 100.0 in t
+    assert (t[0], t[-1]) == (0.0, 2000.0)
+    assert np.all(np.diff(t) > 0)
+
+
+def test_samples_of_a_fixed_step_are_own_steps_backwards_too():
+    for t_end in (10.0, -10.0):
+        problem = problems.load("pendulum", t_end=t_end)
+        t = Grid(count=40, own_steps=True).times(problem, 0.3)
+        assert t[-1] == t_end
+        assert np.array_equal(np.abs(t[:-1]), np.rint(np.abs(t[:-1]) / 0.3) * 0.3)
+        assert np.all(np.diff(np.abs(t)) > 0)
+    assert np.array_equal(Grid(count=40, own_steps=True).times(problem), Grid(count=40).times(problem))

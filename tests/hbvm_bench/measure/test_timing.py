@@ -1,5 +1,6 @@
 """The clock runs for the library's own work only: the sampling it recommends, and nothing of setting up."""
 
+import gc
 from types import SimpleNamespace
 
 import numpy as np
@@ -138,7 +139,42 @@ def test_no_sample_is_always_the_first_of_its_round(asked, order):
     assert seconds == [[i + 1.0 for i, name in enumerate(order) if name == one] for one in "ab"]
 
 
-def test_ratios_are_of_the_rounds_that_both_have():
-    found = timing.Spread.of(timing.ratios([3.0, None, 6.0, 4.0], [1.0, 1.0, 2.0, None]))
+def test_one_sample_has_no_quartiles():
+    found = timing.Spread.of([3.0, 3.0])
     assert found == timing.Spread(3.0, 3.0, 3.0)
     assert timing.Spread.of([2.0]) == timing.Spread(2.0, None, None)
+
+
+def test_timing_takes_the_integration_alone_and_restores_garbage_collection():
+    run = timing.Run.of(problems.load("kepler", e=0.6, t_end=3.0), integrators.Gauss(s=4, h=0.1))
+    seconds, samples = run.seconds(3)
+    assert seconds > 0
+    assert samples.t.tolist() == [3.0]
+    assert gc.isenabled()
+    assert run.until(0.1).t_end == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(("seconds", "repeats"), [(1.0, 1), (0.02, 1), (0.01, 3), (1e-3, 24)])
+def test_short_runs_are_repeated_until_a_sample_is_long_enough(seconds, repeats):
+    assert timing.repeats_for(seconds, 0.02) == repeats
+
+
+def test_a_setting_too_slow_for_all_rounds_takes_part_in_some_of_them():
+    assert timing.spread_evenly(3, 9) == [0, 3, 6]
+    assert timing.spread_evenly(0, 9) == [0]
+    taken = timing.interleaved([lambda: 1.0, lambda: 2.0], 3, turns=[[0, 1, 2], [1]])
+    assert taken == [[1.0, 1.0, 1.0], [2.0]]
+
+
+def test_shuffled_rounds_are_in_another_order_each_and_the_same_every_time():
+    def order():
+        seen = []
+        samples = [lambda name=name: seen.append(name) or 1.0 for name in "abcdefgh"]
+        timing.interleaved(samples, 2, order="shuffled", begin=seen.append)
+        return seen
+
+    first = order()
+    assert first == order()
+    assert (first[0], first[9]) == (0, 1)
+    assert sorted(first[1:9]) == sorted(first[10:]) == list("abcdefgh")
+    assert first[1:9] != first[10:]

@@ -6,7 +6,7 @@ from hbvm_bench.campaign.file import Campaign, Case, Ensemble, MethodEntry
 from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index
 from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
-from hbvm_bench.summaries.profiles import Goal
+from hbvm_bench.summaries.profiles import Accuracy
 
 
 def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
@@ -65,12 +65,12 @@ def test_an_envelope_is_what_nothing_beats_in_both():
 def test_an_ensemble_is_in_no_summary_of_single_trajectories():
     many = record("Taylor()", many=True)
     assert points.points([many], "kepler()", "warm_seconds", "position_end") == []
-    assert profiles.profile([many], Goal(1e-4), "warm_seconds").ratios == {}
+    assert profiles.profile([many], Accuracy(1e-4), "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})
 
 
 def test_a_profile_counts_problems_within_a_factor_of_the_best():
-    found = profiles.profile(RUN, Goal(1e-8), "warm_seconds")
+    found = profiles.profile(RUN, Accuracy(1e-8), "warm_seconds")
     assert found.problems == ["kepler()", "pendulum()"]
     assert found.unsolved == ["toda()"]
     assert found.ratios == {"Gauss": [2.0, 1.0], "Taylor": [1.0, 8.0]}
@@ -80,11 +80,11 @@ def test_a_profile_counts_problems_within_a_factor_of_the_best():
     assert (found.wins("Gauss"), found.solved("Taylor")) == (1, 2)
 
 
-def test_who_does_not_reach_the_goal_has_an_infinite_ratio():
-    found = profiles.profile(RUN, Goal(1e-8, 1e-13), "warm_seconds")
+def test_who_does_not_reach_the_accuracy_has_an_infinite_ratio():
+    found = profiles.profile(RUN, Accuracy(1e-8, 1e-13), "warm_seconds")
     assert found.ratios["Taylor"] == [math.inf, 8.0]
     assert found.solved("Taylor") == 1
-    assert "energy to 1e-13" in found.goal.words
+    assert "energy to 1e-13" in found.accuracy.words
 
 
 def test_needs_name_the_families_near_the_best_most_often():

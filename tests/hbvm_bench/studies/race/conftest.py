@@ -1,22 +1,71 @@
+import hashlib
+
+import msgspec
 import pytest
 
-from hbvm_bench.studies.race.contests import CONTESTS
-from hbvm_bench.studies.race.results import Load, Outcome, Probe, Race, Setting
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.shorter import chosen, quick_run
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Compile, Counters, Load, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.store import Index
+from hbvm_bench.studies.race import results
+from hbvm_bench.studies.race.probe import Probe
+from hbvm_bench.studies.race.results import Race
+
+MACHINE = {"processor": "<b>fast</b> | one"}
 
 
-def outcome(method, seconds, energy, position, family="hbvm", **more):
-    """Return an outcome of three rounds about a median."""
-    return Outcome(
-        setting=Setting(family=family, method=method, default=more.pop("default", False)),
-        status=more.pop("status", "finished"),
-        energy=energy,
-        position=position,
-        samples=401,
-        steps=100,
-        call_seconds=1e-5,
-        repeats=2,
-        seconds=more.pop("times", [0.9 * seconds, seconds, 1.2 * seconds]),
-        **more,
+def record(method, seconds, energy, position, role="peer", **more):
+    """Return a case of three rounds about a median."""
+    times = more.pop("times", [0.9 * seconds, seconds, 1.2 * seconds])
+    void = more.pop("void", "")
+    timing = Timing(
+        rounds=[
+            TimingRound(
+                samples=[one],
+                repeats=2,
+                compile=Compile(seconds=0.1, cached=True),
+                calibration=[(0.0101, 0.01, 0.0102)[place]],
+                number=place,
+            )
+            for place, one in enumerate(times)
+            if one is not None
+        ],
+        machine=MACHINE,
+        process="one",
+        call=1e-5,
+        load=Load(others=0.2, stolen=0.0),
+    )
+    numbers = {
+        "energy_max": energy,
+        "position_end": position,
+        "steps": 100.0,
+        "warm_seconds": timing.summary.get("median"),
+    }
+    metrics = {
+        key: Value(value=number, void=bool(void), why=void)
+        for key, number in numbers.items()
+        if number is not None
+    }
+    problem = make_problem("outer_solar_system(t_end=1200.0)")
+    return Record(
+        id=hashlib.sha256(method.encode()).hexdigest(),
+        case=Case(problem=repr(problem), method=method),
+        role=role,
+        library="",
+        order=None,
+        result=Result(
+            outcome=more.pop("outcome", "ok"),
+            status=more.pop("status", "finished"),
+            reason=more.pop("reason", ""),
+            violation=void,
+            counters=Counters(steps=100),
+            metrics=metrics,
+        ),
+        timing=timing if timing.rounds else None,
+        versions={"numpy": "2"},
+        finished="2026-01-02T03:04:05+00:00",
     )
 
 
@@ -25,40 +74,52 @@ def race():
     return made_up()
 
 
-def made_up():
-    """Return a small race with every kind of row."""
-    return Race(
-        contest=CONTESTS["outer_solar_system"],
-        t_end=1200.0,
-        quick=True,
-        outcomes=[
-            outcome("Gauss(s=8, h=2.0)", 0.001, 2e-12, 1e-9),
-            outcome("Gauss(s=8, h=1.5)", 0.002, 5e-14, 5e-11),
-            outcome("HBVM(k=16, s=8, h=2.0)", 0.0015, 1e-14, 1e-8),
-            outcome("Taylor(tol=1e-12)", 0.015, 3e-11, 2e-8, "heyoka"),
-            outcome("Taylor()", 0.03, 2e-15, 1e-12, "heyoka", default=True),
-            outcome("IAS15()", 0.0, None, None, "ias15", status="stalled", reason="stood still", times=[]),
-            outcome("IAS15(mode='global')", 0.05, 1e-15, 1e-12, "ias15", void="another trajectory", times=[]),
-            outcome("WHFast(h=0.5)", 0.006, 5e-11, 3e-9, "whfast", times=[None, 0.006, None]),
-            outcome("Leapfrog(h=0.1)", 0.0, None, None, "leapfrog", status="refused", reason="no", times=[]),
-        ],
-        rounds=3,
-        calibration=[0.0101, 0.01, 0.0102],
-        probes=[
-            Probe(
-                family="hbvm",
-                method="Gauss(s=8, h=2.0)",
-                caches="empty",
-                compile_seconds=[2.5, 2.4, 2.6],
-                process_seconds=[3.5, 3.4, 3.6],
-                from_cache=False,
+def made_up(**said):
+    """Return a small race with every kind of row, and what is said for machine, versions and command."""
+    records = [
+        record("Gauss(s=8, h=2.0)", 0.001, 2e-12, 1e-9, "ours"),
+        record("Gauss(s=8, h=1.5)", 0.002, 5e-14, 5e-11, "ours"),
+        record("HBVM(k=16, s=8, h=2.0)", 0.0015, 1e-14, 1e-8, "ours"),
+        record("Taylor(tol=1e-12)", 0.015, 3e-11, 2e-8),
+        record("Taylor()", 0.03, 2e-15, 1e-12),
+        record(
+            "IAS15()", 0.0, None, None, outcome="stalled", status="stalled", reason="stood still", times=[]
+        ),
+        record("IAS15(mode='global')", 0.05, 1e-15, 1e-12, void="another trajectory", times=[]),
+        record("WHFast(h=0.5)", 0.006, 5e-11, 3e-9, times=[None, 0.006, None]),
+        record("Leapfrog(h=0.1)", 0.0, None, None, outcome="refused", status="", reason="no", times=[]),
+    ]
+    if "machine" in said:
+        records = [
+            msgspec.structs.replace(
+                one,
+                timing=one.timing and msgspec.structs.replace(one.timing, machine=said["machine"]),
+                versions=said.get("versions", one.versions),
             )
-        ],
-        reference={"method": "128 bits"},
-        load=Load(others=0.2, stolen=0.0),
-        machine={"processor": "<b>fast</b> | one"},
-        versions={"numpy": "2"},
-        command="hbvm-bench race --quick",
-        started="2026-01-02T03:04:05+00:00",
-        seconds=1.5,
+            for one in records
+        ]
+    campaign = quick_run(chosen(results.declared(), ["outer_solar_system"]), 3)
+    index = Index(
+        campaign=campaign,
+        ids=[one.id for one in records],
+        version="0",
+        command=said.get("command", "hbvm-bench race --quick"),
     )
+    probes = [
+        Probe(
+            problem="outer_solar_system",
+            family="",
+            method="Gauss(s=8, h=2.0)",
+            caches="empty",
+            compile_seconds=[2.5, 2.4, 2.6],
+            process_seconds=[3.5, 3.4, 3.6],
+            from_cache=False,
+        )
+    ]
+    (entry,) = campaign.entries()
+    return Race(entry, Kept(index=index, records=records), records, probes)
+
+
+def save(race, directory):
+    """Keep a race in a directory, as the command does."""
+    results.kept.keep(race.run, directory / results.FILE, "race")

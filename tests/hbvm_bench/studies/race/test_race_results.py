@@ -1,51 +1,73 @@
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import pytest
 
+from hbvm_bench.campaign.file import name_of
 from hbvm_bench.commands.race import as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
 from hbvm_bench.studies.race import report, results, tables
-from hbvm_bench.studies.race.contests import CONTESTS
 from hbvm_bench.studies.race.figures import front, work_precision
+from hbvm_bench.studies.race.results import ENERGY, POSITION
 from problems.errors import InputError
+from tests.hbvm_bench.studies.race.conftest import save
 
-KEY = "outer_solar_system"
+REPORTS = Path(__file__).parents[4] / "reports" / "race"
 
 
 def test_a_stored_race_is_read_back_equal(race, tmp_path):
-    path = results.save(race, tmp_path)
-    assert path.name == f"{KEY}.json"
-    assert results.load(tmp_path, [KEY]) == [race]
-    assert [p.name for p in tmp_path.iterdir()] == [path.name]  # no temporary file is left
+    save(race, tmp_path)
+    (found,) = results.load(tmp_path)
+    assert (found.entry, found.run, found.records) == (race.entry, race.run, race.records)
+    assert [p.name for p in tmp_path.iterdir()] == ["race.json"]  # no temporary file is left
 
 
 def test_an_empty_directory_says_how_to_fill_it(tmp_path):
     with pytest.raises(InputError, match="hbvm-bench race --out"):
-        results.load(tmp_path, [KEY])
+        results.load(tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b'{"contest": 1}', b"[]"])
-def test_a_file_that_is_no_race_is_refused_by_name(content, tmp_path):
-    (tmp_path / f"{KEY}.json").write_bytes(content)
-    with pytest.raises(InputError, match=f"{KEY}.json"):
-        results.load(tmp_path, [KEY])
+@pytest.mark.parametrize("name", ["race.json", "kepler.json", "compile_times.json"])
+@pytest.mark.parametrize("content", [b"", b"{", b'{"contest": 1}'])
+def test_a_file_that_is_no_race_is_refused_by_name(content, name, race, tmp_path):
+    save(race, tmp_path)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=name):
+        results.load(tmp_path)
 
 
 def test_a_race_of_another_version_is_refused(race, tmp_path):
-    results.save(msgspec.structs.replace(race, schema=0), tmp_path)
+    other = msgspec.structs.replace(race.run, schema=0)
+    (tmp_path / "race.json").write_bytes(msgspec.json.encode([other]))
     with pytest.raises(InputError, match="another version"):
-        results.load(tmp_path, [KEY])
+        results.load(tmp_path)
+
+
+def test_a_race_from_before_it_was_a_campaign_is_read_as_records():
+    """What it says is what the committed page said when it was drawn."""
+    found = {race.key: race for race in results.load(REPORTS)}
+    assert list(found)[:3] == ["outer_solar_system", "sitnikov", "kepler"]
+    planets = found["outer_solar_system"]
+    assert (len(planets.records), planets.rounds, len(planets.calibration)) == (112, 5, 5)
+    ratio = planets.at("Taylor", *planets.asked).ratio
+    assert (round(ratio.median, 1), round(ratio.low, 2), round(ratio.high, 1)) == (10.5, 9.84, 10.6)
+    verdicts = [verdict.verdict for race in found.values() for verdict in race.goals]
+    assert verdicts == ["reached", "reached", "missed", "missed", "reached", *4 * ["missed"]]
+    assert planets.probes[0].family == ""
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
     data = msgspec.json.decode(msgspec.json.encode(as_data([race])))
-    goal = next(goal for goal in data["goals"] if goal["peer"] == "heyoka")
+    goal = next(goal for goal in data["goals"] if goal["goal"]["against"] == "Taylor")
     assert goal["ratio"] == pytest.approx(15.0)
-    assert goal["reached"]
-    assert data["races"][0]["outcomes"][0]["seconds"] == race.outcomes[0].seconds
-    levels = [r for r in data["ratios"] if r["peer"] == "heyoka"]
+    assert goal["verdict"] == "reached"
+    (first, *_) = data["races"][0]["cases"]
+    samples = [one["samples"] for one in first["timing"]["rounds"]]
+    assert samples == [one.samples for one in race.records[0].timing.rounds]
+    levels = [r for r in data["ratios"] if r["peer"] == "Taylor"]
     assert [r["energy"] for r in levels[1:]] == pytest.approx([10.0**-d for d in range(8, 15)])
 
 
@@ -86,31 +108,31 @@ def test_the_tables_say_why_there_is_no_ratio(race):
 
 
 def test_goals_are_listed_with_their_verdict(race):
-    verdicts = {row[1]: row[-1] for row in tables.goals([race]).rows}
-    assert verdicts == {"heyoka": "reached", "IAS15": "missed", "WHFast": "reached"}
+    verdicts = {verdict.goal.against: verdict.verdict for verdict in race.goals}
+    assert verdicts == {"Taylor": "reached", "IAS15": "missed", "WHFast": "reached"}
+    assert [row[-1] for row in tables.goals([race]).rows][1] == "missed: the peer has no setting as accurate"
 
 
 def test_a_race_without_any_valid_run_has_no_figure(race):
-    void = msgspec.structs.replace(race, outcomes=race.outcomes[5:7])
+    void = replace(race, records=race.records[5:7])
     assert work_precision(void, looks([])) is None
 
 
 def test_the_front_of_a_family_is_beaten_by_none_of_it(race):
-    ours = [o for o in race.outcomes if o.setting.family == "hbvm"]
-    assert [o.setting.method for o in front(ours, "position")] == ["Gauss(s=8, h=2.0)", "Gauss(s=8, h=1.5)"]
-    assert [o.setting.method for o in front(ours, "energy")] == [
-        "Gauss(s=8, h=2.0)",
-        "HBVM(k=16, s=8, h=2.0)",
-    ]
+    ours = race.of(results.OURS)
+    assert [o.case.method for o in front(ours, POSITION)] == ["Gauss(s=8, h=2.0)", "Gauss(s=8, h=1.5)"]
+    assert [o.case.method for o in front(ours, ENERGY)] == ["Gauss(s=8, h=2.0)", "HBVM(k=16, s=8, h=2.0)"]
 
 
-def test_the_report_names_one_command_where_the_contests_together_are_one_run(race):
+def test_the_report_names_one_command_where_the_problems_together_are_one_run(race):
     def run(key, words):
-        contest = msgspec.structs.replace(race.contest, key=key)
-        return msgspec.structs.replace(race, contest=contest, command=words)
+        entry = msgspec.structs.replace(race.entry, name=key)
+        index = msgspec.structs.replace(race.run.index, command=words)
+        return replace(race, entry=entry, run=msgspec.structs.replace(race.run, index=index))
 
-    single = [run(key, f"hbvm-bench race --problem {key} --out x") for key in CONTESTS]
+    keys = [name_of(entry) for entry in results.declared().entries()]
+    single = [run(key, f"hbvm-bench race --problem {key} --out x") for key in keys]
     assert report.commands(single) == "hbvm-bench race --out x"
-    assert report.commands(single[1:]) == "\n".join(one.command for one in single[1:])
+    assert report.commands(single[1:]) == "\n".join(one.run.command for one in single[1:])
     other = [run("kepler", "hbvm-bench race --problem kepler --rounds 5 --out x"), *single[1:]]
-    assert report.commands(other).count("\n") == len(CONTESTS) - 1
+    assert report.commands(other).count("\n") == len(keys) - 1

@@ -3,53 +3,56 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from hbvm_bench.campaign.identity import make_method, make_problem
+from hbvm_bench.campaign.file import name_of
+from hbvm_bench.campaign.identity import make_method, make_problem, resolve
+from hbvm_bench.campaign.shorter import QUICK_SHARE, chosen, quick_run
+from hbvm_bench.commands.race import _family
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.race import truth
-from hbvm_bench.studies.race.accuracy import SAMPLES, sample_times
-from hbvm_bench.studies.race.contests import CONTESTS, QUICK_SHARE, chosen
+from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.probe import METHODS
-from hbvm_bench.studies.race.settings import FAMILIES, QUICK_SETTINGS, SETTINGS, settings
+from hbvm_bench.studies.race.results import OURS, declared
 from problems.errors import UnknownNameError
 
-KEYS = list(CONTESTS)
+KEYS = [name_of(entry) for entry in declared().entries()]
+SETTINGS, QUICK_SETTINGS = 16, 3
+
+
+def cases(key, *, quick=False):
+    campaign = chosen(declared(), [key])
+    return (quick_run(campaign, 3) if quick else campaign).cases()
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_every_family_has_the_same_number_of_settings_and_none_twice(key):
-    declared = settings(key)
-    assert set(Counter(s.family for s in declared).values()) == {SETTINGS}
-    assert len({s.method for s in declared}) == len(declared)
-    assert {s.family for s in declared} <= set(FAMILIES)
+    here = cases(key)
+    assert set(Counter(map(_family, here)).values()) == {SETTINGS}
+    assert len({case.method for case in here}) == len(here)
+    assert {*map(_family, here)} <= set(FAMILIES)
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_the_quick_settings_are_some_of_the_declared_ones(key):
-    quick = settings(key, quick=True)
-    assert set(Counter(s.family for s in quick).values()) == {QUICK_SETTINGS}
-    assert {s.method for s in quick} <= {s.method for s in settings(key)}
-
-
-@pytest.mark.parametrize("key", KEYS)
-def test_the_settings_print_as_they_are_read(key):
-    for setting in settings(key):
-        assert repr(make_method(setting.method)) == setting.method
+    quick = cases(key, quick=True)
+    assert set(Counter(map(_family, quick)).values()) == {QUICK_SETTINGS}
+    assert {case.method for case in quick} <= {case.method for case in cases(key)}
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_the_problem_has_a_stored_true_solution_at_both_ends(key):
-    problem = make_problem(CONTESTS[key].problem)
-    stored = solutions.find(problem)
-    assert stored is not None
-    assert stored.t[-1] == problem.t_end
-    short = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
-    assert stored.t[truth.nearest(stored, short)] == pytest.approx(short)
-    assert "check" in stored.provenance
+    (problem,) = {case.problem for case in cases(key)}
+    (short,) = {case.problem for case in cases(key, quick=True)}
+    whole, part = make_problem(problem), make_problem(short)
+    for made in (whole, part):
+        stored = solutions.find(made)
+        assert stored is not None
+        assert made.t_end in stored.t
+        assert "check" in stored.provenance
+    assert part.t_end == pytest.approx(whole.t0 + QUICK_SHARE * (whole.t_end - whole.t0))
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_the_true_solution_starts_where_the_problem_starts(key):
-    problem = make_problem(CONTESTS[key].problem)
+    problem = make_problem(cases(key)[0].problem)
     stored = solutions.find(problem)
     assert stored is not None
     assert np.array_equal(stored.high[0], problem.y0)
@@ -58,50 +61,44 @@ def test_the_true_solution_starts_where_the_problem_starts(key):
 
 @pytest.mark.parametrize("key", ["outer_solar_system", "sitnikov", "kepler", "henon_heiles", "fput32"])
 def test_a_fixed_step_divides_the_span(key):
-    problem = make_problem(CONTESTS[key].problem)
-    for setting in settings(key):
-        if FAMILIES[setting.family].fixed:
-            steps = problem.t_end / make_method(setting.method).h  # pyright: ignore[reportAttributeAccessIssue]
+    for case in cases(key):
+        h = getattr(make_method(case.method), "h", None)
+        if h:
+            steps = make_problem(case.problem).t_end / h
             assert abs(steps - round(steps)) < 1e-6
 
 
-def test_defaults_are_marked():
-    marked = {s.method for s in settings("outer_solar_system") if s.default}
-    assert marked == {"Taylor()", "IAS15()"}
+def test_samples_of_a_fixed_step_are_own_steps_and_end_at_the_end():
+    case = cases("henon_heiles")[1]
+    resolved = resolve(case)
+    h = getattr(resolved.method, "h", 0.0)
+    t = case.grid.times(resolved.problem, h)
+    assert np.array_equal(t / h, np.rint(t / h))
+    assert t[-1] == resolved.problem.t_end
+    assert np.all(np.diff(t) > 0)
+    assert t.size > 395  # of 400 cells: in few do two samples meet the same step
 
 
 def test_goals_are_about_families_that_run():
-    for key, contest in CONTESTS.items():
-        assert {goal.family for goal in contest.goals} <= {s.family for s in settings(key)}
+    for goal in declared().goals:
+        (key,) = goal.only
+        assert goal.against in {_family(case) for case in cases(key)}
 
 
-def test_an_unknown_contest_is_named_with_the_nearest():
+def test_an_unknown_problem_is_named_with_the_nearest():
     with pytest.raises(UnknownNameError, match="kepler"):
-        chosen(["keppler"])
+        chosen(declared(), ["keppler"])
 
 
-def test_contests_are_chosen_in_the_order_of_declaration():
-    assert [c.key for c in chosen(["kepler", "sitnikov"])] == ["sitnikov", "kepler"]
-    assert chosen(None) == list(CONTESTS.values())
+def test_problems_are_chosen_in_the_order_of_declaration():
+    found = chosen(declared(), ["kepler", "sitnikov"])
+    assert [name_of(entry) for entry in found.entries()] == ["sitnikov", "kepler"]
+    assert chosen(declared(), []).cases() == declared().cases()
 
 
 def test_compile_times_are_measured_for_methods_that_exist():
-    for methods in METHODS.values():
+    assert OURS in METHODS
+    for family, methods in METHODS.items():
+        assert family in FAMILIES
         for template in methods:
             make_method(template.format(h=0.5))
-
-
-def test_samples_lie_one_in_each_part_of_the_span_and_end_at_its_end():
-    t = sample_times(0.0, 40.0, None)
-    assert t.size == SAMPLES
-    assert t[-1] == 40.0
-    assert np.array_equal(np.floor(t[:-1] * SAMPLES / 40.0), np.arange(SAMPLES - 1))
-
-
-def test_samples_of_a_fixed_step_are_own_steps():
-    t = sample_times(1.0, 11.0, 0.375)
-    steps = (t - 1.0) / 0.375
-    assert np.array_equal(steps, np.rint(steps))
-    assert t[0] > 1.0
-    assert t[-1] <= 11.0
-    assert np.all(np.diff(t) > 0)
