@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -26,6 +27,7 @@ from problems.trace.graph import FUNCTIONS, reachable
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
+LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
 SLOW = 10  # operations that take as long to compile as one of:
 _SLOW = {*FUNCTIONS, "atan2", "table"} - {"sqrt", "abs", "sign"}
 _NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
@@ -202,10 +204,17 @@ def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
     """
     if isinstance(system, Foreign) and what == "field":
         return system.evaluate
-    compilable(system, what)
+    cost = compilable(system, what)
     made = source(system, what, "numba", limit=limit)
     key = ("numba", made.sha256)
     if key not in _compiled:
+        if cost >= LONG:
+            warnings.warn(
+                f"the {_name(what)} of {system.name} is {cost:,} operations written out, compiled "
+                f"for about {cost / PER_SECOND:.0f} s; write sums as m.sum(lambda i: q[i]**2, range(n)), "
+                "which takes about one.",
+                stacklevel=2,
+            )
         cut = made.text.index(f"def {made.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
         text = _NUMBA_HEAD + made.text[:cut] + "\n" + decorator + made.text[cut:]
@@ -213,8 +222,10 @@ def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
     return _compiled[key]
 
 
-def compilable(system: System, what: str | Jacobian) -> None:
-    """Refuse a function that would be compiled for minutes; see `problems.limits`.
+def compilable(system: System, what: str | Jacobian) -> int:
+    """Return the operations of a function; refuse one that would be compiled for minutes.
+
+    See `problems.limits`. Operations in a loop count once; a sine or an exponential as `SLOW`.
 
     Raises
     ------
@@ -229,6 +240,7 @@ def compilable(system: System, what: str | Jacobian) -> None:
     for node in nodes:  # arguments come first
         depth[node.id] = 1 + max((depth[arg.id] for arg in node.args), default=0)
     limits.check(name, "DEPTH", max(depth.values(), default=0), "nest fewer, or write long sums with m.sum")
+    return cost
 
 
 def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Callable[..., Any]:

@@ -3,6 +3,8 @@
 Seconds are on a page of their own, `hbvm-bench gallery docs --compile-times`.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,17 @@ def test_large_fields_are_loops_that_compile_and_agree_with_numpy(name, argument
     expected = emit.numpy(problem.system, "field")(0.0, problem.y0, problem.par)
     size = np.abs(expected).max()
     assert np.abs(out - expected).max() <= 4e-16 * size  # measured 0 but for the exponentials of toda
+
+
+def test_a_long_sum_that_is_written_out_is_told():
+    def energy(q, p):
+        return sum(x**2 / 2 for x in p) + sum((a - b) ** 4 for a, b in pairwise(q))
+
+    system = problems.Hamiltonian(energy, dof=700)
+    with pytest.warns(UserWarning, match=r"4,197 operations written out.*m\.sum") as told:
+        # Told before anything is compiled.
+        emit.numba(system, "field")
+    assert len(told) == 1
 
 
 def test_the_code_of_a_large_system_does_not_grow_with_it():
