@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from integrators import registry
 from integrators.integrate import integrate
+from integrators.many import Solutions, integrate_many
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.solution import Solution, load
 from integrators.watch import Progress
@@ -27,9 +28,11 @@ __all__ = [
     "Progress",
     "Samples",
     "Solution",
+    "Solutions",
     "Stats",
     "Status",
     "integrate",
+    "integrate_many",
     "load",
     "registry",
 ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from integrators.caveats import blind, unseen
-from integrators.hbvm import HBVM, Solver
+from integrators.hbvm import HBVM, Solver, landings
 from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -108,9 +108,11 @@ class Gauss(MethodBase):
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
+            control: dict[str, Any] = self.as_hbvm().control()
+            control["breakpoints"] = landings(system, self.breakpoints)
             return AdaptiveProgram(
                 system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,
-                **self.as_hbvm().control(),
+                **control,
             )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 

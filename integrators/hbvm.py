@@ -1,11 +1,13 @@
 """Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.caveats import blind, unseen
 from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
+from problems.analysis.structure import breakpoints
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -65,13 +67,13 @@ class HBVM(MethodBase):
     between them - a pulse in time, or a narrow bump of the force, that is shorter than the
     step - is stepped over, and the run ends as finished: no estimate can tell. Where the
     field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
-    the field that nodes do see, such as those of ``m.abs``, are found, and steps cut until
+    the field that nodes do see, such as those of ``m.abs`` and ``m.where``, are found, and steps cut until
     they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
     ``warnings`` say so. They are looked for in steps that vary (``tol``), that the
-    fixed-point iteration solves, and that have eight nodes, or four on a field with ``m.abs``;
+    fixed-point iteration solves, and that have eight nodes, or four on a field with these;
     with k = s (`Gauss`) and with a loose tolerance a weak kink can still cost more than the
     tolerance. They are not looked for with ``h``, with another solver, where ``"auto"`` goes
-    over to Newton, and on Poisson systems; of a field with ``m.abs``, ``warnings`` then say so
+    over to Newton, and on Poisson systems; of a field with these, ``warnings`` then say so
     (`test_own_steps`).
 
     These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
@@ -116,7 +118,8 @@ class HBVM(MethodBase):
         bumps that are shorter than the steps the estimate allows.
     breakpoints : sequence of float, optional
         Times at which the field jumps or has a kink, in any order; with ``tol``. A step ends at each
-        of them that is passed, and nothing from before it is used after it.
+        of them that is passed, and nothing from before it is used after it. The knots of ``m.table(t, ...)``
+        and the times c of ``m.where(t < c, ...)`` need not be given.
     max_steps : int, optional
         Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
         with the status ``max_steps``. By default any number.
@@ -218,11 +221,17 @@ class HBVM(MethodBase):
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
+            control: dict[str, Any] = self.control() | {"breakpoints": landings(system, self.breakpoints)}
             return AdaptiveProgram(
                 system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
-                **self.control(),
+                **control,
             )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None
         return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver, keep=keep)
+
+
+def landings(system: System, given: Sequence[float]) -> list[float]:
+    """Return the times that steps end at: those given, and those at which the formulas break."""
+    return sorted({*given, *breakpoints(system)})

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from integrators.caveats import unseen
 from integrators.hbvm import CITATION as BOOK
+from integrators.hbvm import landings
 from integrators.options import Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.checks import refusal
@@ -164,7 +165,10 @@ class LineIntegral(MethodBase):
 
         made: HBVMProgram | AdaptiveProgram
         if self.tol is not None:
-            made = AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
+            points = landings(system, ())
+            made = AdaptiveProgram(
+                system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants, breakpoints=points
+            )
         else:
             assert self.h is not None
             made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)

@@ -11,10 +11,11 @@ from integrators.protocol import MethodBase
 from problems.errors import InputError, shown
 from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
+from problems.systems.lagrangian import Lagrangian
 from problems.systems.poisson import Poisson
 from problems.systems.vector_field import VectorField
 
-_SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Poisson, VectorField)}
+_SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Lagrangian, Poisson, VectorField)}
 
 
 def packed(value: Any, arrays: dict[str, NDArray[Any]]) -> Any:

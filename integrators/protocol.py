@@ -437,7 +437,10 @@ def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: Syst
         raise InputError(f"Y0 must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
     n = rows.shape[0]
     limits.check(f"a batch of {n} trajectories", "GIB", 8 * times.size * rows.size / 2**30)
-    starts = np.array([check_state(row, system.dim) for row in rows])
+    if rows.shape[1] != system.dim or not np.isfinite(rows).all():
+        for row in rows:
+            check_state(row, system.dim)
+    starts = np.array(rows, order="C")
     given = None if par is None else as_numbers("par", par)
     if given is None or given.ndim == 1:
         return starts, np.tile(check_parameters(given, system), (n, 1))

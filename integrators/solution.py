@@ -175,8 +175,8 @@ class Solution:
 
     @property
     def v(self) -> Array | None:
-        """Velocities (n, dof) of a Hamiltonian problem with constant masses, else ``None``."""
-        return self.problem.velocity(self.y)
+        """Velocities (n, dof) of a Lagrangian, or a Hamiltonian with constant masses, else ``None``."""
+        return self.problem.velocity(self.y, self.t)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from problems.problem import Problem
 from problems.registry import load, names
 from problems.systems.base import Bodies, System
 from problems.systems.hamiltonian import Hamiltonian
+from problems.systems.lagrangian import Lagrangian
 from problems.systems.poisson import Poisson
 from problems.systems.untraced import Foreign
 from problems.systems.vector_field import VectorField
@@ -14,6 +15,7 @@ __all__ = [
     "Foreign",
     "Hamiltonian",
     "InputError",
+    "Lagrangian",
     "MissingLibraryError",
     "Poisson",
     "Problem",

@@ -29,7 +29,7 @@ class Problem:
         What moves.
     q0, p0, v0, y0 : array_like
         The start: positions with momenta or (for systems with H = sum c_i p_i^2/2
-        + V) with velocities v = c p; or the whole state ``y0``.
+        + V) with velocities v = c p, or those of a `problems.Lagrangian`; or the whole state ``y0``.
     parameters : mapping of str to float or sequence of float
         Values that differ from the system's defaults.
     t0, t_end : float
@@ -96,7 +96,7 @@ class Problem:
         if not isinstance(system, System):
             raise InputError(f"a Problem needs a Hamiltonian or a VectorField, not {shown(system)}.")
         par = system.pack(parameters)
-        state = _start(system, par, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
+        state = _start(system, par, t0, {"q0": q0, "p0": p0, "v0": v0, "y0": y0})
         if t0 == t_end:
             raise InputError(f"t_end={shown(t_end)} must differ from t0={shown(t0)}.")
         grid = None if times is None else _numbers("times", times, None)
@@ -210,12 +210,15 @@ class Problem:
         """Return the symmetry guards, shape (n,) each; 0 where the symmetry is kept."""
         return invariants.guards(self.system, self.par, y, t)
 
-    def velocity(self, y: ArrayLike) -> Array | None:
-        """Return the velocities c_i p_i, shape (n, dof); ``None`` for systems without such c."""
-        return invariants.velocity(self.system, self.par, y)
+    def velocity(self, y: ArrayLike, t: ArrayLike | None = None) -> Array | None:
+        """Return the velocities, shape (n, dof): c_i p_i, or those of a `problems.Lagrangian`; else ``None``.
+
+        ``t``, shape (n,), is needed where the kinetic energy of a Lagrangian depends on time.
+        """
+        return invariants.velocity(self.system, self.par, y, t)
 
 
-def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) -> Array:
+def _start(system: System, par: Array, t0: float, given: Mapping[str, ArrayLike | None]) -> Array:
     names = tuple(name for name, value in given.items() if value is not None)
     if names == ("y0",):
         return _numbers("y0", given["y0"], system.dim)
@@ -229,7 +232,7 @@ def _start(system: System, par: Array, given: Mapping[str, ArrayLike | None]) ->
     if "p0" in names:
         return np.concatenate([q, _numbers("p0", given["p0"], system.dof)])
     v = _numbers("v0", given["v0"], system.dof)
-    return np.concatenate([q, invariants.momentum(system, par, v)])
+    return np.concatenate([q, invariants.momentum(system, par, t0, q, v)])
 
 
 def _listed(names: Sequence[str]) -> str:

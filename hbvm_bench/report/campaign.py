@@ -217,10 +217,10 @@ def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequenc
         if run.missing
     ]
     if len(parts) == 1:
-        blocks.append(Items(parts[0].summary, "cards"))
+        blocks += parts[0].summary
     elif len(parts) <= FEW:
         blocks += [
-            Section(one.ranked.title, [Items(one.summary, "cards")], f"summary-{i}", code=one.ranked.problem)
+            Section(one.ranked.title, one.summary, f"summary-{i}", code=one.ranked.problem)
             for i, one in enumerate(parts, 1)
         ]
     else:

@@ -1,6 +1,7 @@
 """What every report is made of: blocks, which `markdown` and `html` print, each in its way.
 
-A text is a ``str``. What stands between backquotes in it is code; nothing else in it means anything.
+A text is a ``str``. What stands between two single backquotes in it is code; nothing else in it means
+anything.
 A report is a `Document`, a paragraph of it is a text, and everything else is one of the blocks below, a
 `Table` or a `Picture`. A picture is described once, where it is drawn: its title, caption and numbers.
 """
@@ -264,7 +265,7 @@ def attempt(*makers: Maker) -> list[Block]:
 
 def pieces(text: object) -> list[tuple[str, bool]]:
     """Return a text on one line in pieces, each with whether it is code."""
-    split = re.split(r"`([^`]+)`", " ".join(str(text).split()))
+    split = re.split(r"(?<!`)`([^`]+)`(?!`)", " ".join(str(text).split()))
     return [(piece, i % 2 == 1) for i, piece in enumerate(split) if piece]
 
 

@@ -33,11 +33,11 @@ MOST_DRAWN = 32  # cases in a figure of a large report
 
 @dataclass(frozen=True)
 class ProblemPart:
-    """What a report says on one problem: its rows and sentences, and a section of its own."""
+    """What a report says on one problem: its rows, its summary, and a section of its own."""
 
     problem: Problem
     ranked: Ranked
-    summary: list[str]
+    summary: list[Block]
     section: Section
 
 
@@ -83,19 +83,25 @@ def part(
         for key in GROUPS
         if (members := [row for row in table if row.group == key])
     ]
-    summary = [*words.summary(records), *([words.WITNESSES] if ensemble is not None else [])]
+    witnesses = [words.WITNESSES] if ensemble is not None else []
+    summary = attempt(
+        (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
+    )
     title = f"{problem.title}{at_once(ensemble)}"
     unrun = Details(
         f"{len(missing)} cases on this problem have no result yet",
         [Items([f"`{case.method}`" for case in missing])],
     )
-    truth = _truth(problem, known)
     blocks: list[Block] = [
-        *([Items(summary, "cards")] if summarized else []),
-        *([Items(truth)] if truth else []),
+        *(summary if summarized else []),
+        *attempt((f"the reference of {text}", lambda: _truth(problem, known))),
         *([unrun] if missing else []),
         *_figures(problem, drawn, known, number, brief=brief),
-        Section("What our own methods do wrong", [Items(words.shortcomings(records))], f"wrong-{number}"),
+        Section(
+            "What our own methods do wrong",
+            attempt((f"our shortcomings on {text}", lambda: Items(words.shortcomings(records)))),
+            f"wrong-{number}",
+        ),
     ]
     section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
     return ProblemPart(problem, Ranked(title, repr(problem), groups), summary, section)
@@ -257,10 +263,10 @@ def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
     return (series["t"], series[names[0]]) if names else None
 
 
-def _truth(problem: Problem, known: Reference | None) -> list[str]:
+def _truth(problem: Problem, known: Reference | None) -> Items | None:
     """Return what is known of the trusted solution, as far as the table's readers want it."""
     if known is None:
-        return []
+        return None
     made = known.provenance
     said = [f"Reference: {made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"]
     floor = problem.errors(known.high, known.t)
@@ -276,4 +282,4 @@ def _truth(problem: Problem, known: Reference | None) -> list[str]:
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
         z = known.high[-1, PLANETOID_Z]
         said.insert(0, f"Reference value of z at t = {problem.t_end:g}: {z:.16g}")
-    return said
+    return Items(said)

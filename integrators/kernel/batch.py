@@ -1,11 +1,12 @@
 """Many trajectories of one system: starts and parameters differ, times do not.
 
-A trajectory of a small system spends its time waiting for its own square roots
-and divisions. A few trajectories taken through their steps together fill that
-time; each sees exactly the operations that it would see alone.
+They go in lanes, one in each lane of the vector unit (`integrators.kernel.ensemble`), and
+one by one where that cannot be: with steps of varying length, an implicit solver, more than
+sixteen stages, a field that does not run on lanes. One whose equations the iteration does
+not solve leaves its lane and goes by itself, from its start.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,19 +16,21 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel.context import ALWAYS_IMPLICIT, DENSE, DONE, LAND, SIDE, Context, Shape
-from integrators.kernel.native import engine
+from integrators.kernel.ensemble.engine import run
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.prepared import Lanes
 from integrators.kernel.pace import Pace
-from integrators.kernel.step.engine import steps
-from integrators.kernel.stepper import HBVMStepper, Program, failure
+from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
 from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
 from integrators.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown
+from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
-SAMPLINGS = {"side": SIDE, "land": LAND, "dense": DENSE}
+JOBS = 8  # for each thread, at least, where there are so many groups: for even loads
+SAMPLINGS = ("side", "land", "dense")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,23 +47,14 @@ class Batch(Trajectories):
     evaluations: Counts
 
 
-class BatchProgram(Program, Protocol):
+class BatchProgram(Protocol):
     """What a batch asks of its program."""
 
-    varying: bool
-    shape: Shape
+    system: System
+    h: float
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
-
-
-def members_for(rows: int, route: int) -> int:
-    """Return how many trajectories to take through their steps together.
-
-    Two, where a sweep over eight stages of a few components waits more than it
-    works (Kepler: 25 ns alone, 15 ns in pairs); larger systems and sixteen
-    stages keep the processor busy by themselves.
-    """
-    return 2 if route == 8 and rows <= 6 else 1
+    def in_lanes(self) -> Lanes | None: ...
 
 
 def prepare_batch(
@@ -78,100 +72,64 @@ def prepare_batch(
     threads = checked("a batch", "threads", threads, Count)
     grid = check_times(times, t0)
     starts, parameters = check_batch(Y0, par, grid, program.system)
-    h = -program.h if grid[-1] < t0 else program.h
-    bases = np.full(grid.size, t0)
-    if sample == "land":
-        bases[1:] = grid[:-1]
     n, dim = starts.shape
     counts = [np.zeros(n, dtype=np.int64) for _ in range(3)]
     result = Batch(
         grid, np.full((n, grid.size, dim), np.nan),
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
-    work = _Work(program, result, starts, parameters, t0, h, sample or "side", *plan(grid, bases, h))
-    return partial(_done, work, threads)
-
-
-def _done(work: "_Work", threads: int) -> Batch:
-    program, result = work.program, work.result
-    n = len(result.status)
-    if program.varying or program.solver.strategy == ALWAYS_IMPLICIT:
-        work.share(work.alone, range(n), threads)
-        return result
-    size = min(n, members_for(program.shape.rows, program.constants.route))
-    groups = [range(first, min(first + size, n)) for first in range(0, n, size)]
-    threads = min(threads, len(groups))
-    work.share(work.run, [groups[i::threads] for i in range(threads)], threads)
-    return result
+    work = _Work(program, result, starts, parameters, t0, sample or "side", threads)
+    lanes = program.in_lanes() if work.sample == "side" else None
+    return work.all_alone if lanes is None else partial(work.run, _InLanes.of(lanes, work))
 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """A batch under way; groups of its trajectories may run on several threads."""
+    """A batch under way; its trajectories may run on several threads."""
 
     program: BatchProgram
     result: Batch
     starts: Array
     parameters: Array
     t0: float
-    h: float
     sample: str
-    targets: Counts
-    parts: Array
+    threads: int
     stop: Event = field(default_factory=Event)
 
-    def share(self, do: Callable[[Any], None], jobs: Iterable[Any], threads: int) -> None:
+    def run(self, lanes: "_InLanes") -> Batch:
+        """Integrate all trajectories in lanes, and those that leave one by one."""
+        n, result = len(self.starts), self.result
+        width = lanes.lanes.width
+        size = max(1, n // (width * JOBS * self.threads)) * width
+        self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)])
+        stayed = lanes.arrived == 1
+        result.steps[stayed] = lanes.steps
+        result.iterations[stayed] = lanes.sweeps[stayed]
+        result.evaluations[stayed] = lanes.lanes.k * lanes.sweeps[stayed]
+        self.share(self.alone, np.flatnonzero(~stayed).tolist())
+        return result
+
+    def all_alone(self) -> Batch:
+        """Integrate all trajectories one by one."""
+        self.share(self.alone, list(range(len(self.starts))))
+        return self.result
+
+    def share(self, do: Callable[[Any], None], jobs: list[Any]) -> None:
         """Do all jobs, on several threads or in this one; Ctrl-C stops the threads' work too."""
-        if threads == 1:
+        if self.threads == 1:
             for job in jobs:
                 do(job)
             return
-        with ThreadPoolExecutor(threads) as pool:
+        with ThreadPoolExecutor(self.threads) as pool:
             waiting = [pool.submit(do, job) for job in jobs]
             try:
-                for done in waiting:
-                    done.result()
+                for made in waiting:
+                    made.result()
             except BaseException:
                 self.stop.set()
-                for done in waiting:
-                    done.cancel()
+                for made in waiting:
+                    made.cancel()
                 raise
-
-    def run(self, groups: list[range]) -> None:
-        """Integrate groups of trajectories one after another, in memory of their own."""
-        if not groups:
-            return
-        program, size = self.program, len(groups[0])
-        pairs = [program.contexts() for _ in range(size)]
-        for own, _ in pairs:
-            own.point(program.scaled(self.h))
-        addresses = np.array([[context.address for context in pair] for pair in pairs])
-        y, times = self.result.y, self.result.t
-        pace = Pace(CHUNK, self.starts.shape[1])
-        for group in groups:
-            here = addresses[: len(group)].T.copy()
-            for pair, i in zip(pairs, group, strict=False):
-                program.load(pair, self.starts[i], self.parameters[i], self.t0)
-                self._reset(pair[0], self.starts[i])
-            made, broken = 0, False
-            while made < times.size:
-                try:
-                    with pace:
-                        made = steps(
-                            engine.ADVANCE_BATCH, here.ctypes.data, len(group), SAMPLINGS[self.sample],
-                            times.size, times.ctypes.data, self.targets.ctypes.data, self.parts.ctypes.data,
-                            made, y[group[0] :].ctypes.data, pace.steps,
-                        )  # fmt: skip
-                except UserError:  # of which of them is not known: each by itself
-                    broken = True
-                    break
-                if self.stop.is_set():
-                    return
-            for pair, i in zip(pairs, group, strict=False):
-                if broken or pair[0].wanted:
-                    self.alone(i)
-                else:
-                    self._report(i, pair)
 
     def alone(self, i: int) -> None:
         """Integrate one trajectory by a stepper: its steps are its own, or its implicit solver."""
@@ -191,20 +149,65 @@ class _Work:
         result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
         result.evaluations[i] = stats.evaluations or 0
 
-    def _reset(self, context: Context, start: Array) -> None:
-        context.steps = context.iterations = context.evaluations = context.restarts = context.partial = 0
-        context.strategy = self.program.solver.strategy
-        context.wanted = context.slow = 0
-        context.t0, context.h = self.t0, self.h
-        steps(engine.RESET, context.address, out=start.ctypes.data)
 
-    def _report(self, i: int, pair: tuple[Context, Context]) -> None:
-        result, ctx = self.result, pair[0]
-        result.steps[i] = ctx.steps
-        result.iterations[i] = ctx.iterations
-        result.evaluations[i] = ctx.evaluations
-        if ctx.outcome != DONE:
-            t = ctx.t0 + ctx.n * ctx.h
-            result.y[i, ctx.made :] = np.nan
-            result.t_stop[i] = t
-            result.status[i], result.reason[i] = failure(ctx.outcome, self.program, pair, t)
+@dataclass(frozen=True, eq=False)
+class _InLanes:
+    """What a batch needs to go in lanes."""
+
+    lanes: Lanes
+    work: _Work
+    h: float
+    numbers: dict[str, int]
+    arrays: dict[str, Any]
+    spare: list[tuple[Group, Group]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, lanes: Lanes, work: _Work) -> "_InLanes":
+        """Plan the steps to the samples; allocate."""
+        result, t0 = work.result, work.t0
+        h = -work.program.h if result.t[-1] < t0 else work.program.h
+        targets, parts = plan(result.t, np.full(result.t.size, t0), h)
+        n = len(work.starts)
+        arrays = {
+            "starts": work.starts, "all_par": work.parameters,
+            "all_velocity": lanes.velocities(work.parameters),
+            "times": np.ascontiguousarray(result.t), "targets": targets, "out": result.y,
+            **lanes.parts(parts, h),
+            "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
+        }  # fmt: skip
+        made = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)
+        made.spare.append(made._memory())
+        return made
+
+    def _memory(self) -> tuple[Group, Group]:
+        return self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
+
+    @property
+    def steps(self) -> int:
+        """Own steps of every trajectory."""
+        return int(self.arrays["targets"].max(initial=0))
+
+    @property
+    def arrived(self) -> Counts:
+        """1 for trajectories that arrived, 0 for those that left."""
+        return self.arrays["arrived"]
+
+    @property
+    def sweeps(self) -> Counts:
+        """Sweeps in which each took part."""
+        return self.arrays["all_sweeps"]
+
+    def run(self, members: range) -> None:
+        """Integrate some trajectories, group by group."""
+        try:
+            memory = self.spare.pop()
+        except IndexError:  # another thread has it
+            memory = self._memory()
+        group, side = memory
+        group.at, group.end, group.sample = members.start, members.stop, -1
+        pace = Pace(CHUNK, self.work.starts.shape[1])
+        done = False
+        while not done and not self.work.stop.is_set():
+            with pace:
+                done = run(group.address, side.address, pace.steps) == 1
+        self.spare.append(memory)

@@ -192,8 +192,6 @@ class Context(Memory):
     tolerance = Real()
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
-    untested = Integer()  # iterations left before the first test, in a batch
-    alive = Integer()  # 1: takes part in a batch
     made = Integer()  # samples
     strategy = Integer()  # FIXED_POINT, AUTO, ALWAYS_IMPLICIT
     solver = Integer()  # address of the implicit solver, int64(context, memory, started); 0: not there yet
@@ -297,11 +295,15 @@ def blocks(system: System) -> tuple[Integers, Integers]:
     coordinates or momenta of one body, where the system says that it has bodies, so
     that a planetoid's tiny momentum is resolved, and else every component by itself.
     """
-    dim, dof = system.dim, system.dof
-    bodies = getattr(system, "bodies", None)
-    width = bodies.dimension if bodies is not None else 1
+    dim, dof, width = system.dim, system.dof, width_of_blocks(system)
     block = np.arange(dim) // width
     group = np.zeros(dim // width, dtype=np.int64)
     if dof is not None:
         group[dof // width :] = 1
     return block, group
+
+
+def width_of_blocks(system: System) -> int:
+    """Return how many components a block has: the coordinates of a body, or one."""
+    bodies = getattr(system, "bodies", None)
+    return bodies.dimension if bodies is not None else 1

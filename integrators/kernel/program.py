@@ -11,6 +11,7 @@ from integrators.caveats import sees_kinks
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
@@ -81,6 +82,8 @@ class HBVMProgram(Compiled):
 
     varying = False
     """Whether steps vary in length."""
+    threaded = True
+    """Whether `batch` takes threads."""
     _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
@@ -129,6 +132,7 @@ class HBVMProgram(Compiled):
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
         self.from_cache = all(made.from_cache for made in parts if made is not None)
         self._linearization: Linearization | None = None
+        self._in_lanes: tuple[Lanes | None] | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
         self.compile_seconds = binary.clock() - started
@@ -172,9 +176,11 @@ class HBVMProgram(Compiled):
         sample: str | None = None,
         threads: int = 1,
     ) -> Batch:
-        """Integrate many starts to the same times, several of them at once.
+        """Integrate many starts to the same times, one in each lane of the vector unit.
 
-        Each trajectory is bit for bit the one that ``start`` and ``advance`` give.
+        The numbers of a trajectory depend on nothing in the others, nor on their order or the
+        threads. They are those of ``start`` and ``advance`` up to rounding; bit for bit where
+        trajectories go one by one, see `integrators.kernel.batch`.
 
         Parameters
         ----------
@@ -203,6 +209,17 @@ class HBVMProgram(Compiled):
     ) -> Callable[[], Batch]:
         """Check and allocate all that `batch` needs; return what then does it, once."""
         return prepare_batch(self, Y0, par, times, check_start(t0))
+
+    def in_lanes(self) -> Lanes | None:
+        """Return the method on trajectories in lanes, compiled the first time; ``None`` where it has none."""
+        if self._in_lanes is None:
+            made, seconds = None, 0.0
+            if self.lanes and not self.kept and not self.varying and self.solver.strategy != ALWAYS_IMPLICIT:
+                made, seconds = lanes_of(self.system, self.constants, self.second, self.shape.unit)
+            self.compile_seconds += seconds
+            self.from_cache = self.from_cache and (made is None or made.from_cache)
+            self._in_lanes = (made,)
+        return self._in_lanes[0]
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""

@@ -211,9 +211,9 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         where no factor follows.
     """
     a = constants.arrays
-    high, low = _times(a["matrix"], a["matrix_low"], h)
+    high, low = times(a["matrix"], a["matrix_low"], h)
     if squared:
-        high, low = _times(high, low, h)
+        high, low = times(high, low, h)
     projection, modes = a["projection"], slice(MODES)
     beyond = a["beyond"][:, modes]
     if constants.route == THROUGH:
@@ -269,7 +269,8 @@ def _recurrence(modes: int) -> Array:
     )
 
 
-def _times(high: Array, low: Array, h: float) -> tuple[Array, Array]:
+def times(high: Array, low: Array, h: float) -> tuple[Array, Array]:
+    """Return (high + low) * h as a sum of two doubles."""
     product = DD(high, low) * h
     return product.hi, product.lo
 

@@ -263,7 +263,76 @@ def tan(a: DD) -> DD:
     return sine / cosine
 
 
+def sinh(a: DD) -> DD:
+    """Return the hyperbolic sine: its series near 0, where the exponentials cancel."""
+    up = exp(a)
+    near = np.abs(a.hi) < 0.5
+    small = where(near, a, DD(np.zeros_like(a.hi)))
+    series = small * _series(small * small, _inverse_factorials(1, 2, 13, False))
+    return where(near, series, (up - 1.0 / up) * 0.5)
+
+
+def cosh(a: DD) -> DD:
+    """Return the hyperbolic cosine."""
+    up = exp(a)
+    return (up + 1.0 / up) * 0.5
+
+
+def tanh(a: DD) -> DD:
+    """Return the hyperbolic tangent; 1 or -1 where that is all that 32 digits tell."""
+    far = np.abs(a.hi) > 40.0
+    small = where(far, DD(np.zeros_like(a.hi)), a)
+    return where(far, sign(a), sinh(small) / cosh(small))
+
+
+def atan2(y: DD, x: DD) -> DD:
+    """Return the angle of the point (x, y): that of the doubles, turned by the rest."""
+    start = np.arctan2(y.hi, x.hi)
+    sine, cosine = _sin_cos(DD(start))
+    # tan of the rest, which is as small as rounding.
+    rest = (y * cosine - x * sine) / (x * cosine + y * sine)
+    return where((y.hi == 0) & (x.hi == 0), DD(start), DD(start) + rest)
+
+
+def atan(a: DD) -> DD:
+    """Return the inverse tangent."""
+    return atan2(a, DD(np.ones_like(a.hi)))
+
+
+def asin(a: DD) -> DD:
+    """Return the inverse sine."""
+    return atan2(a, sqrt((1.0 - a) * (1.0 + a)))
+
+
+def acos(a: DD) -> DD:
+    """Return the inverse cosine."""
+    return atan2(sqrt((1.0 - a) * (1.0 + a)), a)
+
+
+def erf(a: DD) -> DD:
+    """Return the error function: 2/sqrt(pi) x e^(-x^2) times the sum of (2x^2)^n/(2n + 1)!!."""
+    far = ~(np.abs(a.hi) < 9.0)  # where it is 1 or -1 to 32 digits
+    x = where(far, DD(np.zeros_like(a.hi)), a)
+    square = x * x
+    term = DD(np.ones_like(x.hi))
+    total, n = term, 0
+    while (term.hi > 1e-34 * total.hi).any():
+        n += 1
+        term = term * square * 2.0 / float(2 * n + 1)
+        total = total + term
+    root = sqrt(_constant(_PI))
+    return where(far, sign(a) + 0.0 * a, x * exp(-square) * total * 2.0 / root)
+
+
 FUNCTIONS = {
+    "sinh": sinh,
+    "cosh": cosh,
+    "tanh": tanh,
+    "asin": asin,
+    "acos": acos,
+    "atan": atan,
+    "atan2": atan2,
+    "erf": erf,
     "sqrt": sqrt,
     "sin": sin,
     "cos": cos,

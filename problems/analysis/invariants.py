@@ -16,6 +16,7 @@ from problems.analysis.double_double import DD
 from problems.calculus.function import Function
 from problems.errors import InputError, shown
 from problems.systems.base import System
+from problems.systems.lagrangian import Lagrangian
 from problems.trace.graph import Loop, Node, T, reachable
 
 Array = NDArray[np.float64]
@@ -28,6 +29,7 @@ _OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
     "mul": operator.mul,
     "div": operator.truediv,
     "neg": operator.neg,
+    "where": lambda condition, a, b: double_double.where(condition.rounded() > 0.0, a, b),
 }
 
 
@@ -116,6 +118,8 @@ class _Interpreter:
         args = [known[arg.id] if arg.id in known else self.known[arg.id] for arg in node.args]
         if node.op == "pow":
             return args[0] ** node.data
+        if node.op == "table":
+            return node.data.at(args[0])
         return _OPERATIONS[node.op](*args)
 
     def _sum(self, node: Node, loop: Loop) -> DD:
@@ -196,17 +200,23 @@ def _scale(system: System, par: Array) -> list[DD]:
     return evaluate(system.function("velocity_scale"), 0.0, np.zeros((system.dim, 1)), par)
 
 
-def velocity(system: System, par: Array, y: ArrayLike) -> Array | None:
+def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> Array | None:
     """Return the velocities at states, see `problems.problem.Problem.velocity`."""
     states = _states(system, y)
+    if isinstance(system, Lagrangian):
+        return np.stack([value.rounded() for value in _along(system, par, "velocity", states, t)], axis=1)
     if not system.separable or system.dof is None:
         return None
     momenta = states[:, system.dof :]
     return np.stack([(c * momenta[:, i]).rounded() for i, c in enumerate(_scale(system, par))], axis=1)
 
 
-def momentum(system: System, par: Array, v: Array) -> Array:
-    """Return the momenta p = v/c of a separable system, each rounded once."""
+def momentum(system: System, par: Array, t: float, q: Array, v: Array) -> Array:
+    """Return the momenta p = v/c of a separable system, or dL/dv of a Lagrangian, each rounded once."""
+    if isinstance(system, Lagrangian):
+        state = np.concatenate([q, v])[:, np.newaxis]
+        found = evaluate(system.function("momentum"), t, state, par)
+        return np.array([float(p.rounded()[0]) for p in found])
     if not system.separable:
         raise InputError(f"v0= needs constant masses, which {system.name} does not have; give p0=.")
     scale = _scale(system, par)

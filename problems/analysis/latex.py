@@ -97,8 +97,17 @@ class _Printer:
                 return f"\\left|{self._at(node.args[0], _SUM)}\\right|", _LEAF
             case "sign":
                 return f"\\operatorname{{sign}}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
+            case "where":
+                condition, a, b = (self._at(arg, _SUM) for arg in node.args)
+                pieces = f"{a} & {condition} > 0 \\\\ {b} & \\text{{else}}"
+                return f"\\begin{{cases}} {pieces} \\end{{cases}}", _LEAF
+            case "atan2" | "erf" | "table":
+                inside = ", ".join(self._at(arg, _SUM) for arg in node.args)
+                return f"\\operatorname{{{node.op}}}\\left({inside}\\right)", _LEAF
             case _:
-                name = {"log": "ln"}.get(node.op, node.op)
+                name = {"log": "ln", "asin": "arcsin", "acos": "arccos", "atan": "arctan"}.get(
+                    node.op, node.op
+                )
                 return f"\\{name}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
 
     def _power(self, base: Node, exponent: int) -> str:

@@ -22,13 +22,14 @@ from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
 from problems.systems.code_digest import code_digest
 from problems.systems.untraced import Foreign
-from problems.trace.graph import reachable
+from problems.trace.graph import FUNCTIONS, reachable
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
 SLOW = 10  # operations that take as long to compile as one of:
-_SLOW = ("sin", "cos", "tan", "exp", "log")
+_SLOW = {*FUNCTIONS, "atan2", "table"} - {"sqrt", "abs", "sign"}
 _NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
+from math import acos, asin, atan, atan2, cosh, erf, sinh, tanh
 
 import numba
 import numpy as np
@@ -169,7 +170,7 @@ def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
 def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
     key = ("numpy", made.sha256)
     if key not in _compiled:
-        inner = _executed(made, {"np": np})
+        inner = _executed(made, {"np": np, "erf": _erf})
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
             y = np.asarray(y, dtype=np.float64)
@@ -184,6 +185,12 @@ def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
         evaluate.__name__ = made.name
         _compiled[key] = evaluate
     return _compiled[key]
+
+
+def _erf(x: Any) -> Any:
+    from scipy.special import erf  # which takes its time to be imported
+
+    return erf(x)
 
 
 def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Any:
@@ -243,7 +250,7 @@ def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> C
     made = source(system, what, "jax", limit=limit)
     key = ("jax", made.sha256)
     if key not in _compiled:
-        _compiled[key] = _executed(made, {"np": np, "jnp": jnp})
+        _compiled[key] = _executed(made, {"np": np, "jnp": jnp, "erf": library.scipy.special.erf})
     return _compiled[key]
 
 

@@ -14,7 +14,14 @@ class _ArrayPrinter(Printer):
 
     def __init__(self, plan: Plan, library: str) -> None:
         named = {name: f"{library}.{name}" for name in FUNCTIONS}
-        super().__init__(plan, named | {"sign": library + ".copysign(1.0, {})"})
+        named |= {"sign": library + ".copysign(1.0, {})", "erf": "erf({})"}
+        named |= {"atan2": library + ".atan2({}, {})", "where": library + ".where({} > 0.0, {}, {})"}
+        super().__init__(plan, named)
+        self._library = library
+
+    def find(self, place: str, knots: str, x: str, n: int) -> None:
+        found = f'{self._library}.searchsorted({knots}, {x}, side="right") - 1'
+        self.line(f"{place} = {self._library}.clip({found}, 0, {n - 1})")
 
     def _table(self, values: np.ndarray) -> str:
         return self.table(f"np.array({values.tolist()})")
@@ -104,6 +111,9 @@ class _JaxPrinter(_ArrayPrinter):
     def __init__(self, plan: Plan) -> None:
         super().__init__(plan, "jnp")
         self.outputs: dict[int, str] = {}
+
+    def array(self, name: str) -> str:
+        return f"jnp.asarray({name})"
 
     def store(self, place: int, value: str) -> None:
         if self.plan.scatters:

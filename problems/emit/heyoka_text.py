@@ -4,11 +4,14 @@ from collections.abc import Callable
 
 from problems.emit.plan import Plan
 from problems.emit.printer import Printer
+from problems.errors import InputError
 from problems.trace.graph import FUNCTIONS, Affine, Node
 
 _FUNCTIONS = {name: f"hy.{name}" for name in FUNCTIONS} | {
     "abs": "(hy.relu({0}) + hy.relu(-({0})))",
     "sign": "(hy.relup({0}) - hy.relup(-({0})))",
+    "atan2": "hy.atan2({}, {})",
+    "where": "hy.select(hy.gt({}, 0.0), {}, {})",
 }
 
 
@@ -19,6 +22,12 @@ class _HeyokaPrinter(Printer):
             self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
         else:
             super().let(node, index)
+
+    def look_up(self, node: Node) -> None:
+        raise InputError(
+            "m.table is pieces of polynomials, of which a Taylor series sees one only; "
+            "use HBVM, Gauss or another method."
+        )
 
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")

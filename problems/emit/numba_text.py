@@ -10,6 +10,7 @@ from problems.emit.printer import Printer
 from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
 
 _FUNCTIONS = {name: name for name in FUNCTIONS} | {"abs": "fabs", "sign": "copysign(1.0, {})"}
+_FUNCTIONS |= {"atan2": "atan2({}, {})", "where": "({1} if {0} > 0.0 else {2})"}
 
 
 class _NumbaPrinter(Printer):
@@ -29,6 +30,19 @@ class _NumbaPrinter(Printer):
 
     def store(self, place: int, value: str) -> None:
         self.line(f"out[{place}] = {value}")
+
+    def find(self, place: str, knots: str, x: str, n: int) -> None:
+        for text in (
+            f"{place} = 0",
+            f"above = {n}",
+            f"while above - {place} > 1:",
+            f"    middle = ({place} + above) >> 1",
+            f"    if {knots}[middle] <= {x}:",
+            f"        {place} = middle",
+            "    else:",
+            "        above = middle",
+        ):
+            self.line(text)
 
     def reduce(self, node: Node, loop: Loop, body: Sequence[Node]) -> None:
         # By way of an output not yet in use: the sum is a lane where outputs are lanes.

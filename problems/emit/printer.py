@@ -87,12 +87,39 @@ class Printer:
             else:
                 assert index is not None
                 self.assign(node, f"{space}[{index(place)}]")
+        elif node.op == "table":
+            self.look_up(node)
         elif node.op != "const":
             text, level = self._operation(node)
             if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
                 self._pending[node.id] = (text, level)
             else:
                 self.assign(node, text)
+
+    def look_up(self, node: Node) -> None:
+        """Print the value of a table: the piece by its place, then Horner's scheme."""
+        table = node.data
+        knots, rows = (
+            self.array(self.table(f"np.array({list(values)!r})"))
+            for values in (table.knots, map(list, table.rows))
+        )
+        x = self.text(node.args[0])
+        place, rest = f"i{node.id}", f"d{node.id}"
+        self.line(f"{rest} = {x}")
+        self.find(place, knots, rest, len(table.rows))
+        self.line(f"{rest} = {rest} - {knots}[{place}]")
+        text = f"{rows}[{place}, 0]"
+        for power in range(1, len(table.rows[0])):
+            text = f"({text})*{rest} + {rows}[{place}, {power}]"
+        self.assign(node, text)
+
+    def array(self, name: str) -> str:
+        """Return the text of a table's array where it is indexed."""
+        return name
+
+    def find(self, place: str, knots: str, x: str, n: int) -> None:
+        """Print the search for the one of n pieces that x is in."""
+        raise NotImplementedError
 
     def waiting(self, node: Node) -> bool:
         """Whether a value's text waits for the one place that uses it."""
@@ -115,5 +142,8 @@ class Printer:
         if node.op == "neg":
             return "-" + self.text(node.args[0], _LEAF), _SUM
         name = self._functions[node.op]
-        text = self.text(node.args[0])
+        first, *others = node.args
+        if others:
+            return name.format(*(self.text(arg, _LEAF) for arg in node.args)), _LEAF
+        text = self.text(first)
         return (name.format(text) if "{" in name else f"{name}({text})"), _LEAF

@@ -20,7 +20,7 @@ from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
 
-_DECLARED = ("hamiltonian", "domain", "invariant", "guard")  # kinds of functions that users write
+_DECLARED = ("hamiltonian", "momentum", "domain", "invariant", "guard")  # kinds of functions that users write
 
 _COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
 

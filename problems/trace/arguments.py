@@ -5,10 +5,12 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NoReturn
 
+import numpy as np
+
 from problems import limits
 from problems.errors import InputError, shown, unknown
 from problems.trace import sums
-from problems.trace.graph import FUNCTIONS, PAR, Graph, Node, P, Q, T
+from problems.trace.graph import FUNCTIONS, PAR, Condition, Graph, Node, P, Q, T, Table
 from problems.trace.source_line import line_of_function, line_of_traceback, refuse
 
 # Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
@@ -147,11 +149,44 @@ class Mathematics:
             refuse("m.sum needs a term and an index list", "write m.sum(lambda i: q[i]**2, range(n))")
         return sums.declare(self._graph, term, index)
 
+    def atan2(self, y: Any, x: Any) -> Node:
+        """Return the angle of the point (x, y), from -pi to pi."""
+        return self._graph.atan2(self._graph.node(y), self._graph.node(x))
+
+    def where(self, condition: Any, a: Any, b: Any) -> Node:
+        """Return ``a`` where a comparison such as ``q[0] > 1`` holds, else ``b``; ``& | ~`` join them."""
+        a, b = self._graph.node(a), self._graph.node(b)
+        if isinstance(condition, bool):
+            return a if condition else b
+        if not isinstance(condition, Condition):
+            refuse(
+                f"m.where chooses by {shown(condition)}", "compare with < or >, as in m.where(q[0] > 1, a, b)"
+            )
+        return condition.choose(a, b)
+
+    def table(self, x: Any, xs: Any, ys: Any) -> Node:
+        """Return the cubic spline through points, at ``x``; as SciPy's ``CubicSpline(xs, ys)``."""
+        from scipy.interpolate import CubicSpline  # for those who have tables
+
+        try:
+            xs, ys = (np.asarray(values, dtype=np.float64) for values in (xs, ys))
+            if xs.ndim != 1 or ys.ndim != 1:
+                raise ValueError("they are no flat lists")
+            spline = CubicSpline(xs, ys)
+        except (TypeError, ValueError) as error:
+            refuse(
+                f"m.table cannot use these points ({error})",
+                "give as many finite ys as ascending xs, flat lists",
+            )
+        return self._graph.table(
+            self._graph.node(x), Table(tuple(spline.x.tolist()), tuple(map(tuple, spline.c.T.tolist())))
+        )
+
     def __getattr__(self, name: str) -> Callable[[Any], Node]:
         if name.startswith("__"):
             raise AttributeError(name)
         if name not in _PUBLIC:
-            known = [f"m.{function}" for function in (*_PUBLIC, "sum", "pi")]
+            known = [f"m.{function}" for function in (*_PUBLIC, *_OTHERS)]
             refuse(str(unknown("function", f"m.{name}", known)).rstrip("."), "write it with these functions")
 
         def function(x: Any) -> Node:
@@ -162,6 +197,7 @@ class Mathematics:
 
 
 _PUBLIC = tuple(name for name in FUNCTIONS if name != "sign")
+_OTHERS = ("atan2", "where", "table", "sum", "pi")
 
 
 def call(
@@ -171,6 +207,7 @@ def call(
     dim: int,
     layout: Layout,
     what: str,
+    second: str = "p",
 ) -> Any:
     """Run a user's function on symbols, with the arguments that it names.
 
@@ -186,6 +223,8 @@ def call(
         Offset and length of each parameter in ``par``.
     what : str
         What the function is, for messages: ``"H"``, ``"invariant 'L'"``.
+    second : {"p", "v"}
+        What the second half of the state is called: momenta, or velocities in a Lagrangian.
 
     Raises
     ------
@@ -203,7 +242,9 @@ def call(
     if graph.dof is not None:
         dof = graph.dof
         offered["q"] = lambda: Vector(graph, "q", "y", 0, dof)
-        offered["p"] = lambda: Vector(graph, "p", "y", dof, dof)
+        offered[second] = lambda: Vector(graph, second, "y", dof, dof)
+        if second != "p":
+            del offered["y"]
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
@@ -239,7 +280,7 @@ def call(
         raise
     except NameError as error:
         name = error.name or "?"
-        if name in _PUBLIC or name in ("sum", "pi", "math", "np", "numpy"):
+        if name in (*_PUBLIC, *_OTHERS, "math", "np", "numpy"):
             remedy = "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.sum, m.pi"
         elif name in layout:
             remedy = f"declare the argument par and write par.{name}"

@@ -40,6 +40,13 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "log": math.log,
     "abs": math.fabs,
     "sign": lambda x: math.copysign(1.0, x),
+    "sinh": math.sinh,
+    "cosh": math.cosh,
+    "tanh": math.tanh,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
+    "erf": math.erf,
 }
 """What a node may be of one argument, and its value at a constant."""
 
@@ -105,6 +112,74 @@ class Affine:
         return Affine(self.coefficients, self.offset + by)
 
 
+@dataclass(frozen=True)
+class Table:
+    """A piecewise polynomial of one argument; beyond its ends the outer pieces go on.
+
+    Attributes
+    ----------
+    knots : tuple of float
+        Ascending, n >= 2.
+    rows : tuple of tuple of float
+        The n - 1 pieces' coefficients in powers of ``x - knots[i]``, highest first.
+    """
+
+    knots: tuple[float, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+    def slope(self) -> "Table":
+        """Return the derivative."""
+        rows = tuple(
+            tuple((len(row) - 1 - i) * c for i, c in enumerate(row[:-1])) or (0.0,) for row in self.rows
+        )
+        return Table(self.knots, rows)
+
+    def at(self, x: Any) -> Any:
+        """Return the value at a number or an array of any kind, of doubles or of more digits."""
+        place = np.searchsorted(self.knots, getattr(x, "hi", x), side="right") - 1
+        place = np.clip(place, 0, len(self.rows) - 1)
+        rest = x - np.array(self.knots)[place]
+        first, *others = np.array(self.rows).T
+        value = first[place] + 0.0 * rest
+        for coefficient in others:
+            value = value * rest + coefficient[place]
+        return value
+
+
+class Condition:
+    """What a comparison of symbols is: not true or false, but what `m.where` chooses by.
+
+    Parameters
+    ----------
+    choose : callable
+        Returns the node of ``a`` where the condition holds, else ``b``.
+    """
+
+    __slots__ = ("choose",)
+
+    def __init__(self, choose: "Callable[[Node, Node], Node]"):
+        self.choose = choose
+
+    def __and__(self, other: "Condition") -> "Condition":
+        return Condition(lambda a, b: self.choose(other.choose(a, b), b))
+
+    def __or__(self, other: "Condition") -> "Condition":
+        return Condition(lambda a, b: self.choose(a, other.choose(a, b)))
+
+    def __invert__(self) -> "Condition":
+        return Condition(lambda a, b: self.choose(b, a))
+
+    def __bool__(self) -> NoReturn:
+        refuse(*_BRANCH)
+
+
+_BRANCH = (
+    "this compares or branches on a symbol",
+    "the function is run once, on symbols, so write one formula for all states "
+    "(m.abs(x) for the absolute value, m.where(x > 0, a, b) for two pieces)",
+)
+
+
 class Node:
     """One operation of a graph; what a user's function sees as a number.
 
@@ -116,12 +191,13 @@ class Node:
         Position in the graph; arguments always come before their users.
     op : str
         ``"const"``, ``"symbol"``, ``"index"``, ``"add"``, ``"sub"``, ``"mul"``, ``"div"``,
-        ``"neg"``, ``"pow"``, ``"sum"`` or one of `FUNCTIONS`.
+        ``"neg"``, ``"pow"``, ``"sum"``, ``"atan2"``, ``"where"`` (the second argument where the
+        first is above 0, else the third), ``"table"`` or one of `FUNCTIONS`.
     args : tuple of Node
         The arguments, in the user's order.
     data : Any
         The value of a constant; (space, index) of a symbol; the affine index of
-        ``"index"``; the exponent of ``"pow"``; the loop of ``"sum"``.
+        ``"index"``; the exponent of ``"pow"``; the loop of ``"sum"``; the `Table` of ``"table"``.
     flags : int
         What the node depends on, of `T`, `Q`, `P`, `PAR`.
     loop : Loop or None
@@ -197,13 +273,23 @@ class Node:
     # What a traced function cannot do. Comparisons refuse by themselves: `==` falling
     # back to identity would take one branch in silence.
     def _branch(self, *_: Any) -> NoReturn:
-        refuse(
-            "this compares or branches on a symbol",
-            "the function is run once, on symbols, so write one formula for all states "
-            "(m.abs(x) for the absolute value)",
-        )
+        refuse(*_BRANCH)
 
-    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _branch  # type: ignore[assignment]
+    __bool__ = __eq__ = __ne__ = _branch  # type: ignore[assignment]
+
+    def __gt__(self, other: Any) -> Condition:
+        difference = self.graph.sub(self, self.graph.node(other))
+        return Condition(lambda a, b: self.graph.where(difference, a, b))
+
+    def __lt__(self, other: Any) -> Condition:
+        difference = self.graph.sub(self.graph.node(other), self)
+        return Condition(lambda a, b: self.graph.where(difference, a, b))
+
+    def __ge__(self, other: Any) -> Condition:
+        return ~(self < other)
+
+    def __le__(self, other: Any) -> Condition:
+        return ~(self > other)
 
     def __hash__(self) -> int:
         return hash((id(self.graph), self.id))
@@ -211,7 +297,7 @@ class Node:
     def _number(self, *_: Any) -> NoReturn:
         refuse(
             "this needs the value of a symbol",
-            "declare the argument m and use m.sqrt, m.sin, m.cos, m.tan, m.exp, m.log, m.abs",
+            "declare the argument m and use m.sqrt, m.sin, m.cos, m.tan, m.exp, m.log, m.abs, m.where",
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
@@ -238,7 +324,7 @@ class Node:
         if binary is not None and method == "__call__" and len(inputs) == 2:
             return binary(self.graph.node(inputs[0]), self.graph.node(inputs[1]))
         name = ufunc.__name__
-        better = {"absolute": "abs"}.get(name, name)
+        better = {"absolute": "abs", "arcsin": "asin", "arccos": "acos", "arctan": "atan"}.get(name, name)
         remedy = f"use m.{better}" if better in FUNCTIONS else "write it with + - * / and the functions of m"
         return refuse(f"this applies numpy's {name} to a symbol", f"declare the argument m and {remedy}")
 
@@ -479,26 +565,46 @@ class Graph:
         if a.op == "const":
             try:
                 return self.node(FUNCTIONS[name](a.data))
-            except ValueError:
+            except (ValueError, OverflowError):
                 refuse(f"{name}({a.data!r}) is not defined", "keep to the function's domain")
         return self._intern(name, (a,))
+
+    def atan2(self, y: Node, x: Node) -> Node:
+        """Return the angle of the point (x, y)."""
+        if y.op == x.op == "const":
+            return self.node(math.atan2(y.data, x.data))
+        return self._intern("atan2", (y, x))
+
+    def where(self, condition: Node, a: Node, b: Node) -> Node:
+        """Return ``a`` where ``condition`` is above 0, else ``b``."""
+        if condition.op == "const":
+            return a if condition.data > 0.0 else b
+        return a if a is b else self._intern("where", (condition, a, b))
+
+    def table(self, x: Node, table: Table) -> Node:
+        """Return a piecewise polynomial of ``x``."""
+        if x.op == "const":
+            return self.node(float(table.at(x.data)))
+        return self._intern("table", (x,), table, key=("table", x.id, table))
 
     def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
         """Return the operation of ``node`` on other arguments."""
         match node.op:
-            case "add" | "sub" | "mul" | "div" | "neg":
+            case "add" | "sub" | "mul" | "div" | "neg" | "atan2" | "where":
                 return getattr(self, node.op)(*args)
             case "pow":
                 return self.int_power(args[0], node.data)
             case "sum":
                 return self.sum(args[0], node.data)
+            case "table":
+                return self.table(args[0], node.data)
             case "const" | "symbol" | "index":
                 return node
             case _:
                 return self.call(node.op, args[0])
 
 
-_ARITHMETIC = ("add", "sub", "mul", "div", "neg")
+_ARITHMETIC = ("add", "sub", "mul", "div", "neg", "atan2", "where")
 
 
 def _affine(plain: Sequence[Any]) -> Affine:
@@ -511,6 +617,7 @@ _OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
     "index": lambda data, _: _affine(data),
     "pow": lambda data, _: int(data),
     "sum": lambda data, loops: loops[data],
+    "table": lambda data, _: Table(tuple(map(float, data[0])), tuple(tuple(map(float, r)) for r in data[1])),
 }
 """What `Node.data` is, from what `_plain` returns."""
 
@@ -519,6 +626,8 @@ def _plain(data: Any) -> Any:
     match data:
         case Loop():
             return data.id
+        case Table():
+            return [list(data.knots), [list(row) for row in data.rows]]
         case Affine():
             return [list(data.coefficients), data.offset]
         case (space, place):
@@ -539,8 +648,8 @@ def _key(node: Node) -> Hashable:
             return "index", node.data, node.loop.id
         case "sum":
             return "sum", *args, node.data.id
-        case "pow":
-            return "pow", *args, node.data
+        case "pow" | "table":
+            return node.op, *args, node.data
         case "add" | "mul":
             return node.op, *sorted(args)
     return node.op, *args

@@ -10,6 +10,8 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "examples"
 
 SAYS = {
+    "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
+    "measured_forcing.py": ["steps that end at a knot: 40 of 40"],
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }

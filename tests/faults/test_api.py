@@ -233,6 +233,28 @@ integrate(F(lambda t, y: [huge, 1]), M1)                     | system returns
 integrators.order_of(3)                                      | 3 is no Runge-Kutta method whose coefficients
 integrators.stability(3, 1)                                  | 3 is no Runge-Kutta method whose coefficients
 integrate(P1, M1, times=np.broadcast_to(0., 10**10))         | HBVM_BENCH_MAX_GIB
+integrate_many(H1, M1, starts=[[0, 1]])                      | problem must be a Problem, not
+integrate_many(P1, 3, starts=[[0, 1]])                       | method must be a method such as HBVM(k=8,
+integrate_many(P1, M1)                                       | integrate_many needs starts=, an array (n, dim
+integrate_many(P1, M1, starts='a')                           | starts must be numbers, not 'a'
+integrate_many(P1, M1, starts=3)                             | starts must have shape (n, 2) with n >= 1, not
+integrate_many(P1, M1, starts=[0, 1])                        | starts must have shape (n, 2) with n >= 1, not
+integrate_many(P1, M1, starts=[])                            | starts must have shape (n, 2) with n >= 1, not
+integrate_many(P1, M1, starts=[[0, 1, 2]])                   | starts must have shape (n, 2) with n >= 1, not
+integrate_many(P1, M1, starts=[[0, nan]])                    | the initial state must be finite numbers;
+integrate_many(P1, M1, starts=[[0, 1]], times='a')           | times must be numbers, not 'a'
+integrate_many(P1, M1, starts=[[0, 1]], times=[1, 0])        | times must be strictly monotone and ahead of
+integrate_many(P1, M1, starts=[[0, 1]], threads=0)           | threads=0 of integrate_many must be a whole
+integrate_many(P1, M1, starts=[[0, 1]], progress=3)          | progress=3 must be True, False or a function
+integrate_many(P1, M1, starts=[[0, 1]], threads=1.5)         | threads=1.5 of integrate_many must be a whole
+integrate_many(P1, M1, starts=[[0, 1]], parameters={'b': 1}) | unknown parameter of
+integrate_many(P1, M1, starts=[[0, 1]], parameters=[1])      | parameters=[1] of integrate_many must be
+integrate_many(K1, M1, starts=[K1.y0], parameters={'mu': 'a'}) | values of parameter 'mu' must be numbers, not
+integrate_many(K1, M1, starts=[K1.y0], parameters={'nu': 1}) | unknown parameter of spring 'nu'; did you mean
+integrate_many(K1, M1, starts=[K1.y0], parameters={'mu': [1, 2]}) | parameter 'mu' has 2 values, and starts 1;
+integrate_many(K1, M1, parameters={'mu': [[1, 2]]})          | parameter 'mu' must have shape (n,), not (1, 2)
+integrate_many(K1, M1, starts=[K1.y0], parameters={'mu': [nan]}) | parameter 'mu' must be finite numbers; got
+integrate_many(K1, M1, starts=np.broadcast_to(K1.y0, (10**7, 2)), times=np.arange(200.)) | HBVM_BENCH_MAX_GIB
 """
 
 STATES = r"""

@@ -9,7 +9,7 @@ import numpy as np
 
 import integrators
 import problems
-from integrators import HBVM, Event, integrate, registry, section
+from integrators import HBVM, Event, integrate, integrate_many, registry, section
 from problems import Bodies, Foreign, Hamiltonian, Poisson, Problem, VectorField, emit, load
 
 from .fault import Fault
@@ -33,6 +33,9 @@ def osc(q: Any, p: Any) -> Any:
 def names() -> dict[str, Any]:
     """Return what the tables may use."""
     pendulum = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 - m.cos(q[0]), dof=1)
+    spring = Hamiltonian(
+        lambda q, p, par: p[0] ** 2 / 2 + par.mu * q[0] ** 2 / 2, dof=1, parameters={"mu": 1.0}, name="spring"
+    )
     return {
         **{name: registry.get(name) for name in registry.names()},
         "nan": math.nan,
@@ -46,6 +49,7 @@ def names() -> dict[str, Any]:
         "emit": emit,
         "Event": Event,
         "integrate": integrate,
+        "integrate_many": integrate_many,
         "section": section,
         "load": load,
         "Hamiltonian": Hamiltonian,
@@ -59,6 +63,7 @@ def names() -> dict[str, Any]:
         "osc": osc,
         "H1": pendulum,
         "V2": VectorField(lambda y: [y[1], -y[0]], dim=2),
+        "K1": Problem(spring, y0=[1.0, 0.0], t_end=1.0),
         "P1": Problem(pendulum, q0=[0.0], p0=[1.9], t_end=1.0),
         "M1": HBVM(k=4, s=2, h=0.1),
         "F": lambda f: Problem(Foreign(f, dim=2), y0=[1, 2], t_end=1.0),

@@ -83,16 +83,19 @@ def build_one_by_one(function: Any, lanes: int) -> bytes:
     return binary.build(*_one_by_one(function, lanes))
 
 
-def on_lanes(function: Any, lanes: int) -> tuple[Any, Arguments]:
-    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `binary.build`."""
+def on_lanes(function: Any, lanes: int, *, par: bool = False) -> tuple[Any, Arguments]:
+    """Return ``function(t, y, par, out)`` for numba, and its arguments on lanes for `binary.build`.
+
+    Parameters are the same in all lanes, or with ``par`` rows like the stages.
+    """
     from integrators.kernel.native.jit import compiled
     from integrators.kernel.simd import functions  # noqa: F401 -- gives sin, exp, ... a meaning on lanes
     from integrators.kernel.simd.lanes import Lanes
     from integrators.kernel.simd.views import DOUBLES, Rows
 
     stages = Rows(lanes)
-    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (DOUBLES, "ptr"), (stages, "ptr")]
-    return compiled(function), arguments
+    arguments = [(Lanes(lanes), f"<{lanes} x double>"), (stages, "ptr"), (stages if par else DOUBLES, "ptr")]
+    return compiled(function), [*arguments, (stages, "ptr")]
 
 
 def _one_by_one(function: Any, lanes: int) -> tuple[Any, Arguments]:

@@ -1,5 +1,6 @@
 """LLVM instructions on vectors of doubles, for whoever writes LLVM's text; numba is not needed."""
 
+import re
 from typing import Any
 
 from llvmlite import ir
@@ -93,3 +94,12 @@ def reduced(builder: Any, pick: Any, value: Any) -> Any:
 def largest_of(builder: Any, value: Any) -> Any:
     """Return the largest lane of a vector that is not negative; NaN if any lane is."""
     return reduced(builder, larger_of, value)
+
+
+def text_of(module: ir.Module) -> str:
+    """Return a module's text; vectors that its functions keep on the stack lie within one line of the cache.
+
+    llvmlite does not write ``attributes.alignstack`` where a function is defined.
+    """
+    aligned = rf'\1 alignstack({ALIGNMENT}) "stackrealign"'
+    return re.sub(r"(?m)^(define [^\n{]*\))$", aligned, str(module))

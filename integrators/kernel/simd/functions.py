@@ -18,8 +18,9 @@ from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
+from integrators.kernel.simd.emit import llvm_call
 from integrators.kernel.simd.lanes import Lanes, register
+from integrators.kernel.simd.values import Value
 
 # Adding 1.5 * 2^52 leaves the nearest whole number in the lowest bits.
 SHIFT = 6755399441055744.0
@@ -45,75 +46,7 @@ LOGARITHM = (
 )  # fmt: skip
 
 
-class _Value:
-    """A vector under construction, with the operators that formulas need."""
-
-    def __init__(self, builder: Any, value: Any):
-        self.builder, self.value = builder, value
-        self.count = value.type.count
-
-    def _of(self, other: "_Value | float") -> Any:
-        if isinstance(other, _Value):
-            return other.value
-        return ir.Constant(vector(self.count), [float(other)] * self.count)
-
-    def of(self, number: float) -> "_Value":
-        """Return the number in every lane."""
-        return self._make(self._of(number))
-
-    def _make(self, value: Any) -> "_Value":
-        return _Value(self.builder, value)
-
-    def __add__(self, other: "_Value | float") -> "_Value":
-        return self._make(self.builder.fadd(self.value, self._of(other)))
-
-    def __sub__(self, other: "_Value | float") -> "_Value":
-        return self._make(self.builder.fsub(self.value, self._of(other)))
-
-    def __rsub__(self, other: float) -> "_Value":
-        return self._make(self.builder.fsub(self._of(other), self.value))
-
-    def __mul__(self, other: "_Value | float") -> "_Value":
-        return self._make(self.builder.fmul(self.value, self._of(other)))
-
-    def __truediv__(self, other: "_Value | float") -> "_Value":
-        return self._make(self.builder.fdiv(self.value, self._of(other)))
-
-    def __neg__(self) -> "_Value":
-        return self._make(self.builder.fneg(self.value))
-
-    def fma(self, factor: "_Value | float", term: "_Value | float") -> "_Value":
-        """Return the value times a factor plus a term, rounded once."""
-        return self._make(llvm_call(self.builder, "fma", self.value, self._of(factor), self._of(term)))
-
-    def polynomial(self, coefficients: Any) -> "_Value":
-        """Horner's scheme, lowest coefficient first."""
-        result = self._make(self._of(coefficients[-1]))
-        for coefficient in reversed(coefficients[:-1]):
-            result = result.fma(self, coefficient)
-        return result
-
-    def where(self, condition: Any, other: "_Value | float") -> "_Value":
-        """Choose the value where the condition holds, else ``other``."""
-        return self._make(self.builder.select(condition, self.value, self._of(other)))
-
-    def compare(self, symbol: str, other: "_Value | float") -> Any:
-        return self.builder.fcmp_ordered(symbol, self.value, self._of(other))
-
-    def integers(self) -> Any:
-        return self.builder.bitcast(self.value, ir.VectorType(INTEGER, self.count))
-
-    def whole(self, number: int) -> Any:
-        return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)
-
-    def doubles(self, integers: Any) -> "_Value":
-        return self._make(self.builder.bitcast(integers, vector(self.count)))
-
-    def absolute(self) -> "_Value":
-        return self._make(llvm_call(self.builder, "fabs", self.value))
-
-
-def _sine_and_cosine(x: _Value) -> tuple[_Value, _Value, Any]:
+def _sine_and_cosine(x: Value) -> tuple[Value, Value, Any]:
     """Return sin and cos of x less the nearest multiple of pi/2, and that multiple as integers."""
     shifted = x.fma(2.0 / math.pi, SHIFT)
     n = -(shifted - SHIFT)
@@ -136,7 +69,7 @@ def _sine_and_cosine(x: _Value) -> tuple[_Value, _Value, Any]:
     return sine, cosine, shifted.integers()
 
 
-def _quarter(x: _Value, sine: _Value, cosine: _Value, quadrant: Any, first: int) -> _Value:
+def _quarter(x: Value, sine: Value, cosine: Value, quadrant: Any, first: int) -> Value:
     """Return sin (first = 0) or cos (first = 1) of x, from those of the reduced argument."""
     b = x.builder
     turned = b.add(quadrant, x.whole(first))
@@ -146,22 +79,22 @@ def _quarter(x: _Value, sine: _Value, cosine: _Value, quadrant: Any, first: int)
     return x.doubles(b.xor(size.integers(), sign))
 
 
-def _sin(x: _Value) -> _Value:
+def _sin(x: Value) -> Value:
     sine, cosine, quadrant = _sine_and_cosine(x)
     return _quarter(x, sine, cosine, quadrant, 0)
 
 
-def _cos(x: _Value) -> _Value:
+def _cos(x: Value) -> Value:
     sine, cosine, quadrant = _sine_and_cosine(x)
     return _quarter(x, sine, cosine, quadrant, 1)
 
 
-def _tan(x: _Value) -> _Value:
+def _tan(x: Value) -> Value:
     sine, cosine, quadrant = _sine_and_cosine(x)
     return _quarter(x, sine, cosine, quadrant, 0) / _quarter(x, sine, cosine, quadrant, 1)
 
 
-def _exp(x: _Value) -> _Value:
+def _exp(x: Value) -> Value:
     b = x.builder
     # Beyond these the result is 0 or infinite anyhow.
     y = x.of(-746.0).where(x.compare("<", -746.0), x)
@@ -180,7 +113,7 @@ def _exp(x: _Value) -> _Value:
     return value.where(x.compare("==", x), x)  # a NaN stays
 
 
-def _log(x: _Value) -> _Value:
+def _log(x: Value) -> Value:
     b = x.builder
     tiny = x.compare("<", 2.2250738585072014e-308)
     scaled = (x * 18014398509481984.0).where(tiny, x)  # 2^54
@@ -213,7 +146,7 @@ def _function(name: str, formula: Any, limit: float | None) -> Any:
             function = ir.Function(builder.module, ir.FunctionType(kind, [kind]), full)
             function.linkage = "linkonce_odr"
             inner = ir.IRBuilder(function.append_basic_block())
-            argument = _Value(inner, function.args[0])
+            argument = Value(inner, function.args[0])
             if limit is not None:
                 mask = inner.fcmp_unordered(">", argument.absolute().value, argument.of(limit).value)
                 bits: Any = inner.bitcast(mask, ir.IntType(kind.count))

@@ -236,3 +236,5 @@ call_line = _caller(2, types.int64)
 """``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
+call_steps = _caller(2)
+"""``call_steps(code, group, count)``: steps of a group of trajectories, see `integrators.kernel.ensemble`."""

@@ -1,10 +1,10 @@
 """What Python calls: the one C function of the steps."""
 
 from integrators.kernel.context import DONE
-from integrators.kernel.native.engine import ADVANCE, ADVANCE_BATCH, RESET
+from integrators.kernel.native.engine import ADVANCE, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
-from integrators.kernel.step.loop import advance, advance_batch, context, reset, walk
+from integrators.kernel.step.loop import advance, context, reset, walk
 
 
 @compiled
@@ -12,7 +12,6 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
     """Do what ``what`` names; all arguments are integers or addresses.
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
-    ADVANCE_BATCH: the same for ``side`` trajectories, whose addresses are at ``ctx``.
     WALK: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
@@ -21,6 +20,4 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
         return DONE
     if what == ADVANCE:
         return advance(context(ctx), context(side), between, count, t, n, p, first, y, budget)
-    if what == ADVANCE_BATCH:
-        return advance_batch(integers(ctx), side, between, count, t, n, p, first, y, budget)
     return walk(context(ctx), t, y, budget)

@@ -25,6 +25,7 @@ from integrators.kernel.simd.emit import (
     largest_of,
     llvm_call,
     splat,
+    text_of,
     vector,
 )
 from problems import emit
@@ -74,7 +75,6 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     field = ir.Function(module, status, inner)
     sweep = ir.Function(module, SWEEP, binary.ENTRY)
     context, count, tested = sweep.args
-    sweep.attributes.alignstack = ALIGNMENT
     b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
@@ -160,4 +160,4 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
                 top = larger_of(b, top, b.fmul(llvm_call(b, "fabs", moved), size))
         b.store(largest_of(b, top), b.bitcast(word(Context.change), pointer))
     b.ret_void()
-    return str(module)
+    return text_of(module)

@@ -1,17 +1,14 @@
-"""Whole trajectories: own steps to the times asked for, one by one or in step with others."""
+"""Whole trajectories: own steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, RUNNING, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.advance import step
-from integrators.kernel.step.begin import begin, set_factors
+from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length
-from integrators.kernel.step.finish import arrive, commit, finish
-from integrators.kernel.step.handover import reconsider
-from integrators.kernel.step.iterate import close, test
+from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
-from integrators.kernel.step.sweep import sweep, sweep_measured
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
 context = view(Context)
@@ -133,93 +130,7 @@ def reset(ctx, start):
     ctx.n = ctx.age = ctx.free = ctx.made = 0
     ctx.solved = UNSOLVED
     ctx.outcome = DONE
-    ctx.alive = 1
     arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)
         ctx.age = 0
-
-
-# --- several trajectories in step with each other -----------------------------------------------------
-
-
-@compiled
-def busy(ctx):
-    """Whether a trajectory of a batch has a step to solve."""
-    return ctx.alive == 1 and ctx.outcome == RUNNING
-
-
-@compiled
-def together(contexts, count):
-    """Take one step on each living trajectory, all of them at the same time; see `advance.step`.
-
-    One trajectory's field waits for its own square roots and divisions; the
-    others' work fills that time. Each sees the operations it would see alone.
-    """
-    most = 0
-    for m in range(count):
-        ctx = context(contexts[m])
-        if ctx.alive:
-            ctx.outcome = DONE
-            if ctx.solved == UNSOLVED:
-                begin(ctx)
-                ctx.untested = ctx.free if ctx.predicted else 0
-                most = max(most, ctx.untested)
-    for j in range(most):
-        for m in range(count):
-            ctx = context(contexts[m])
-            if busy(ctx) and j < ctx.untested:
-                sweep(ctx, 1)
-    running = True
-    while running:
-        running = False
-        for m in range(count):
-            ctx = context(contexts[m])
-            if busy(ctx):
-                test(ctx, sweep_measured(ctx))
-                running = running or ctx.outcome == RUNNING
-                if ctx.outcome != RUNNING:
-                    ctx.outcome = reconsider(ctx, close(ctx))
-    for m in range(count):
-        ctx = context(contexts[m])
-        if ctx.alive:
-            if ctx.outcome == DONE:
-                ctx.outcome = finish(ctx)
-            if ctx.outcome == DONE:
-                commit(ctx)
-            else:
-                ctx.alive = 0
-
-
-@compiled
-def advance_batch(contexts, members, between, count, times, targets, parts, first, out, budget):
-    """Make the samples from ``first`` on of all living members of a batch; see `advance`.
-
-    ``contexts`` holds the addresses of the members' contexts and then of those for
-    their partial steps; ``out`` (members, count, dim) doubles. A member that fails stops living,
-    with its outcome and its samples made; the others go on. One that needs the implicit solver stops
-    so as well, and wants it. Returns the sample that is next after ``budget`` steps, or ``count``.
-    """
-    dim = dimension(context(contexts[0]))
-    for i in range(first, count):
-        n, living = 0, False
-        for m in range(members):
-            ctx = context(contexts[m])
-            if ctx.alive:
-                ctx.made = i
-                n, living = ctx.n, True
-        if not living:
-            return count
-        for _ in range(n, targets[i]):
-            if budget == 0:
-                return i
-            budget -= 1
-            together(contexts, members)
-        for m in range(members):
-            ctx = context(contexts[m])
-            if ctx.alive:
-                side, place = context(contexts[members + m]), out + dim * (count * m + i)
-                ctx.outcome = sample(ctx, side, between, times[i], parts[i], place)
-                ctx.alive = 1 if ctx.outcome == DONE else 0
-                ctx.made = i + 1 if ctx.outcome == DONE else i
-    return count

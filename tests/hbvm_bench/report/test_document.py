@@ -130,6 +130,7 @@ def test_code_is_what_stands_between_backquotes_and_a_lone_one_is_itself():
     assert markdown.words("a `b*` c*") == "a `b*` c\\*"
     assert html.words("a `b<` c<") == "a <code>b&lt;</code> c&lt;"
     assert markdown.words("`") == "\\`"
+    assert pieces("a ``` b ``` c") == [("a ``` b ``` c", False)]  # a fence in somebody's text is none
 
 
 def test_powers_of_ten_are_set_as_powers_and_code_is_left_alone():
@@ -183,6 +184,8 @@ def test_a_figure_of_a_campaign_that_fails_loses_no_other(tmp_path, monkeypatch)
     made = document(store)
     assert [part.title for part in made.failed] == ["Drift of the energy, pendulum(q=0.0, p=1.0)"]
     assert [p.key for p in made.pictures] == [p.key for p in whole.pictures if p.key != "drift"]
+    monkeypatch.setattr("hbvm_bench.report.words.summary", lambda records: broken())
+    assert "the summary of pendulum(q=0.0, p=1.0)" in [part.title for part in document(store).failed]
 
 
 def stored_document(name: str) -> Document:

@@ -156,7 +156,7 @@ def test_the_state_carries_what_it_lacks(equal):
 def test_rows_of_the_matrix_keep_their_moments(k, s, second, gain, h):
     constants = tables.constants(k, s, second, tables.lanes_for(k))
     arrays = constants.arrays
-    high, low = tables._times(arrays["matrix"], arrays["matrix_low"], h)
+    high, low = tables.times(arrays["matrix"], arrays["matrix_low"], h)
     rounded = tables.keep_moments(high, low, arrays["basis"])
     lost = ((high - rounded) + low) @ arrays["basis"]
     assert np.abs(lost).max() < gain * 3e-17 * h  # 3e-17: what plain rounding may lose

@@ -1,0 +1,74 @@
+"""The memory of a group of trajectories, one in each lane, by name.
+
+A row holds one number of every trajectory, side by side. Arrays of rows are declared with the
+number of rows first; `lanes` is the length of a row.
+"""
+
+from integrators.kernel.native.memory import Array, Integer, Memory, Real
+
+
+class Group(Memory):
+    """As many trajectories as a vector has lanes, their present step, and what is to be done with them."""
+
+    # --- what is integrated, and how ---
+    code = Integer()  # address of void(group, count): see `ensemble.steps`
+    lanes = Integer()
+    rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
+    dim = Integer()
+    parameters = Integer()
+    k = Integer()
+    matrix = Array()  # values -> stages, (k, k) doubles row by row
+    extrapolation = Array()  # the last step's values -> those of the step ahead, (k, k)
+    nodes = Array()
+    nodes_low = Array()
+    weights = Array()
+    weights_low = Array()
+    position_weights = Array()
+    position_weights_low = Array()
+    falls = Array()  # changes that a number of sweeps must have come to; see `steps.Writer.rule`
+    reach = Real()  # the largest sum of a row of the matrix, by sizes
+    h = Array("lanes")
+    par = Array("parameters", "lanes")
+    velocity = Array("rows", "lanes")  # q' = velocity * p
+
+    # --- where the trajectories are ---
+    t0 = Array("lanes")
+    time_low = Array("lanes")  # what `t0` lacks
+    n = Integer()  # steps since `t0`
+    state = Array("dim", "lanes")  # q, p or y
+    error = Array("dim", "lanes")  # what `state` lacks
+    alive = Array("lanes")  # 1: goes on; 0: left, because its equations were not solved
+    living = Integer()  # whether any is alive
+    sweeps = Array("lanes")  # in which the trajectory took part
+
+    # --- a step ---
+    values = Array("k", "rows", "lanes")  # of the field, at the stages
+    ahead = Array("k", "rows", "lanes")  # the values that a step starts from
+    base = Array("k", "rows", "lanes")  # what a stage has besides the state and the values
+    stage = Array("rows", "lanes")
+    found = Array("rows", "lanes")  # the field there
+    factor = Array("rows", "lanes")
+    moved = Array("rows", "lanes")  # how much the values of a row have changed
+    strict = Array("rows", "lanes")  # what that is beside the row's block,
+    floored = Array("rows", "lanes")  # and beside its block, small ones raised to a part of the largest
+    size = Array("rows", "lanes")
+
+    # --- trajectories one group after another; see `ensemble.loop` ---
+    starts = Array()  # (n, dim)
+    all_par = Array()  # (n, parameters)
+    all_velocity = Array()  # (n, rows)
+    count = Integer()  # samples of a trajectory
+    times = Array()
+    targets = Array(of=int)  # steps before each sample,
+    parts = Array()  # and the part of a step that is left
+    part_places = Array(of=int)  # where among all lengths of parts that is; for each length
+    part_matrix = Array()  # (k, k): `matrix`,
+    part_extrapolation = Array()  # (k, k): `extrapolation`,
+    part_reach = Array()  # and `reach`
+    out = Array()  # (n, samples, dim)
+    arrived = Array(of=int)  # (n): 1, or 0 for one that left
+    all_sweeps = Array(of=int)  # (n)
+    trajectories = Integer()  # n
+    at = Integer()  # first trajectory of the group,
+    end = Integer()  # and the one after the last to be done
+    sample = Integer()  # the next one to be made; -1: the group is not loaded

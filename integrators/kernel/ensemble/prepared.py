@@ -1,0 +1,178 @@
+"""A method's coefficients for trajectories in lanes, and the memory of groups of them."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.kernel import tables
+from integrators.kernel.context import width_of_blocks
+from integrators.kernel.ensemble.engine import run
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.steps import GOAL, MOST, Form, compile_steps
+from integrators.kernel.native import binary
+from integrators.kernel.native.memory import Numbers, aligned
+from integrators.kernel.tables import Constants
+from problems import emit
+from problems.systems.base import System
+from problems.trace.graph import reachable
+
+LANES = 8  # of a register
+SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
+STAGES = 16  # at most: their sums are written out
+ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
+
+
+class Lanes:
+    """HBVM(k, s) on trajectories in lanes, compiled for one system.
+
+    Parameters
+    ----------
+    system : System
+        What is integrated; its field can run on lanes.
+    constants : Constants
+        The method's.
+    second : bool
+        Whether in second-order form.
+    unit : bool
+        Whether the rows' factors can be in the matrix; see `integrators.kernel.tables.unit`.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If parameters that differ from lane to lane keep the field from running on lanes.
+    """
+
+    def __init__(self, system: System, constants: Constants, second: bool, unit: bool):
+        self.system, self.second, self.unit, self._constants = system, second, unit, constants
+        self.rows = system.dof if second and system.dof is not None else system.dim
+        width = width_of_blocks(system)
+        starts = [0] if second or system.dof is None else [0, system.dof]
+        size = self.rows // len(starts)
+        groups = tuple((start, size // width, width) for start in starts)
+        self.k = constants.k
+        self.width = width_for(system, second, self.rows)
+        self._code = compile_steps(system, Form(self.width, self.k, self.rows, second, unit, groups))
+        loop = run.code()
+        self.from_cache = self._code.from_cache and loop.from_cache
+        self._scaled: dict[float, Numbers] = {}
+
+    @staticmethod
+    def takes(system: System, constants: Constants, second: bool) -> bool:
+        """Whether stages of so many components, and so many of them, are few enough."""
+        rows = system.dim // 2 if second else system.dim
+        return constants.k <= STAGES and constants.k * rows <= ROOM
+
+    @cached_property
+    def _fixed(self) -> dict[str, Numbers]:
+        """The tables that do not depend on the step."""
+        a = self._constants.arrays
+        names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
+        # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
+        falls = 3.0 * GOAL * 1e15 ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
+        extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
+        found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
+        return {name: _aligned(values) for name, values in found.items()}
+
+    def _matrix(self, h: float) -> Numbers:
+        """Return the matrix for the step h, shape (k, k)."""
+        if h not in self._scaled:
+            a = self._constants.arrays
+            high, low = tables.times(a["matrix"], a["matrix_low"], h)
+            if self.second and self.unit:
+                high, low = tables.times(high, low, h)
+            self._scaled[h] = tables.keep_moments(high, low, a["basis"])
+        return self._scaled[h]
+
+    def parts(self, parts: Numbers, h: float) -> dict[str, NDArray[Any]]:
+        """Return what `Group` has of partial steps that follow a step of h."""
+        from integrators.legendre import legendre
+
+        a, modes = self._constants.arrays, min(self.k, tables.MODES)
+        lengths, places = np.unique(parts, return_inverse=True)
+        nodes = 1.0 + (lengths / h)[:, None] * a["nodes"].reshape(-1)
+        basis = legendre(nodes.reshape(-1), modes).reshape(lengths.size, self.k, modes)
+        factor = lengths * lengths if self.second and self.unit else lengths
+        matrix = factor[:, None, None] * self._matrix(1.0)
+        return {
+            "parts": parts,
+            "part_places": places.astype(np.int64),
+            "part_matrix": np.ascontiguousarray(matrix),
+            "part_extrapolation": np.ascontiguousarray(basis @ a["into_modes"][:modes]),
+            "part_reach": _reach(matrix),
+        }
+
+    def velocities(self, par: Numbers) -> Numbers:
+        """Return q' = velocity * p of all trajectories, shape (n, rows); ones in first-order form."""
+        if not self.second:
+            return np.ones((len(par), self.rows))
+        there = np.zeros((self.system.dim, len(par)))
+        found = emit.numpy(self.system, "velocity_scale")(0.0, there, np.ascontiguousarray(par.T))
+        return np.ascontiguousarray(found.T)
+
+    def groups(
+        self, t0: float, h: float, numbers: dict[str, int], arrays: dict[str, NDArray[np.generic]]
+    ) -> tuple[Group, Group]:
+        """Return memory for a group of trajectories with step h, and for partial steps.
+
+        Parameters
+        ----------
+        t0, h : float
+            Time of the starts, and the step.
+        numbers, arrays : dict
+            What `Group` is to know of the trajectories.
+        """
+        system = self.system
+        shape = {
+            "code": self._code.address, "lanes": self.width, "rows": self.rows, "dim": system.dim,
+            "parameters": system.n_par, "k": self.k, **numbers,
+        }  # fmt: skip
+        matrix = self._matrix(h)
+        group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
+        group.reach = float(_reach(matrix))
+        group.h[:], group.t0[:] = h, t0
+        return group, side
+
+
+def width_for(system: System, second: bool, rows: int) -> int:
+    """Return how many trajectories go side by side.
+
+    Eight, which fill a register; more where the field has few components and the results of
+    divisions, roots or other functions are waited for (Kepler: 15 % faster with sixteen, an
+    exponential of one component twice as fast with 32).
+    """
+    nodes = reachable(system.function("force" if second else "field").roots)
+    if rows > 4 or all(node.op in SOON for node in nodes):
+        return LANES
+    return 4 * LANES if rows == 1 else 2 * LANES
+
+
+def lanes_of(system: System, constants: Constants, second: bool, unit: bool) -> tuple[Lanes | None, float]:
+    """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
+    started = binary.clock()
+    found = None
+    if Lanes.takes(system, constants, second):
+        try:
+            found = Lanes(system, constants, second, unit)
+        except Exception as error:
+            from numba.core.errors import NumbaError  # has been imported to compile
+
+            if not isinstance(error, NumbaError):
+                raise
+    return found, binary.clock() - started
+
+
+def _reach(matrix: Numbers) -> Numbers:
+    """Return how far a change of the values moves the stages at most, for a matrix or for several.
+
+    In the next sweep a stage meets the changes at itself and at those after it only, which is less. But a
+    bound by these alone ends iterations early: energies of Henon and Heiles drifted by 2e-19 per step.
+    """
+    return np.abs(matrix).sum(axis=-1).max(axis=-1)
+
+
+def _aligned(values: Numbers) -> Numbers:
+    made = aligned(values.size)
+    made[:] = values.reshape(-1)
+    return made

@@ -1,0 +1,436 @@
+"""Steps of HBVM(k, s) on trajectories in lanes, compiled around the field of one system.
+
+Every number of a step is a vector, with one trajectory in each lane, so that there is nothing to shuffle and
+no sum over lanes. Stages come one after another; each uses the values that the field has had at the stages
+before it in the same sweep (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
+nodes, weights and the state are sums of two doubles, and what is at the size of the state is added last.
+
+A trajectory whose iteration has ended keeps its values while the others iterate on: what happens
+in a lane depends on nothing in the others.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from llvmlite import ir
+
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.ensemble.writer import Index, Writer
+from integrators.kernel.native import binary, field, store
+from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
+from integrators.kernel.simd.values import Value
+from problems import emit
+from problems.systems.base import System
+
+INFINITY = float("inf")
+UNROLLED = 640  # products of a sweep up to which stages and rows are written out
+
+# The stopping rule; see `Steps.rule`.
+TOLERANCE = 1e-16
+GOAL, STEEP = 3e-17, 0.15
+PATIENCE, ROUNDING, STAGNATION = 5, 1e-15, 1e-13
+FLOOR, SMALLEST, LARGE = 1e-3, 1e-200, 1e200
+AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
+MOST = 80  # sweeps after which a trajectory leaves
+
+
+@dataclass(frozen=True)
+class Form:
+    """What the code of a step depends on besides the field.
+
+    Attributes
+    ----------
+    lanes, k, rows : int
+        Trajectories side by side, stages, components of a stage.
+    second : bool
+        Second-order form: stages hold positions, the state is (q, p).
+    unit : bool
+        Whether the rows' factors h q' / p are in the matrix.
+    groups : tuple of tuple of int
+        First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
+    """
+
+    lanes: int
+    k: int
+    rows: int
+    second: bool
+    unit: bool
+    groups: tuple[tuple[int, int, int], ...]
+
+
+def compile_steps(system: System, form: Form) -> binary.Native:
+    """Compile ``void(group, count)``, or load it: as many steps of a `Group`, for a field on lanes.
+
+    Raises
+    ------
+    numba.core.errors.NumbaError
+        If the field cannot be compiled on lanes.
+    """
+    what = "force" if form.second else "field"
+    source = emit.source(system, what, "numba")
+    modules = binary.sources(*field.SOURCES, "ensemble")
+    name = store.key("ensemble", source.text, repr(form), modules)
+
+    def make() -> tuple[str, bytes]:
+        function, arguments = field.on_lanes(emit.numba(system, what).py_func, form.lanes, par=True)
+        return field.ON_LANES, binary.build(
+            function, arguments, around=lambda inner: Steps(inner, form).text()
+        )
+
+    return binary.obtain(name, make)
+
+
+class Steps(Writer):
+    """Writes LLVM's text of what `compile_steps` promises, around the compiled field ``inner``."""
+
+    # Where the arrays of `Group` are, by their names there.
+    nodes: Any
+    nodes_low: Any
+    weights: Any
+    weights_low: Any
+    position_weights: Any
+    position_weights_low: Any
+    state: Any
+    error: Any
+    velocity: Any
+    par: Any
+    factor: Any
+    moved: Any
+    strict: Any
+    floored: Any
+    size: Any
+    stage: Any
+    found: Any
+
+    def __init__(self, inner: str, form: Form):
+        super().__init__(inner, form.lanes, unrolled=form.k * form.k * form.rows <= UNROLLED)
+        self.form = form
+
+    def text(self) -> str:
+        """Return the module."""
+        b, form = self.b, self.form
+        k, rows = form.k, form.rows
+        count = self.function.args[1]
+        self.zero = Value(b, ir.Constant(self.kind, [0.0] * form.lanes))
+        self.one = self.zero.of(1.0)
+        slots = Group.slots
+        for name in (
+            "nodes",
+            "nodes_low",
+            "weights",
+            "weights_low",
+            "position_weights",
+            "position_weights_low",
+        ):
+            setattr(self, name, self.array(slots[name]))
+        for name in ("state", "error", "velocity", "par"):
+            setattr(self, name, self.array(slots[name]))
+        for name in ("factor", "moved", "strict", "floored", "size", "stage", "found"):
+            setattr(self, name, self.room(slots[name], rows))
+        self.values, self.ahead = (self.room(slots[name], k * rows) for name in ("values", "ahead"))
+        self.base = self.array(slots["base"])
+        kept = self.array(slots["values"])
+        pointer = DOUBLE.as_pointer()
+        self.result, self.exception = b.alloca(pointer), b.alloca(pointer)
+        self.h = self.get(self.array(slots["h"]))
+        if self.unrolled:
+            self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
+        alive = self.get(self.array(slots["alive"]))
+        self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
+        self.sweeps = self.variable(self.kind, self.get(self.array(slots["sweeps"])).value)
+        taken = self.variable(INTEGER, ir.Constant(INTEGER, 0))
+        loop, end = self.function.append_basic_block("step"), self.function.append_basic_block("done")
+        b.branch(loop)
+        b.position_at_end(loop)
+        self.step()
+        steps = b.add(b.load(taken), ir.Constant(INTEGER, 1))
+        b.store(steps, taken)
+        b.store(b.add(b.load(self.word(slots["n"])), ir.Constant(INTEGER, 1)), self.word(slots["n"]))
+        living = self.any(b.load(self.alive))
+        b.cbranch(b.and_(living, b.icmp_signed("<", steps, count)), loop, end)
+        b.position_at_end(end)
+        if self.unrolled:
+            self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
+        self.put(self.one.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
+        self.put(Value(b, b.load(self.sweeps)), self.array(slots["sweeps"]))
+        b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
+        b.ret_void()
+        return text_of(self.module)
+
+    def step(self) -> None:
+        """Write one step of all lanes."""
+        self.begin()
+        self.sizes()
+        self.predict()
+        self.iterate()
+        self.finish()
+
+    def each_row(self, body: Callable[[Any], None]) -> None:
+        """Write ``body(d)`` for every component of a stage."""
+        self.each(self.form.rows, body)
+
+    def begin(self) -> None:
+        """Set what stages have besides the state and the values, and the time of the step."""
+        b, form = self.b, self.form
+
+        def row(d: Index) -> None:
+            error = self.get(self.error, d)
+            if not form.second:
+                self.each(form.k, lambda i: self.put(error, self.base, self.at(i, form.rows, d)))
+                return
+            kh = self.h * self.get(self.velocity, d)
+            if not form.unit:
+                self.put(kh, self.factor, d)
+            u, u_low = self.drift(d, kh)
+
+            def stage(i: Index) -> None:
+                c, c_low = self.number(self.nodes, i), self.number(self.nodes_low, i)
+                low = c.fma(u_low, c_low.fma(u, error))
+                self.put(c.fma(u, low), self.base, self.at(i, form.rows, d))
+
+            self.each(form.k, stage)
+
+        self.each_row(row)
+        # t0 + n h, as a sum of two doubles
+        slots = Group.slots
+        n = Value(b, splat(b, b.sitofp(b.load(self.word(slots["n"])), DOUBLE), form.lanes))
+        elapsed = n * self.h
+        self.t, lost = self.get(self.array(slots["t0"])).two_sum(elapsed)
+        self.t_low = lost + n.fma(self.h, -elapsed) + self.get(self.array(slots["time_low"]))
+
+    def drift(self, d: Index, kh: Value) -> tuple[Value, Value]:
+        """Return kh (p + its error) as a sum of two doubles."""
+        momentum = self.at(1, self.form.rows, d)
+        p, error = self.get(self.state, momentum), self.get(self.error, momentum)
+        u = kh * p
+        return u, kh.fma(error, kh.fma(p, -u))
+
+    def sizes(self) -> None:
+        """Set what a change of the values is: that of the stages which follows from it, beside their block.
+
+        The size of a block is the largest at the start of the step and, about, at its end.
+        """
+        form = self.form
+        reach = Value(self.b, splat(self.b, self.b.load(self.word(Group.slots["reach"], DOUBLE)), form.lanes))
+
+        def own(d: Index) -> Value:
+            y = self.get(self.state, d)
+            if form.second:
+                moved, _ = self.drift(d, self.h * self.get(self.velocity, d))
+            else:
+                moved = self.h * self.get(self.values, self.at(form.k - 1, form.rows, d))
+            return y.absolute().max((y + moved).absolute())
+
+        for first, blocks, width in form.groups:
+            largest = self.variable(self.kind, self.zero.value)
+
+            def measure(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+                start = self.at(block, width, first)
+                size = self.zero
+                for i in range(width):
+                    size = size.max(own(self.at(start, 1, i)))
+                self.put(size, self.size, start)
+                self.b.store(Value(self.b, self.b.load(largest)).max(size).value, largest)
+
+            self.each(blocks, measure)
+
+            def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
+                start = self.at(block, width, first)
+                size = self.get(self.size, start)
+                floor = size.max(Value(self.b, self.b.load(largest)) * FLOOR)
+                inverses = [(self.one / x).where(x.compare(">", SMALLEST), LARGE) for x in (size, floor)]
+                for i in range(width):
+                    d = self.at(start, 1, i)
+                    weight = reach if form.unit else self.get(self.factor, d).absolute() * reach
+                    self.put(weight * inverses[0], self.strict, d)
+                    self.put(weight * inverses[1], self.floored, d)
+
+            self.each(blocks, invert)
+
+    def combination(self, table: Any, i: Index) -> Callable[..., Value]:
+        """Return what makes ``sum_j table[i, j] values[j, d]`` for rows d, added to a start."""
+        k, rows = self.form.k, self.form.rows
+        factors = [self.number(table, self.at(i, k, j)) for j in range(k)]
+
+        # The newest value comes last: all the rest need not wait for it.
+        order = [*range(i, k), *range(i)] if isinstance(i, int) else [*range(k)]
+
+        def total(d: Index, start: Value | None = None) -> Value:
+            for j in order:
+                value = self.get(self.values, self.at(j, rows, d))
+                start = factors[j] * value if start is None else factors[j].fma(value, start)
+            assert start is not None
+            return start
+
+        return total
+
+    def predict(self) -> None:
+        """First values: the last step's polynomial at the nodes of this one."""
+        k, rows = self.form.k, self.form.rows
+        table = self.table(Group.slots["extrapolation"])
+
+        def stage(i: Index) -> None:
+            total = self.combination(table, i)
+            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, rows, d)))
+
+        self.each(k, stage)
+        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
+
+    def iterate(self) -> None:
+        """Sweep until every lane is solved, or has left."""
+        b, form = self.b, self.form
+        infinite = self.zero.of(INFINITY).value
+        none = ir.Constant(self.bits, [0] * form.lanes)
+        self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
+        self.stalled = self.variable(self.kind, self.zero.value)
+        self.final, self.again = self.variable(self.bits, none), self.variable(self.bits, none)
+        self.active = self.variable(self.bits, b.load(self.alive))
+        self.tried = self.variable(INTEGER, ir.Constant(INTEGER, 0))
+        loop, end = self.function.append_basic_block("sweep"), self.function.append_basic_block("solved")
+        b.branch(loop)
+        b.position_at_end(loop)
+        self.sweep()
+        self.rule()
+        b.cbranch(self.any(b.load(self.active)), loop, end)
+        b.position_at_end(end)
+
+    def sweep(self) -> None:
+        """Set new values at all stages, one after another, and how much they have changed."""
+        b, form = self.b, self.form
+        k, rows = form.k, form.rows
+        active = b.load(self.active)
+        matrix = self.table(Group.slots["matrix"])
+        self.each_row(lambda d: self.put(self.zero, self.moved, d))
+
+        def stage(i: Index) -> None:
+            total = self.combination(matrix, i)
+
+            def displace(d: Index) -> None:
+                base = self.get(self.base, self.at(i, rows, d))
+                moved = total(d, base) if form.unit else self.get(self.factor, d).fma(total(d), base)
+                self.put(self.get(self.state, d) + moved, self.stage, d)
+
+            self.each_row(displace)
+            time = self.t + self.number(self.nodes, i).fma(self.h, self.t_low)
+            b.call(self.field, [self.result, self.exception, time.value, self.stage, self.par, self.found])
+
+            def keep(d: Index) -> None:
+                place = self.at(i, rows, d)
+                old, new = self.get(self.values, place), self.get(self.found, d)
+                self.put(self.get(self.moved, d).larger((new - old).absolute()), self.moved, d)
+                self.put(new.where(active, old), self.values, place)
+
+            self.each_row(keep)
+
+        self.each(k, stage)
+
+    def rule(self) -> None:
+        """Apply the stopping rule, in every lane by itself.
+
+        What is judged is the change that the next sweep would make of the stages, beside
+        their block: bounded by that of the values. As in `integrators.kernel.step.iterate`,
+        an iteration ends when that is at most 1e-16, one sweep after it falls so steeply that
+        it is going to be, or when it does not decrease and rounding accounts for it.
+        """
+        b, form = self.b, self.form
+        change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
+
+        def largest(d: Index) -> None:
+            moved = self.get(self.moved, d)
+            for scales, top in ((self.strict, change), (self.floored, floored)):
+                size = (moved * self.get(scales, d)).absolute()
+                b.store(Value(b, b.load(top)).larger(size).value, top)
+
+        self.each_row(largest)
+        load = lambda variable: Value(b, b.load(variable))  # noqa: E731
+        strict, last, best, stalled = load(change), load(self.last), load(self.best), load(self.stalled)
+        tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
+        b.store(tried, self.tried)
+        active = b.load(self.active)
+        sweeps = load(self.sweeps)
+        b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
+
+        falling = strict.compare("<", best)
+        fall = self.number(self.array(Group.slots["falls"]), tried)
+        steep = b.and_(falling, last.compare("<", 1.0))
+        for condition in (
+            strict.compare("<=", last * STEEP),
+            (strict * strict).compare("<=", last * GOAL),
+            b.fcmp_ordered("<=", strict.value, fall.value),
+        ):
+            steep = b.and_(steep, condition)
+        stalled = self.zero.where(falling, stalled + 1.0)
+        allowed = self.zero.of(STAGNATION).where(stalled.compare(">=", float(PATIENCE)), ROUNDING)
+        stopped = b.and_(b.not_(falling), load(floored).compare("<", allowed))
+        solved = b.or_(strict.compare("<=", TOLERANCE), b.or_(b.load(self.final), stopped))
+        finite = strict.compare("<", INFINITY)
+        solved = b.and_(solved, finite)
+        b.store(steep, self.final)
+        b.store(strict.value, self.last)
+        b.store(best.where(best.compare("<=", strict), strict).value, self.best)
+        b.store(stalled.value, self.stalled)
+
+        over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in (AGAIN, MOST)]
+        all_of_them, none = (ir.Constant(active.type, [bit] * form.lanes) for bit in (1, 0))
+        late = [b.select(flag, all_of_them, none) for flag in over]
+        failing = b.and_(b.and_(active, b.not_(solved)), b.or_(b.not_(finite), b.or_(*late)))
+        active = b.and_(active, b.not_(solved))
+        b.store(active, self.active)
+        with b.if_then(self.any(failing), likely=False):
+            self.restart(failing)
+
+    def restart(self, failing: Any) -> None:
+        """Begin again without values where that has not been tried, or else let the trajectory leave."""
+        b, form = self.b, self.form
+        leaves = b.and_(failing, b.load(self.again))
+        anew = b.and_(failing, b.not_(b.load(self.again)))
+        b.store(b.or_(b.load(self.again), anew), self.again)
+        infinite = self.zero.of(INFINITY)
+        for variable, value in ((self.last, infinite), (self.best, infinite), (self.stalled, self.zero)):
+            b.store(value.where(anew, Value(b, b.load(variable))).value, variable)
+        b.store(b.and_(b.load(self.final), b.not_(anew)), self.final)
+        self.each(
+            form.k * form.rows,
+            lambda i: self.put(self.zero.where(anew, self.get(self.values, i)), self.values, i),
+        )
+        b.store(b.and_(b.load(self.active), b.not_(leaves)), self.active)
+        b.store(b.and_(b.load(self.alive), b.not_(leaves)), self.alive)
+
+    def finish(self) -> None:
+        """Set the state at the end, as a sum of two doubles; the displacement is formed first."""
+        b, form = self.b, self.form
+        alive = self.variable(self.bits, b.load(self.alive))
+
+        def mean(d: Index, high: Any, low: Any) -> Value:
+            total = None
+            for table in (low, high):
+                for j in range(form.k):
+                    weight, value = self.number(table, j), self.get(self.values, self.at(j, form.rows, d))
+                    total = weight * value if total is None else weight.fma(value, total)
+            assert total is not None
+            return total
+
+        def add(d: Index, before: Value, small: Value) -> None:
+            new, lost = before.two_sum(small)
+            good = b.and_(b.load(alive), (new - new).compare("==", 0.0))
+            b.store(good, self.alive)
+            for value, base in ((new, self.state), (lost, self.error)):
+                self.put(value.where(good, self.get(base, d)), base, d)
+
+        def row(d: Index) -> None:
+            impulse = self.h * mean(d, self.weights, self.weights_low)
+            error = self.get(self.error, d)
+            if not form.second:
+                add(d, self.get(self.state, d), impulse + error)
+                return
+            kh = self.h * self.get(self.velocity, d)
+            u, u_low = self.drift(d, kh)
+            moved, lost = self.get(self.state, d).two_sum(u)
+            kick = kh * (self.h * mean(d, self.position_weights, self.position_weights_low))
+            momentum = self.at(1, form.rows, d)
+            p, p_error = self.get(self.state, momentum), self.get(self.error, momentum)
+            add(d, moved, (kick + (u_low + error)) + lost)
+            add(momentum, p, impulse + p_error)
+
+        self.each_row(row)

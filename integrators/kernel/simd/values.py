@@ -1,0 +1,90 @@
+"""A vector of doubles in LLVM code under construction, with the operators that formulas need."""
+
+from typing import Any
+
+from llvmlite import ir
+
+from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
+
+
+class Value:
+    """A vector under construction, with the operators that formulas need."""
+
+    def __init__(self, builder: Any, value: Any):
+        self.builder, self.value = builder, value
+        self.count = value.type.count
+
+    def _of(self, other: "Value | float") -> Any:
+        if isinstance(other, Value):
+            return other.value
+        return ir.Constant(vector(self.count), [float(other)] * self.count)
+
+    def of(self, number: float) -> "Value":
+        """Return the number in every lane."""
+        return self._make(self._of(number))
+
+    def _make(self, value: Any) -> "Value":
+        return Value(self.builder, value)
+
+    def __add__(self, other: "Value | float") -> "Value":
+        return self._make(self.builder.fadd(self.value, self._of(other)))
+
+    def __sub__(self, other: "Value | float") -> "Value":
+        return self._make(self.builder.fsub(self.value, self._of(other)))
+
+    def __rsub__(self, other: float) -> "Value":
+        return self._make(self.builder.fsub(self._of(other), self.value))
+
+    def __mul__(self, other: "Value | float") -> "Value":
+        return self._make(self.builder.fmul(self.value, self._of(other)))
+
+    def __truediv__(self, other: "Value | float") -> "Value":
+        return self._make(self.builder.fdiv(self.value, self._of(other)))
+
+    def __neg__(self) -> "Value":
+        return self._make(self.builder.fneg(self.value))
+
+    def fma(self, factor: "Value | float", term: "Value | float") -> "Value":
+        """Return the value times a factor plus a term, rounded once."""
+        return self._make(llvm_call(self.builder, "fma", self.value, self._of(factor), self._of(term)))
+
+    def polynomial(self, coefficients: Any) -> "Value":
+        """Horner's scheme, lowest coefficient first."""
+        result = self._make(self._of(coefficients[-1]))
+        for coefficient in reversed(coefficients[:-1]):
+            result = result.fma(self, coefficient)
+        return result
+
+    def max(self, other: "Value | float") -> "Value":
+        """Return the larger one; of a NaN and a number, any."""
+        return self.where(self.compare(">", other), other)
+
+    def where(self, condition: Any, other: "Value | float") -> "Value":
+        """Choose the value where the condition holds, else ``other``."""
+        return self._make(self.builder.select(condition, self.value, self._of(other)))
+
+    def compare(self, symbol: str, other: "Value | float") -> Any:
+        return self.builder.fcmp_ordered(symbol, self.value, self._of(other))
+
+    def integers(self) -> Any:
+        return self.builder.bitcast(self.value, ir.VectorType(INTEGER, self.count))
+
+    def whole(self, number: int) -> Any:
+        return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)
+
+    def doubles(self, integers: Any) -> "Value":
+        return self._make(self.builder.bitcast(integers, vector(self.count)))
+
+    def larger(self, other: "Value") -> "Value":
+        """Return the larger of numbers that are not negative, by their bits: a NaN is larger than all."""
+        bits = llvm_call(self.builder, "umax", self.integers(), other.integers())
+        return self.doubles(bits)
+
+    def two_sum(self, other: "Value") -> "tuple[Value, Value]":
+        """Return the sum, and what rounding took from it (Knuth)."""
+        total = self + other
+        part = total - self
+        return total, (self - (total - part)) + (other - part)
+
+    def absolute(self) -> "Value":
+        return self._make(llvm_call(self.builder, "fabs", self.value))

@@ -1,0 +1,159 @@
+"""Mechanical systems from their Lagrangian: the momenta and the Hamiltonian are found from it."""
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from problems.calculus.function import Function, function_of
+from problems.calculus.gradient import gradient
+from problems.calls import checked_arguments
+from problems.checks import NOTHING, Named, at_least
+from problems.errors import InputError
+from problems.systems.base import System, Value
+from problems.systems.hamiltonian import Hamiltonian
+from problems.trace import arguments
+from problems.trace.graph import Node, P, reachable
+from problems.trace.source_line import line_of_function
+
+
+class Lagrangian(Hamiltonian):
+    """A mechanical system, from L = kinetic minus potential energy, of positions and velocities.
+
+    L is quadratic in the velocities, ``L = v.M(q, t) v/2 + A(q, t).v - V(q, t)``, written in any form.
+    The momenta are ``p = M v + A`` and ``H = (p - A).M^-1 (p - A)/2 + V``, with M factored
+    as L D L^T symbolically: the system is a `Hamiltonian` in q and p for every method, and M(q) q'' is
+    never solved for numerically.
+
+    Parameters
+    ----------
+    L : callable
+        Names the arguments it needs among ``t, q, v, par, m``. Velocities do not stand in `m.sum`.
+    dof : int
+        Degrees of freedom.
+    parameters, guards, name
+        As for `Hamiltonian`.
+    invariants : mapping of str to callable
+        As for `Hamiltonian`, of ``t, q, p, y, par, m``; the energy is H.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If L is not quadratic in v as it is written, or does not depend on one of the velocities.
+
+    Examples
+    --------
+    A pendulum on a cart, which starts from velocities:
+
+    >>> from problems import Problem
+    >>> def L(q, v, m):
+    ...     x, y = v[0] + m.cos(q[1])*v[1], m.sin(q[1])*v[1]
+    ...     return v[0]**2 + (x**2 + y**2)/2 + m.cos(q[1])
+    >>> cart = Problem(Lagrangian(L, dof=2), q0=[0.0, 1.0], v0=[0.1, 0.0], t_end=10.0)
+    >>> cart.y0.round(3).tolist(), abs(cart.velocity(cart.y0).round(15)).tolist()
+    ([0.0, 1.0, 0.3, 0.054], [[0.1, 0.0]])
+    """
+
+    @checked_arguments
+    def __init__(
+        self,
+        L: Callable[..., Any],
+        *,
+        dof: Annotated[int, at_least(1)],
+        parameters: Named[Value] = NOTHING,
+        invariants: Named[Callable[..., Any]] = NOTHING,
+        guards: Named[Callable[..., Any]] = NOTHING,
+        name: str | None = None,
+    ) -> None:
+        System.__init__(self, L, 2 * dof, dof, parameters, invariants, guards, name)
+        self._line = line_of_function(L)
+        # In L the places of the momenta hold the velocities.
+        value = arguments.call(L, graph=self._graph, dim=self.dim, layout=self._layout, what="L", second="v")
+        lagrangian = self._node(value, L, "L")
+        momenta = self._slopes(lagrangian)
+        self._functions["momentum"] = function_of(self._graph, momenta)
+        self._energy = self._eliminated(lagrangian, momenta)
+        self._set_energy(self._energy)
+        self._trace_declared(invariants, guards)
+
+    def __repr__(self) -> str:
+        return f"Lagrangian({self.name}, dof={self.dof})"
+
+    def _derived(self, what: str) -> Function | None:
+        if what == "velocity":
+            return self.function("field").part(0, self.dim // 2)
+        return super()._derived(what)
+
+    def _slopes(self, node: Node) -> list[Node]:
+        """Return the derivatives with respect to the velocities."""
+        dof = self.dim // 2
+        found = gradient(node, self.dim)
+        for loop, entries in found.loops:
+            if any((entry.index.values(loop) >= dof).any() for entry in entries):
+                raise InputError(
+                    f"{self._line}: a velocity stands in m.sum; write the kinetic energy in Python, such as "
+                    "sum(v[i]**2 for i in range(n)), or the system as a Hamiltonian."
+                )
+        slopes = []
+        for terms in found.outputs[dof:]:
+            total = self._graph.const(0.0)
+            for term in terms:
+                total = total + term.node
+            slopes.append(total)
+        return slopes
+
+    def _eliminated(self, lagrangian: Node, momenta: list[Node]) -> Node:
+        """Return the Hamiltonian, in which the momenta take the places of the velocities."""
+        graph, dof = self._graph, len(momenta)
+        mass = [self._slopes(p) for p in momenta]
+        if any(m.flags & P for row in mass for m in row):
+            raise InputError(
+                f"{self._line}: L is not quadratic in v as it is written; expand it, or give the Hamiltonian."
+            )
+        zero = graph.const(0.0)
+
+        def times(*factors: Node) -> Node:
+            if any(factor is zero for factor in factors):
+                return zero
+            total, *others = factors
+            for factor in others:
+                total = total * factor
+            return total
+
+        rest = [graph.symbol("y", dof + i, flags=P) - self._at_rest(p) for i, p in enumerate(momenta)]
+        lower = [[zero] * dof for _ in range(dof)]
+        diagonal: list[Node] = []
+        energy = -self._at_rest(lagrangian)
+        for j in range(dof):
+            pivot = mass[j][j]
+            for k in range(j):
+                pivot = pivot - times(lower[j][k], lower[j][k], diagonal[k])
+                rest[j] = rest[j] - times(lower[j][k], rest[k])
+            if pivot is zero:
+                raise InputError(f"{self._line}: L does not depend on v[{j}] by itself; each needs a mass.")
+            diagonal.append(pivot)
+            for i in range(j + 1, dof):
+                entry = mass[i][j]
+                for k in range(j):
+                    entry = entry - times(lower[i][k], lower[j][k], diagonal[k])
+                lower[i][j] = zero if entry is zero else entry / pivot
+        kinetic = zero
+        for z, pivot in zip(rest, diagonal, strict=True):
+            kinetic = kinetic + z * z / (2.0 * pivot)
+        return kinetic + energy
+
+    def _at_rest(self, root: Node) -> Node:
+        """Return a node where all velocities are 0."""
+        graph = self._graph
+        zero = graph.const(0.0)
+        done: dict[int, Node] = {}
+        for node in reachable([root]):
+            if not node.flags & P:
+                done[node.id] = node
+            elif node.op == "symbol":
+                done[node.id] = zero
+            else:
+                args = tuple(done[arg.id] for arg in node.args)
+                vanishes = node.op in ("mul", "div") and (
+                    args[0] is zero or (node.op == "mul" and args[1] is zero)
+                )
+                done[node.id] = zero if vanishes else graph.apply(node, args)
+        return done[root.id]

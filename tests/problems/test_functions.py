@@ -1,0 +1,292 @@
+"""The functions of m: values and derivatives in every engine, against NumPy, SciPy and mpmath."""
+
+import doctest
+import math
+import pickle
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+from scipy.special import erf
+
+import problems
+from integrators import DOP853, HBVM, Gauss, Taylor, integrate
+from problems import Hamiltonian, InputError, Problem, VectorField, emit
+from problems.analysis import latex, structure
+from problems.analysis.double_double import DD
+from problems.analysis.double_double import FUNCTIONS as IN_DD
+
+KNOTS = [-2.0, -1.1, -0.3, 0.5, 1.0, 2.0]
+POINTS = [0.3, -1.0, 0.7, 0.1, 0.9, -0.4]
+SPLINE = CubicSpline(KNOTS, POINTS)
+
+# What a user writes, and what NumPy makes of it; smooth between -0.95 and 0.95, but for the last two.
+FORMULAS = {
+    "tanh": (lambda x, y, m: m.tanh(3 * x) * y, lambda x, y: np.tanh(3 * x) * y),
+    "sinh": (lambda x, y, m: m.sinh(x + y), lambda x, y: np.sinh(x + y)),
+    "cosh": (lambda x, y, m: m.cosh(x * y), lambda x, y: np.cosh(x * y)),
+    "asin": (lambda x, y, m: m.asin(x) / (2 + y), lambda x, y: np.arcsin(x) / (2 + y)),
+    "acos": (lambda x, y, m: m.acos(x * y), lambda x, y: np.arccos(x * y)),
+    "atan": (lambda x, y, m: m.atan(5 * x - y), lambda x, y: np.arctan(5 * x - y)),
+    "atan2": (lambda x, y, m: m.atan2(y + 2, x), lambda x, y: np.arctan2(y + 2, x)),
+    "erf": (lambda x, y, m: m.erf(2 * x) + y * y, lambda x, y: erf(2 * x) + y * y),
+    "table": (lambda x, y, m: m.table(x + y, KNOTS, POINTS), lambda x, y: SPLINE(x + y)),
+    "where": (
+        lambda x, y, m: m.where((x > y) & ~(x > 0.5), x**3, m.exp(y)),
+        lambda x, y: np.where((x > y) & (x <= 0.5), x**3, np.exp(y)),
+    ),
+    "either": (
+        lambda x, y, m: m.where((x <= y) | (x >= 0.5), m.sin(x), x * y),
+        lambda x, y: np.where((x <= y) | (x >= 0.5), np.sin(x), x * y),
+    ),
+}  # fmt: skip
+
+
+def system_of(name):
+    formula = FORMULAS[name][0]
+    return Hamiltonian(
+        lambda q, p, m: p[0] ** 2 / 2 + p[1] ** 2 / 2 + formula(q[0], q[1], m), dof=2, name=name
+    )
+
+
+def states(n=40):
+    """Return states (4, n), none of them where a formula has a kink."""
+    return np.random.default_rng(7).uniform(-0.95, 0.95, (4, n))
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+class TestEveryEngine:
+    def test_values(self, name):
+        y = states()
+        wanted = (y[2] ** 2 + y[3] ** 2) / 2 + FORMULAS[name][1](y[0], y[1])
+        found = emit.numpy(system_of(name), "hamiltonian")(0.0, y, np.empty(0))[0]
+        # Measured 6.7e-16.
+        assert np.abs(found - wanted).max() < 2e-15
+
+    def test_gradients_against_differences(self, name):
+        y, h = states(), 1e-4
+        field = emit.numpy(system_of(name), "field")(0.0, y, np.empty(0))
+        for i in range(2):
+            ends = []
+            for far in (-2, -1, 1, 2):
+                moved = y.copy()
+                moved[i] += far * h
+                ends.append(FORMULAS[name][1](moved[0], moved[1]))
+            slope = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * h)
+            near = np.abs(y[0] - y[1]) < 3 * h
+            # Measured 4.3e-12; a table, whose third derivative jumps, 6.6e-12.
+            assert np.abs(field[2 + i] + slope)[~near].max() < 3e-11
+
+    def test_jacobians_against_differences(self, name):
+        system, h = system_of(name), 1e-4
+        jacobian = system.jacobian("force")
+        y = states(1)[:, 0]
+        full = np.zeros((2, 2))
+        full[jacobian.rows, jacobian.columns] = emit.numpy(system, jacobian)(0.0, y, np.empty(0))
+        force = emit.numpy(system, "force")
+        for i in range(2):
+            e = h * np.eye(4)[i]
+            at = [force(0.0, y + k * e, np.empty(0)) for k in (-2, -1, 1, 2)]
+            # Measured 1.0e-11.
+            assert np.abs(full[:, i] - (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)).max() < 5e-11
+
+    def test_the_engines_agree(self, name):
+        system = system_of(name)
+        y = states(20)
+        wanted = emit.numpy(system, "field")(0.0, y, np.empty(0))
+        size = np.abs(wanted).max()
+        found = np.empty_like(wanted)
+        compiled, jax = emit.numba(system, "field"), emit.jax(system, "field")
+        for i in range(y.shape[1]):
+            out = np.empty(4)
+            compiled(0.0, y[:, i].copy(), np.empty(0), out)
+            found[:, i] = out
+            # Measured 3.8e-16.
+            assert np.abs(np.asarray(jax(0.0, y[:, i], np.empty(0))) - wanted[:, i]).max() < 2e-15 * size
+        # Measured 3.3e-16.
+        assert np.abs(found - wanted).max() < 2e-15 * size
+
+    def test_heyoka(self, name):
+        hy = pytest.importorskip("heyoka")
+        if name == "table":
+            with pytest.raises(InputError, match=r"m\.table is pieces of polynomials"):
+                emit.heyoka(system_of(name))
+            return
+        pairs = emit.heyoka(system_of(name))
+        variables, slopes = zip(*pairs, strict=True)
+        y = states(20)
+        found = hy.cfunc(list(slopes), vars=list(variables))(np.ascontiguousarray(y))
+        wanted = emit.numpy(system_of(name), "field")(0.0, y, np.empty(0))
+        # Measured 2.8e-16.
+        assert np.abs(found - wanted).max() < 2e-15 * np.abs(wanted).max()
+
+    def test_in_a_declared_sum(self, name):
+        formula, plain = FORMULAS[name]
+        system = Hamiltonian(lambda q, m: m.sum(lambda i: formula(q[i], q[i + 1], m), range(40)), dof=41)
+        y = np.random.default_rng(3).uniform(-0.95, 0.95, 82)
+        assert emit.numpy(system, "hamiltonian")(0.0, y, np.empty(0))[0] == pytest.approx(
+            plain(y[:40], y[1:41]).sum(), rel=1e-13
+        )
+        out, wanted = np.empty(82), emit.numpy(system, "field")(0.0, y, np.empty(0))
+        emit.numba(system, "field")(0.0, y, np.empty(0), out)
+        assert np.abs(out - wanted).max() < 1e-14 * np.abs(wanted).max()
+
+    def test_a_trajectory_keeps_its_energy(self, name):
+        problem = Problem(system_of(name), q0=[0.3, 0.2], p0=[0.05, -0.03], t_end=1.0)
+        solution = integrate(problem, HBVM(), times=np.linspace(0.0, 1.0, 21))
+        # Measured 6.6e-16; a table's pieces in space are not landed on, 4.5e-12.
+        assert solution.errors()["energy"].max() < (2e-11 if name == "table" else 3e-15)
+        other = integrate(problem, DOP853(rtol=1e-11, atol=1e-13), times=solution.t)
+        # Measured 3.1e-9 with the table.
+        assert np.abs(solution.y - other.y).max() < 1e-8
+
+    def test_pickle_and_formula(self, name):
+        system = system_of(name)
+        again = pickle.loads(pickle.dumps(system))
+        assert emit.source(again, "field", "numba") == emit.source(system, "field", "numba")
+        assert latex.latex(system)
+
+
+UNARY = {
+    "sinh": (-20.0, 20.0), "cosh": (-20.0, 20.0), "tanh": (-60.0, 60.0), "asin": (-1.0, 1.0),
+    "acos": (-1.0, 1.0), "atan": (-1e6, 1e6), "erf": (-12.0, 12.0),
+}  # fmt: skip
+
+
+class TestDoubleDouble:
+    @pytest.mark.parametrize("name", UNARY)
+    def test_against_mpmath(self, name):
+        @settings(max_examples=80, deadline=None, derandomize=True)
+        @given(st.floats(*UNARY[name]), st.floats(-1e-17, 1e-17))
+        def check(x, tail):
+            if abs(x) == 1.0 or 0.0 < abs(x) < 1e-200:
+                return
+            low = float(np.float64(x) * tail)
+            with mpmath.workdps(60):
+                exact = getattr(mpmath, name)(mpmath.mpf(x) + mpmath.mpf(low))
+                found = IN_DD[name](DD(np.array([x]), np.array([low])))
+                error = mpmath.mpf(float(found.hi[0])) + mpmath.mpf(float(found.lo[0])) - exact
+                # Measured 1.5e-31 (erf; the others 3e-32).
+                assert abs(error) <= 1e-30 * max(abs(exact), mpmath.mpf(1e-3) if name == "acos" else 0)
+
+        check()
+
+    def test_atan2_in_all_quadrants(self):
+        y, x = np.array([1.0, 1.0, -1.0, -1.0, 0.0, 2.0]), np.array([3.0, -3.0, -3.0, 3.0, -1.0, 0.0])
+        found = IN_DD["atan2"](DD(y), DD(x))
+        with mpmath.workdps(60):
+            for i in range(y.size):
+                exact = mpmath.atan2(y[i], x[i])
+                assert abs(mpmath.mpf(float(found.hi[i])) + mpmath.mpf(float(found.lo[i])) - exact) < 1e-31
+
+    def test_the_energy_of_a_state(self):
+        y = np.array([[0.3, -0.2, 0.1, 0.4]])
+        for name in ("tanh", "erf", "atan2"):
+            problem = Problem(system_of(name), y0=y[0], t_end=1.0)
+            found = problem.invariants(y)["energy"][0]
+            exact = {
+                "tanh": lambda x, z: mpmath.tanh(3 * x) * z,
+                "erf": lambda x, z: mpmath.erf(2 * x) + z * z,
+                "atan2": lambda x, z: mpmath.atan2(z + 2, x),
+            }[name]
+            with mpmath.workdps(40):
+                q0, q1, p0, p1 = (mpmath.mpf(float(v)) for v in y[0])
+                assert found == float((p0**2 + p1**2) / 2 + exact(q0, q1))
+
+
+class TestTables:
+    def test_outside_the_outer_pieces_go_on_as_scipys(self):
+        system = VectorField(lambda t, m: [m.table(t, KNOTS, POINTS)], dim=1)
+        for t in (-3.0, -2.0, 0.5, 2.0, 2.5):
+            found = emit.numpy(system, "field")(t, np.zeros(1), np.empty(0))[0]
+            assert found == pytest.approx(float(SPLINE(t)), rel=1e-13)
+
+    @pytest.mark.parametrize("method", [HBVM(), Gauss(s=6, tol=1e-15)], ids=repr)
+    def test_steps_land_on_the_knots_of_a_table_of_time(self, method):
+        times = np.linspace(0.0, 10.0, 21)
+        values = np.random.default_rng(5).uniform(-1.0, 1.0, 21)
+        system = VectorField(lambda t, y, m: [y[1], -y[0] + m.table(t, times, values)], dim=2)
+        assert structure.breakpoints(system) == times.tolist()
+        problem = Problem(system, y0=[1.0, 0.0], t_end=10.0)
+        steps = integrate(problem, method, times=[10.0], sample="steps")
+        assert set(times[1:].tolist()) <= set(steps.t.tolist())
+        # Exactly: y = cos t + the integral of sin(t - s) f(s).
+        spline = CubicSpline(times, values)
+        x, w = np.polynomial.legendre.leggauss(20)
+        s = (times[:-1, None] + times[1:, None]) / 2 + x * 0.25
+        exact = math.cos(10.0) + float((np.sin(10.0 - s) * spline(s) * w * 0.25).sum())
+        # Measured 0.
+        assert abs(steps.y[-1, 0] - exact) < 2e-15
+
+    def test_jumps_in_time_are_landed_on(self):
+        system = VectorField(lambda t, m: [m.where((t > 1.0) & (t < 2.5), 1.0, 0.0)], dim=1)
+        assert structure.breakpoints(system) == [1.0, 2.5]
+        solution = integrate(Problem(system, y0=[0.0], t_end=4.0), HBVM())
+        # Measured 0.
+        assert abs(solution.y[-1, 0] - 1.5) < 1e-15
+
+    @pytest.mark.parametrize(
+        ("xs", "ys"),
+        [([0, 1], [1]), ([1, 0, 2], [0, 0, 0]), ([0, 1, np.nan], [0, 1, 2]), (3, 4), (KNOTS, [POINTS] * 6)],
+    )
+    def test_other_points_are_refused(self, xs, ys):
+        with pytest.raises(InputError, match=r"m\.table cannot use these points"):
+            Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.table(q[0], xs, ys), dof=1)
+
+
+class TestWhere:
+    def test_a_comparison_alone_is_still_refused(self):
+        for formula in (
+            lambda q, p, m: q[0] if q[0] > 0 else p[0],
+            lambda q, p, m: max(q[0], p[0]),
+            lambda q, p, m: q[0] if 0 < q[0] < 1 else p[0],
+        ):
+            with pytest.raises(InputError, match=r"compares or branches on a symbol.*m\.where"):
+                Hamiltonian(formula, dof=1)
+        with pytest.raises(InputError, match="compares or branches"):
+            Hamiltonian(lambda q, p, m: m.where(q[0] == 0, q[0], p[0]), dof=1)
+        with pytest.raises(InputError, match=r"m\.where chooses by"):
+            Hamiltonian(lambda q, p, m: m.where(q[0], q[0], p[0]), dof=1)
+
+    def test_a_wall_keeps_the_energy(self):
+        wall = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.where(q[0] > 0, 50 * q[0] ** 2, 0.0), dof=1)
+        assert structure.has_kinks(wall)
+        problem = Problem(wall, q0=[-1.0], p0=[1.0], t_end=1.3)
+        solution = integrate(problem, HBVM())
+        # Measured 6.1e-13.
+        assert solution.errors()["energy"].max() < 3e-12
+        assert any("kink" in sentence for sentence in solution.warnings)
+        assert any("m.where" in sentence for sentence in integrate(problem, Taylor()).warnings)
+
+    def test_what_numbers_decide_is_decided(self):
+        assert Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.where(True, q[0], p[0]), dof=1).separable
+
+
+def test_constants_and_domains():
+    def value(formula):
+        return emit.numpy(VectorField(formula, dim=1), "field")(0.0, np.zeros(1), np.empty(0))[0]
+
+    assert value(lambda m: [m.erf(0.5)]) == math.erf(0.5)
+    assert value(lambda m: [m.atan2(1, -1)]) == math.atan2(1.0, -1.0)
+    assert value(lambda m: [m.where(m.tanh(1.0) > 0.5, 1, 2)]) == 1.0
+    with pytest.raises(InputError, match=r"asin\(2.0\) is not defined"):
+        value(lambda m: [m.asin(2)])
+    with pytest.raises(InputError, match=r"cosh\(1000.0\) is not defined"):
+        value(lambda m: [m.cosh(1000)])
+
+
+def test_expressions_have_them_too():
+    problem = problems.load("expression", H="p^2/2 + cosh(q) + erf(q)/3", q0=(0.4,), p0=(0.0,), t_end=5.0)
+    # Measured 1.2e-16.
+    assert integrate(problem, HBVM()).errors()["energy"].max() < 1e-15
+
+
+def test_the_examples_of_the_page_are_true():
+    page = Path(__file__).parents[2] / "docs" / "formulas.md"
+    result = doctest.testfile(str(page), module_relative=False)
+    assert result.attempted >= 12
+    assert result.failed == 0
