@@ -185,7 +185,7 @@ class TestOtherFiles:
             ({"sample": "steps"}, "sample"),
             ({"events": Event(lambda q: q[0])}, "events"),
         ],
-        ids=lambda case: str(case),
+        ids=["parameters", "problem", "method", "times", "sample", "events"],
     )
     def test_another_integration_is_refused(self, other, what, path):
         problem = self.given(path)
