@@ -194,6 +194,9 @@ class _Way:
         self._made, self._before = 0, Stats()
         self._status, self._reason = Status.FINISHED, ""
         self.t = stepper.t
+        if grid.size:
+            watched: Any = stepper
+            watched.destination = float(grid[-1])  # collapsed steps are judged by the whole way
         if kept is not None:
             stepper.restore(kept["stepper"])
             self._t, self._y, self._made, self._before = [kept["t"]], [kept["y"]], kept["made"], kept["stats"]

@@ -1,6 +1,7 @@
 """When steps of varying length have collapsed: the same rule for every method, ours and the peers'."""
 
 import math
+from typing import Any
 
 CRAWL_STEPS = 200_000
 """Steps after which a method must have got somewhere."""
@@ -80,3 +81,18 @@ class Crawl:
             f"the solution seems to blow up at t = {goal:.9g}: {self._total} steps came to t = {t!r}, each "
             f"doubling of their number by less, while the state grew to {size:.1e}."
         )
+
+
+def crawl(stepper: Any, t: float, end: float) -> Crawl:
+    """Return what watches a stepper on its way from ``t`` to ``end``.
+
+    Where somebody has it go piece by piece, to its attribute ``destination``, one watch serves all the
+    pieces, and what is a small share of the way is measured by the whole of it.
+    """
+    destination = getattr(stepper, "destination", None)
+    if destination is None:
+        return Crawl(t, end)
+    watch = getattr(stepper, "_crawl", None)
+    if watch is None:
+        stepper._crawl = watch = Crawl(t, destination)
+    return watch

@@ -13,7 +13,7 @@ from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.one_thread import one_thread
 from integrators.options import SHORTEST
 from integrators.protocol import Array, Samples, Stats, Status
-from integrators.watchdog import Crawl
+from integrators.watchdog import crawl
 
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
@@ -108,7 +108,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
-        self._watch = Crawl(self.t, float(times[-1]))
+        self._watch = crawl(self, self.t, float(times[-1]))
         if not self._program.breakpoints.size:
             states, outcome, why = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, why)
@@ -142,8 +142,8 @@ class AdaptiveStepper(HBVMStepper):
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."
             )
-        crawl = self._watch.sees(self.t, steps, float(np.abs(self.y).max()))
-        return (Status.STALLED, crawl) if crawl else None
+        why = self._watch.sees(self.t, steps, float(np.abs(self.y).max()))
+        return (Status.STALLED, why) if why else None
 
     @one_thread
     def walk(
@@ -165,7 +165,7 @@ class AdaptiveStepper(HBVMStepper):
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
         self._face(end)
         outcome, steps, why, ctx = BUDGET, 0, None, self._context
-        self._watch = Crawl(self.t, end)
+        self._watch = crawl(self, self.t, end)
         while outcome == BUDGET and (limit is None or steps < limit) and why is None:
             # fewer come where the implicit solver is made
             n = self._budget(None if limit is None else limit - steps)

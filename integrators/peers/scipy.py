@@ -14,7 +14,7 @@ from integrators.options import NotNegative, Share
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.stepping import ProgramBase, StepperBase
-from integrators.watchdog import Crawl
+from integrators.watchdog import Crawl, crawl
 from problems.errors import InputError
 from problems.problem import System
 
@@ -234,7 +234,7 @@ class SciPyStepper(StepperBase):
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         sign = self._towards(float(grid[-1]))
         states = np.empty((grid.size, self._y.size))
-        watch = Crawl(self._solver.t, float(grid[-1]))
+        watch = crawl(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
             self._solver.t_bound = t if how == "land" else sign * math.inf
             while sign * (self._solver.t - t) < 0.0:
@@ -253,7 +253,7 @@ class SciPyStepper(StepperBase):
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         self._solver.t_bound = sign * math.inf
-        watch = Crawl(self._solver.t, end)
+        watch = crawl(self, self._solver.t, end)
         times, states = [self._t], [self._y]
         while self._solver.t != times[-1] or self._step(watch):
             if sign * (self._solver.t - end) > 0.0:

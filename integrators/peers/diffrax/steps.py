@@ -8,7 +8,7 @@ import numpy as np
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status
 from integrators.stepping import FixedStepper, ProgramBase, StepperBase
-from integrators.watchdog import CRAWL_STEPS, Crawl
+from integrators.watchdog import CRAWL_STEPS, Crawl, crawl
 from problems.errors import InputError
 from problems.problem import System
 
@@ -200,7 +200,7 @@ class AdaptiveStepper(StepperBase):
             self._inner = None
             found, accepted, rejected, arrived = self._way.plain(t, end, y, self._par, *self._tolerances)
             if not arrived:  # why not is found out under a watch
-                _, y = self._watched(t, y, end, Crawl(t, end))
+                _, y = self._watched(t, y, end, crawl(self, t, end))
                 if self._status.failed:
                     return grid[:i], states[:i]
                 found, accepted, rejected, self._inner = y, 0, 0, None
@@ -214,7 +214,7 @@ class AdaptiveStepper(StepperBase):
         if how == "end":
             return self._ends(grid)
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y
-        watch = Crawl(t, float(grid[-1]))
+        watch = crawl(self, t, float(grid[-1]))
         for i, end in enumerate(grid.tolist()):
             t, y = self._watched(t, y, end, watch)
             if self._status.failed:

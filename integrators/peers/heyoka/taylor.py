@@ -18,7 +18,7 @@ from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
 from integrators.protocol import Array, MethodBase, Status, Trajectories
 from integrators.stepping import ProgramBase, StepperBase
-from integrators.watchdog import CRAWL_STEPS, Crawl
+from integrators.watchdog import CRAWL_STEPS, crawl
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)
@@ -250,7 +250,7 @@ class TaylorStepper(StepperBase):
 
     def _land(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
-        watch = Crawl(self._ta.time, t)
+        watch = crawl(self, self._ta.time, t)
         while True:
             before = self._ta.time
             outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS, write_tc=write_tc)
