@@ -121,6 +121,7 @@ class Context(Memory):
     raw_matrix = Array()  # values -> stages (THROUGH: coefficients -> stages), for a step of 1
     matrix = Array(8, "matrix_size")  # the same for the step h
     extrapolation = Array()  # the previous step's values -> stages
+    two_steps = Integer()  # whether first stages come from two steps
     extrapolation_two = Array()  # the values of the step before that one, and its own -> stages; route 8
     matrix_size = Integer()  # in vectors of 8
     projection = Array()  # values -> coefficients
@@ -259,7 +260,7 @@ class Context(Memory):
             "rows": rows, "padded": -(-rows // 8) * 8, "lanes": c.lanes, "calls": -(-c.k // c.lanes),
             "chunks": -(-c.k // 8), "route": c.route, "second": shape.second, "unit": shape.unit,
             "k": c.k, "s": c.s, "matrix_size": tables["raw_matrix"].size // 8, "groups": groups,
-            "first": c.first, "mode_groups": mode_groups, "modes": c.modes,
+            "first": c.first, "two_steps": int(c.two_steps), "mode_groups": mode_groups, "modes": c.modes,
             "most_groups": max(groups, mode_groups),
             "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1,
         }  # fmt: skip

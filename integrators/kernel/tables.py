@@ -68,6 +68,11 @@ class Constants:
     arrays: dict[str, Array]
 
     @property
+    def two_steps(self) -> bool:
+        """Whether the first stages of a step come from the values of the two before it."""
+        return from_two(self.k, self.s, self.route)
+
+    @property
     def first(self) -> int:
         """Coefficients that come before gamma_0: on the route THROUGH the first ones are there twice."""
         return min(MOMENTS, self.s) if self.route == THROUGH else 0
@@ -114,10 +119,15 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     return Constants(k, s, lanes, second, route, min(k, MODES_VARYING), arrays)
 
 
+def from_two(k: int, s: int, route: int) -> bool:
+    """Whether first stages come from two steps; with s < k - 1 their polynomials do not join so smoothly."""
+    return route == 8 and s >= k - 1
+
+
 def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
     modes = min(k, MODES_VARYING)
     inner = s if route == THROUGH else k
-    extrapolations = [(modes, k), (k, modes), (k, 2 * k if route == 8 else 0)]
+    extrapolations = [(modes, k), (k, modes), (k, 2 * k if from_two(k, s, route) else 0)]
     return [(k, 1)] * 6 + [(k, inner)] * 2 + [(s, k), *extrapolations, (k, min(MOMENTS, k))]
 
 
@@ -143,7 +153,7 @@ def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
         "projection": keep_moments(t.projection.hi, t.projection.lo, basis[:, : min(MOMENTS, k)]),
         "into_modes": (basis[:, :modes] * t.weights.hi[:, None]).T,
         "beyond": legendre.legendre(1.0 + t.nodes.hi, modes),
-        "beyond_two": legendre.beyond_two(k, MODES) if route == 8 else np.empty((k, 0)),
+        "beyond_two": legendre.beyond_two(k, MODES) if from_two(k, s, route) else np.empty((k, 0)),
         "basis": basis[:, : min(MOMENTS, k)],
     }
 
@@ -228,7 +238,7 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         extrapolation = high @ beyond @ a["into_modes"][modes]
     columns = constants.route if constants.route > 1 else None
     more = {}
-    if constants.route == 8:
+    if constants.two_steps:
         older, last = np.hsplit(high @ a["beyond_two"], 2)
         parts = [packed(part, columns=columns, repeat=True) for part in (older, last)]
         more["extrapolation_two"] = joined(parts)

@@ -105,7 +105,7 @@ def start_plain(ctx):
 @compiled
 def start_extrapolated(ctx):
     """First stages from the values of the previous step, or of two, of the same length."""
-    if ctx.route == 8 and ctx.older_length == ctx.h:
+    if ctx.two_steps != 0 and ctx.older_length == ctx.h:
         product_of_two(ctx, ctx.extrapolation_two, ctx.older_values)
     elif ctx.route == THROUGH:
         through(ctx, ctx.mode_projection, ctx.mode_groups, ctx.extrapolation)
