@@ -81,8 +81,8 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
 
 
 def test_other_problems_and_too_few_rounds_are_refused(capsys):
-    with pytest.raises(UnknownNameError, match="'cr3bp'"):
-        runs.campaign(["cr3bp"])
+    with pytest.raises(UnknownNameError, match="'toda'"):
+        runs.campaign(["toda"])
     with pytest.raises(InputError, match="rounds must be at least 2, not 1"):
         runs.campaign(["kepler"], 1)
     assert main(["automatic", "keppler"]) == 2
