@@ -23,7 +23,8 @@ MOST_YEARS = 1e9
 def endure(
     years: Annotated[float | None, typer.Option(help="The span; default a million.")] = None,
     starts: Annotated[
-        int | None, typer.Option(min=1, help="Trajectories of each method, from perturbed starts; default 8.")
+        int | None,
+        typer.Option(min=1, help="Trajectories of each method, from perturbed starts; default 16."),
     ] = None,
     method: Annotated[
         list[str] | None, typer.Option("-m", "--method", help="Other methods than the declared ones.")

@@ -38,13 +38,13 @@ list --foo                                                 | No such option: --f
 --foo                                                      | No such option: --foo
 -x                                                         | No such option: -x
 run                                                        | give a campaign, or at least one -p
-run ""                                                     | unknown campaign ''; known: drift, ensemble,
+run ""                                                     | unknown campaign ''; known: automatic, drift,
 run sitnikof                                               | unknown campaign 'sitnikof'; did you mean
 run missing.toml                                           | there is no campaign file 'missing.toml'
-run .                                                      | unknown campaign '.'; known: drift, ensemble,
-run .toml                                                  | unknown campaign '.toml'; known: drift,
-run /                                                      | unknown campaign '/'; known: drift, ensemble,
-run /dev/null                                              | unknown campaign '/dev/null'; known: drift,
+run .                                                      | unknown campaign '.'; known: automatic, drift,
+run .toml                                                  | unknown campaign '.toml'; known:
+run /                                                      | unknown campaign '/'; known: automatic, drift,
+run /dev/null                                              | unknown campaign '/dev/null'; known:
 run sitnikov sitnikov                                      | Got unexpected extra argument(s) (sitnikov)
 run sitnikov --jobs 0                                      | Invalid value for '--jobs': Input should be
 run sitnikov --jobs -1                                     | Invalid value for '--jobs': Input should be
@@ -124,7 +124,7 @@ reference "kepler(e=0.61)" --until a                       | Invalid value for '
 reference "kepler(e=0.61)" --until 0                       | until=0.0 must lie between 0.0 and
 reference "kepler(e=0.61)" --until 1 -o /dev/null/x/y      | cannot write to the directory '/dev/null/x':
 reference "kepler(e=0.61)" --until 1 -o /proc/y            | cannot write to the directory '/proc': No such
-automatic nosuch                                           | unknown problem of the race 'nosuch'; known:
+automatic nosuch                                           | unknown problem of automatic 'nosuch'; known:
 automatic kepler --rounds 0                                | rounds must be at least 2, not 0
 automatic kepler --rounds a                                | Invalid value for '--rounds': Input should be a
 automatic kepler --rounds -5                               | rounds must be at least 2, not -5
@@ -133,7 +133,7 @@ automatic --general --limit -1                             | limit must be posit
 automatic --general --limit 0                              | limit must be positive, not 0.0
 automatic --general --limit nan                            | limit must be positive, not nan
 automatic --general --limit a                              | Invalid value for '--limit': Input should be a
-race -p nosuch                                             | unknown problem of the race 'nosuch'; known:
+race -p nosuch                                             | unknown problem of race 'nosuch'; known:
 race --rounds 1                                            | Invalid value for '--rounds': Input should be
 race --rounds 0                                            | Invalid value for '--rounds': Input should be
 race --rounds a                                            | Invalid value for '--rounds': Input should be a
@@ -150,11 +150,11 @@ endure --starts 0                                          | Invalid value for '
 endure --starts a                                          | Invalid value for '--starts': Input should be a
 endure -m "HBVM(kk=3)" --quick                             | HBVM(kk=3): unknown option of HBVM 'kk'; did
 endure -m "nosuch()" --quick                               | nosuch(): unknown method 'nosuch'; known:
-endure --redraw                                            | there is no result of endure in 'runs/endure';
-endure --redraw --out nowhere                              | there is no result of endure in 'nowhere'; run:
-endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x':
-endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x':
-endure -m "Leapfrog(h=0.1)" -m "Leapfrog(h=0.1)" --quick --out /dev/null/x | cannot write to the directory
+endure --redraw                                            | the directory 'runs/endure' does not exist; make some
+endure --redraw --out nowhere                              | the directory 'nowhere' does not exist; make some
+endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
+endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x
+endure -m "Leapfrog(h=0.1)" -m "Leapfrog(h=0.1)" --quick --out /dev/null/x | is given twice
 paper nosuch                                               | unknown part of the paper 'nosuch'; known:
 paper --jobs 0                                             | Invalid value for '--jobs': Input should be
 paper claims --jobs a                                      | Invalid value for '--jobs': Input should be a

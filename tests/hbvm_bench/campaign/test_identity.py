@@ -29,7 +29,13 @@ print(*(name for name in sys.modules if name.partition(".")[0] in packages))
 # `import integrators` brings, since the bench takes its steps by `hbvm_bench.measure.solve`.
 NOT_ASKED = {
     *("hbvm_bench.run.worker", "integrators.kernel.native.store"),
-    *("integrators", "integrators.integrate", "integrators.registry", "integrators.watch"),
+    *(
+        "integrators",
+        "integrators.integrate",
+        "integrators.many",
+        "integrators.registry",
+        "integrators.watch",
+    ),
 }
 
 
