@@ -150,7 +150,7 @@ endure --starts 0                                          | Invalid value for '
 endure --starts a                                          | Invalid value for '--starts': Input should be a
 endure -m "HBVM(kk=3)" --quick                             | HBVM(kk=3): unknown option of HBVM 'kk'; did
 endure -m "nosuch()" --quick                               | nosuch(): unknown method 'nosuch'; known:
-endure --redraw                                            | the directory 'runs/endure' does not exist; make some
+endure --redraw                                            | the directory 'runs/endure' does not exist;
 endure --redraw --out nowhere                              | the directory 'nowhere' does not exist; make some
 endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
 endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x
