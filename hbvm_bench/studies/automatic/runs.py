@@ -45,8 +45,8 @@ class Duel:
 
     @property
     def problem(self) -> str:
-        """Its name."""
-        return self.theirs.case.problem.partition("(")[0]
+        """The problem, as the campaign writes it."""
+        return self.theirs.case.problem
 
     @property
     def goal(self) -> float:
