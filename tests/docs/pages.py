@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -64,9 +65,13 @@ def cells(path: Path) -> list[str]:
 
 def run(path: Path) -> None:
     """Run the cells of a page in order, in one name space, as a notebook does."""
-    names: dict[str, object] = {"__name__": "__main__", "_shell": shell, "_write": write}
-    for number, cell in enumerate(cells(path), 1):
-        exec(compile(plain(cell), f"{path.name}, cell {number}", "exec"), names)  # noqa: S102
+    module = sys.modules["page"] = ModuleType("page")  # where pickle finds what the page defines
+    vars(module).update(_shell=shell, _write=write)
+    try:
+        for number, cell in enumerate(cells(path), 1):
+            exec(compile(plain(cell), f"{path.name}, cell {number}", "exec"), vars(module))  # noqa: S102
+    finally:
+        del sys.modules["page"]
 
 
 def shell(line: str) -> None:
