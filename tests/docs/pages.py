@@ -8,10 +8,13 @@ from types import ModuleType
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-MADE = ("_build", "made", "api")  # folders that a build of the site writes
+MADE = {"_build", "made", "api"}  # folders that a build of the site writes
 
 FENCE = re.compile(r"^(`{3,}|~{3,})(.*?)^\1[ \t]*$", re.MULTILINE | re.DOTALL)
-CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(?:---\n.*?\n---\n|(?::[^\n]*\n)+)?(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
+CELL = re.compile(
+    r"^```\{code-cell\}[^\n]*\n(?:---\n.*?\n---\n|(?::[^\n]*\n)+\n?)?(.*?)^```[ \t]*$",
+    re.MULTILINE | re.DOTALL,
+)
 TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```", re.MULTILINE | re.DOTALL)
 CARD = re.compile(r"^:link: (\S+)$", re.MULTILINE)
 DOC = re.compile(r"\{doc\}`(?:[^`<]*<)?([^`>]+)>?`")
@@ -20,42 +23,47 @@ HEADING = re.compile(r"^#{1,6} +(.*?) *$", re.MULTILINE)
 
 
 def sources() -> list[Path]:
-    """Return the pages that are written by hand or kept, in the repository."""
-    found = [path for path in DOCS.rglob("*.md") if not set(path.relative_to(DOCS).parts) & set(MADE)]
+    """Return the pages that are in the repository."""
+    found = [path for path in DOCS.rglob("*.md") if not MADE & set(path.relative_to(DOCS).parts)]
     return sorted([*found, ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
-
-
-def prose(path: Path) -> str:
-    """Return a page without its code."""
-    return re.sub(r"`[^`\n]*`", "", FENCE.sub("", path.read_text(encoding="utf-8")))
 
 
 def links(path: Path) -> list[str]:
     """Return where the links and pictures of a page lead, as they are written, without those to other sites."""
-    found = [a or b for a, b in LINK.findall(prose(path))]
+    prose = re.sub(r"`[^`\n]*`", "", FENCE.sub("", path.read_text(encoding="utf-8")))
+    found = [markdown or html for markdown, html in LINK.findall(prose)]
     return [target for target in found if not re.match(r"[a-z]+:", target)]
 
 
-def anchors(path: Path) -> set[str]:
-    """Return the names that headings have in addresses."""
-    found: dict[str, int] = {}
-    made = set()
-    for heading in HEADING.findall(FENCE.sub("", path.read_text(encoding="utf-8"))):
-        words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).lower()
-        slug = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
-        seen = found[slug] = found.get(slug, -1) + 1
-        made.add(f"{slug}-{seen}" if seen else slug)
-    return made
+def listed(path: Path) -> list[str]:
+    """Return the pages that the tables of contents, the cards and the ``{doc}`` roles of a page name."""
+    text = path.read_text(encoding="utf-8")
+    lines = [
+        line for block in TOCTREE.findall(text) for line in block.split("\n") if not line.startswith(":")
+    ]
+    return [line.strip() for line in [*lines, *CARD.findall(text), *DOC.findall(text)] if line.strip()]
+
+
+def page(name: str, source: Path) -> Path:
+    """Return the page that another one names as Sphinx does: from its own folder, or from the top after a /."""
+    return (DOCS / f"{name[1:]}.md" if name.startswith("/") else source.parent / f"{name}.md").resolve()
 
 
 def clicks(path: Path) -> set[Path]:
-    """Return the pages that one click on a page opens: links, cards, the tables of contents."""
-    text = path.read_text(encoding="utf-8")
-    lines = [line for block in TOCTREE.findall(text) for line in block.splitlines() if not line.startswith(":")]
-    named = [f"{line.strip()}.md" for line in [*lines, *CARD.findall(text), *DOC.findall(text)] if line.strip()]
-    written = [target.partition("#")[0] for target in links(path)]
-    opened = [(path.parent / target).resolve() for target in [*named, *written] if target]
-    return {target for target in opened if target.suffix == ".md" and target.is_file() and DOCS in target.parents}
+    """Return the pages of the site that one click on a page opens."""
+    opened = {page(name, path) for name in listed(path)}
+    opened |= {(path.parent / target.partition("#")[0]).resolve() for target in links(path)}
+    return {target for target in opened if target.suffix == ".md" and DOCS in target.parents}
+
+
+def anchors(path: Path) -> set[str]:
+    """Return the names that the headings of a page have in addresses."""
+    seen: dict[str, int] = {}
+    for heading in HEADING.findall(FENCE.sub("", path.read_text(encoding="utf-8"))):
+        words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading).lower()
+        slug = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        seen[slug] = seen.get(slug, 0) + 1
+    return {f"{slug}-{i}" if i else slug for slug, count in seen.items() for i in range(count)}
 
 
 def cells(path: Path) -> list[str]:
@@ -74,22 +82,6 @@ def run(path: Path) -> None:
         del sys.modules["page"]
 
 
-def shell(line: str) -> None:
-    """Run a line of a page that is for a shell, and print what it prints."""
-    program = f"'{sys.executable}' -m hbvm_bench.cli"
-    done = subprocess.run(
-        re.sub(r"^hbvm-bench\b", lambda _: program, line),
-        shell=True, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
-    print(done.stdout)
-    assert done.returncode == 0, f"{line}: exit code {done.returncode}\n{done.stdout}"
-
-
-def write(name: str, text: str) -> None:
-    """Write a file that a cell of a page writes."""
-    Path(name).write_text(text, encoding="utf-8")
-
-
 def plain(cell: str) -> str:
     """Return a cell in plain Python: files and lines for a shell by functions, without settings of notebooks."""
     first, _, rest = cell.partition("\n")
@@ -97,3 +89,18 @@ def plain(cell: str) -> str:
         return f"_write({first.split()[1]!r}, {rest!r})"
     lines = [line for line in cell.splitlines() if not line.startswith("%")]
     return "\n".join(f"_shell({line[1:]!r})" if line.startswith("!") else line for line in lines)
+
+
+def shell(line: str) -> None:
+    """Run a line that a page gives to a shell, and print what it prints; the command is that of this interpreter."""
+    program = re.sub(r"^hbvm-bench\b", lambda _: f"'{sys.executable}' -m hbvm_bench.cli", line)
+    done = subprocess.run(
+        program, shell=True, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    print(done.stdout)
+    assert done.returncode == 0, f"{line}: exit code {done.returncode}\n{done.stdout}"
+
+
+def write(name: str, text: str) -> None:
+    """Write a file that a cell of a page writes."""
+    Path(name).write_text(text, encoding="utf-8")
