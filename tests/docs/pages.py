@@ -1,4 +1,4 @@
-"""The documentation as its sources are: which pages there are, where their links lead, what their cells run."""
+"""The documentation as its sources are: its pages, where their links lead, what their cells run."""
 
 import re
 import subprocess
@@ -29,7 +29,7 @@ def sources() -> list[Path]:
 
 
 def links(path: Path) -> list[str]:
-    """Return where the links and pictures of a page lead, as they are written, without those to other sites."""
+    """Return where links and pictures of a page lead, as they are written, without other sites."""
     prose = re.sub(r"`[^`\n]*`", "", FENCE.sub("", path.read_text(encoding="utf-8")))
     found = [markdown or html for markdown, html in LINK.findall(prose)]
     return [target for target in found if not re.match(r"[a-z]+:", target)]
@@ -45,7 +45,7 @@ def listed(path: Path) -> list[str]:
 
 
 def page(name: str, source: Path) -> Path:
-    """Return the page that another one names as Sphinx does: from its own folder, or from the top after a /."""
+    """Return the page that another one names, from its own folder, or from the top after a slash."""
     return (DOCS / f"{name[1:]}.md" if name.startswith("/") else source.parent / f"{name}.md").resolve()
 
 
@@ -83,7 +83,7 @@ def run(path: Path) -> None:
 
 
 def plain(cell: str) -> str:
-    """Return a cell in plain Python: files and lines for a shell by functions, without settings of notebooks."""
+    """Return a cell in plain Python: files and shells by functions, without settings of notebooks."""
     first, _, rest = cell.partition("\n")
     if first.startswith("%%writefile "):
         return f"_write({first.split()[1]!r}, {rest!r})"
@@ -92,10 +92,9 @@ def plain(cell: str) -> str:
 
 
 def shell(line: str) -> None:
-    """Run a line that a page gives to a shell, and print what it prints; the command is that of this interpreter."""
-    program = re.sub(r"^hbvm-bench\b", lambda _: f"'{sys.executable}' -m hbvm_bench.cli", line)
+    """Run a line for a shell, and print what it prints."""
     done = subprocess.run(
-        program, shell=True, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        line, shell=True, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     )
     print(done.stdout)
     assert done.returncode == 0, f"{line}: exit code {done.returncode}\n{done.stdout}"
