@@ -42,7 +42,7 @@ class HBVM(MethodBase):
     Properties, each asserted in ``tests/integrators``:
 
     * order 2s for every k >= s (`test_order`);
-    * symmetric and perfectly A-stable: |R(iy)| = 1 (`test_tableau`, `test_hbvm`);
+    * symmetric and perfectly A-stable: ``|R(iy)| = 1`` (`test_tableau`, `test_hbvm`);
     * k = s is the Gauss-Legendre method, which is symplectic and keeps quadratic
       invariants; with k > s it is neither (`test_energy`);
     * a polynomial Hamiltonian of degree nu is conserved to round-off if and only
