@@ -136,6 +136,17 @@ class HBVM(MethodBase):
 
     P. Amodio, L. Brugnano, F. Iavernaro, *Arbitrarily high-order energy-conserving
     methods for Poisson problems*, Numer. Algorithms (2022), doi:10.1007/s11075-022-01285-z.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import HBVM, integrate
+    >>> problem = problems.load("henon_heiles", t_end=1000.0)
+    >>> solution = integrate(problem, HBVM(k=6, s=4, h=0.5), [0.0, 1000.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-14)  # of degree 3, so that 6 nodes do
+    True
+    >>> integrate(problem, HBVM(), [1000.0]).status  # chooses everything itself
+    <Status.FINISHED: 'finished'>
     """
 
     k: Stages | None = None
