@@ -24,7 +24,7 @@ import msgspec
 import numpy as np
 
 from hbvm_bench.campaign.file import Case, TimingPlan
-from hbvm_bench.campaign.identity import Resolved, resolve
+from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
@@ -157,7 +157,7 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         names = resolved.problem.system.invariant_names
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
-        grid = resolved.case.grid.times(resolved.problem, getattr(resolved.method, "h", None))
+        grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))
         program = _compiled(resolved, directory)
         if (asked := resolved.case.ensemble) is not None:
             return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
