@@ -13,9 +13,8 @@ from hbvm_bench.campaign.file import Campaign, name_of
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.commands import measuring
 from hbvm_bench.commands.listing import as_json as run_as_json
-from hbvm_bench.commands.run import carry_out
+from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
@@ -158,4 +157,4 @@ def _command(
     words += ["--rounds", str(rounds)] if rounds else []
     words += [] if compile_times is None else ["--compile" if compile_times else "--no-compile"]
     words += ["--avx2"] if avx2 else []
-    return measuring.command(words, out)
+    return as_typed(words, out)

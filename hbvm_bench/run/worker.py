@@ -116,7 +116,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         What this process has not loaded itself but found loaded, being a fork of ``parent``.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
-    _limit_and_die_with(parent)
+    limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     # complex states are no states, and their real parts are not either
@@ -137,7 +137,8 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         raise
 
 
-def _limit_and_die_with(parent: int) -> None:
+def limit_and_die_with(parent: int) -> None:
+    """Leave no core and no huge file behind, end first where memory is short, and with this parent."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
