@@ -20,9 +20,10 @@ from hbvm_bench.report.figures import motion, over_time, portraits, views
 from hbvm_bench.report.figures.canvas import Picture, styled
 from hbvm_bench.report.figures.drift import drift_figure
 from hbvm_bench.report.figures.over_time import Drawn, OverTime
-from hbvm_bench.report.figures.style import Look, method_name
+from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import GROUPS, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
@@ -161,7 +162,7 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
     kept: dict[str, Drawn] = {}
     by_name: dict[str, list[Drawn]] = {}
     for case in cases:
-        by_name.setdefault(method_name(case.record), []).append(case)
+        by_name.setdefault(family_of(case.record), []).append(case)
     for members in by_name.values():
         best = min(members, key=_rank)
         default = next((case for case in members if case.record.case.settings == "default"), best)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look, method_name, options, panels
+from hbvm_bench.report.figures.style import INK, MUTED, Look, options, panels
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import group_of
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ class Drawn:
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
         mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
-        name = f"{method_name(self.record)}  " if named else ""
+        name = f"{family_of(self.record)}  " if named else ""
         return f"{self.look.number}  {name}{options(self.record)}{mark}"
 
 
@@ -168,7 +169,7 @@ def panel_legend(
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
-    named = len({method_name(case.record) for case in cases}) > 1
+    named = len({family_of(case.record) for case in cases}) > 1
     handles = [
         Line2D(
             [],

@@ -14,7 +14,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, OURS, OWN, Row
 from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
-from hbvm_bench.summaries.points import family_of, number
+from hbvm_bench.summaries.points import family_of, front, number
 from hbvm_bench.summaries.standings import TIME
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
@@ -81,7 +81,7 @@ def _panel(
         spot = np.array([_seconds(record)]), np.array([_error(record, key)])
         traces.append(Trace(look[family_of(record)].number, text, *spot))
     for row, records in rows.items():
-        line = front(records, key)
+        line = front(records, lambda o: (_seconds(o), _error(o, key)))
         if len(line) > 1:
             x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
             number = look[family_of(line[0])].number
@@ -98,19 +98,8 @@ def _panel(
     )
 
 
-def front(records: Sequence[Record], key: str) -> list[Record]:
-    """Return the settings that none other beats in both time and error, by ascending time."""
-    best: list[Record] = []
-    least = math.inf
-    for record in sorted(records, key=lambda o: (_seconds(o), _error(o, key))):
-        if _error(record, key) < least:
-            best.append(record)
-            least = _error(record, key)
-    return best
-
-
 def _draw(axes: Axes, row: Row, records: Sequence[Record], key: str, look: Mapping[str, Look]) -> None:
-    line = front(records, key)
+    line = front(records, lambda o: (_seconds(o), _error(o, key)))
     lead = look[family_of(records[0])].light
     own = row.steps == OWN
     style = (0, (1, 1.2)) if own else "solid"

@@ -9,8 +9,7 @@ from hbvm_bench.commands.race import as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
 from hbvm_bench.studies.race import report, results, tables
-from hbvm_bench.studies.race.figures import front, work_precision
-from hbvm_bench.studies.race.results import ENERGY, POSITION
+from hbvm_bench.studies.race.figures import work_precision
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import record, save
 
@@ -117,12 +116,6 @@ def test_fixed_and_own_steps_are_rows_of_their_own_and_the_faster_counts(race):
     assert cells["ours, fixed step"].startswith("2 ms")
     assert cells["ours, own steps"].startswith("500 µs")
     assert cells["heyoka"].startswith("60.0×")
-
-
-def test_the_front_of_a_family_is_beaten_by_none_of_it(race):
-    ours = race.of(results.OURS)
-    assert [o.case.method for o in front(ours, POSITION)] == ["Gauss(s=8, h=2.0)", "Gauss(s=8, h=1.5)"]
-    assert [o.case.method for o in front(ours, ENERGY)] == ["Gauss(s=8, h=2.0)", "HBVM(k=16, s=8, h=2.0)"]
 
 
 def test_the_report_names_one_command_where_the_problems_together_are_one_run(race):
