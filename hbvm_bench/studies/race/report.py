@@ -75,8 +75,9 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
     return Document(
         "The race: who is how fast at which accuracy",
         [
-            "Time at the same energy and position error: every family with the same number of settings, "
-            "declared before the run, all in one process and interleaved round by round."
+            "Time at the same energy and position error: of every family the same number of settings for "
+            "either kind of step, fixed or its own, declared before the run, all in one process and "
+            "interleaved round by round."
         ],
         [
             *map(Note, machine.sentences(race.machine for race in in_order)),
