@@ -11,7 +11,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, st
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, PAPER, Look
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES, OURS, OWN, Row
+from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, Row
 from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
 from hbvm_bench.summaries.points import family_of, front, number
@@ -19,6 +19,7 @@ from hbvm_bench.summaries.standings import TIME
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
+DOTTED = (0, (1, 1.2))
 
 
 @styled
@@ -102,13 +103,12 @@ def _draw(axes: Axes, row: Row, records: Sequence[Record], key: str, look: Mappi
     line = front(records, lambda o: (_seconds(o), _error(o, key)))
     lead = look[family_of(records[0])].light
     own = row.steps == OWN
-    style = (0, (1, 1.2)) if own else "solid"
     axes.plot(
         [_seconds(o) for o in line],
         [_height(o, key) for o in line],
         color=lead,
         linewidth=1.1,
-        linestyle=style,
+        linestyle=DOTTED if own else "solid",
     )
     for record in records:
         mark = look[family_of(record)]
@@ -145,6 +145,10 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
                 label = name if family == OURS else FAMILIES[family].title
                 own = look[name]
                 handles.append(Line2D([], [], color=own.light, marker=own.marker, markersize=5, label=label))
+    for steps, face, style in ((FIXED, MUTED, "solid"), (OWN, PAPER, DOTTED)):
+        handles.append(
+            Line2D([], [], color=MUTED, marker="o", mfc=face, markersize=5, linestyle=style, label=steps)
+        )
     axes.legend(handles=handles, loc="center left", borderaxespad=0.0, fontsize=8.5)
 
 
