@@ -1,6 +1,6 @@
 """Errors over time, and what the figures of cases share: their panels and legends."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -51,8 +51,8 @@ class OverTime:
     ----------
     key, title, caption, label : str
         The label is the axis's.
-    get : callable
-        From the series of a case to times and values; ``None`` where it has none.
+    values, t : str
+        Names of the series that are drawn; a name that ends in a dot is the first that begins so.
     low, high : int
         Powers of ten of the axis.
     zero : bool
@@ -65,11 +65,17 @@ class OverTime:
     title: str
     caption: str
     label: str
-    get: Callable[[dict[str, Array]], tuple[Array, Array] | None]
+    values: str
     low: int
     high: int
+    t: str = "t"
     zero: bool = False
     joined: bool = True
+
+    def get(self, series: dict[str, Array]) -> tuple[Array, Array] | None:
+        """Return times and values of a case; ``None`` where it has none."""
+        names = [name for name in series if self.values in (name, f"{name.split('.')[0]}.")]
+        return (series[self.t], series[names[0]]) if names and series[self.t].size else None
 
 
 def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
