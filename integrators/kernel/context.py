@@ -242,6 +242,7 @@ class Context(Memory):
     rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
     length_limit = Real()  # no step is longer, for what the iteration allows
     longest = Real()  # no step is longer, for what the user allows
+    busy_implicit = Real()  # corrections of a step by the implicit solver to aim at, at most
     stop = Real()  # no step passes this time; infinite: none
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
