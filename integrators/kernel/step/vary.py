@@ -38,7 +38,7 @@ from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.size import ROUNDING
-from integrators.kernel.step.sweep import sweep, sweep_measured
+from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
@@ -84,7 +84,7 @@ def iterate(ctx):
     The first change and the rate of contraction, as it was at the last step, tell how many
     iterations need no test; how many remain then, the rate of this step.
     """
-    test(ctx, sweep_measured(ctx))
+    test(ctx, sweep_measured(ctx, 0))
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
@@ -92,8 +92,8 @@ def iterate(ctx):
     rate = known
     change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
     while ctx.outcome == RUNNING:
-        sweep(ctx, min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED))
-        strict = sweep_measured(ctx)
+        untested = min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED)
+        strict = sweep_measured(ctx, max(untested, 0))
         tries = ctx.tried - tried
         if strict > ROUNDING:
             change = binary_log(strict)
