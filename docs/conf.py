@@ -22,7 +22,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
-    "mathml",
+    "formulas",
     "made",
 ]
 exclude_patterns = ["_build", "_ext", "reference/made"]

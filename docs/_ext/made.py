@@ -1,4 +1,4 @@
-"""Pages that are made from the package itself at every build: commands, metrics, campaigns."""
+"""Pages that are made from the package itself at every build: commands, metrics, campaigns, citations."""
 
 from pathlib import Path
 
@@ -8,6 +8,7 @@ from sphinx.application import Sphinx
 
 from hbvm_bench import cli
 from hbvm_bench.campaign.file import load, shipped
+from hbvm_bench.commands import listing
 from hbvm_bench.measure.metrics import METRICS
 
 
@@ -35,10 +36,15 @@ def campaigns() -> str:
     return "\n".join(["| campaign | what it compares |", "|:--|:--|", *rows, ""])
 
 
+def citations() -> str:
+    """Return how authors ask to be cited, as `hbvm-bench cite` prints it."""
+    return "\n\n".join(["```bibtex", *listing.citations(()), "```", ""])
+
+
 def _write(app: Sphinx) -> None:
     made = Path(app.srcdir) / "reference" / "made"
     made.mkdir(parents=True, exist_ok=True)
-    for make in (commands, metrics, campaigns):
+    for make in (commands, metrics, campaigns, citations):
         path, text = made / f"{make.__name__}.md", make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
             path.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The command ``hbvm-bench compare``."""
+"""``hbvm-bench compare | merge | export``: what is done with runs."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -10,8 +10,11 @@ from rich.console import Console
 from rich.text import Text
 
 from hbvm_bench.report import terminal
+from hbvm_bench.store import merge as merging
+from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import compare as comparing
+from hbvm_bench.summaries import export as exporting
 from hbvm_bench.summaries.table import Table
 
 CHANGED = 1
@@ -70,4 +73,24 @@ def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None
         terminal.print_table(Table("", head, rows, words=range(len(head))))
 
 
-__all__ = ["compare"]
+def merge(
+    runs: Annotated[list[Path], typer.Argument(help="Two runs or more.")],
+    out: Annotated[Path, typer.Option("--out", help="A new directory.")],
+) -> None:
+    """Put several runs together in a new one; of a case in several, the one that got further."""
+    cases, records, left_out = merging.merge(merging.stores(runs), Store(out))
+    print(f"{records} of {cases} cases in {out}")
+    if left_out:
+        print(f"{left_out} left out: damaged, or measured by another version of hbvm-bench; run them again")
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="A file that ends in .csv or .parquet.")],
+    table: Annotated[
+        str, typer.Option(help="cases; timings, one row per sample; or series, one row per number.")
+    ] = "cases",
+) -> None:
+    """Write a run as a flat table, for a spreadsheet or a data frame."""
+    ensure_writable(out.parent)
+    print(f"{exporting.export(Store(directory), out, table)} rows in {out}")
