@@ -24,6 +24,7 @@ extensions = [
     "sphinx_design",
     "formulas",
     "made",
+    "reports",
 ]
 exclude_patterns = ["_build", "_ext", "reference/made"]
 templates_path = ["_templates"]
