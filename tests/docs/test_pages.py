@@ -11,7 +11,6 @@ from tests.docs import pages
 
 EXECUTED = [path for path in pages.sources() if pages.cells(path)]
 TUTORIALS = pages.listed(pages.DOCS / "tutorials" / "index.md")
-LESSONS = [path for path in EXECUTED if path.parent.name != "theory"]
 PEERS = ("heyoka", "rebound", "diffrax", "jax")
 
 
@@ -40,7 +39,7 @@ def test_a_tutorial_runs_something_and_says_what_next(name):
     assert page.read_text(encoding="utf-8").partition("\n## What next\n")[2].count("](") >= 2
 
 
-@pytest.mark.parametrize("page", LESSONS, ids=_name)
+@pytest.mark.parametrize("page", EXECUTED, ids=_name)
 def test_every_picture_is_described_in_words(page):
     drawn = sum("plt.show()" in cell for cell in pages.cells(page))
     assert drawn >= 1
