@@ -1,6 +1,7 @@
 """One traced system to source for numpy, numba, JAX and heyoka: the same operations in the same order."""
 
 import hashlib
+import math
 import re
 import warnings
 from collections.abc import Callable
@@ -30,8 +31,11 @@ BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
 SLOW = 10  # operations that take as long to compile as one of:
 _SLOW = {*FUNCTIONS, "atan2", "table"} - {"sqrt", "abs", "sign"}
-_NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
-from math import acos, asin, atan, atan2, cosh, erf, sinh, tanh
+_MATHEMATICS = (
+    "acos", "asin", "atan", "atan2", "copysign", "cos", "cosh", "erf", "exp", "fabs", "log", "sin", "sinh",
+    "sqrt", "tan", "tanh",
+)  # fmt: skip
+_NUMBA_HEAD = f"""from math import {", ".join(_MATHEMATICS)}
 
 import numba
 import numpy as np
@@ -156,6 +160,13 @@ def numpy(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
 def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return a function that is none of a system's own, such as one of `System.trace`, like `numpy`."""
     return _on_arrays(_written(function, name, "numpy", limit), len(function.outputs))
+
+
+def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
+    """Return the source of such a function for numba, and it as a Python function that numba can compile."""
+    made = _written(function, name, "numba", SMALL)
+    namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in _MATHEMATICS}}
+    return made.text, _executed(made, namespace)
 
 
 def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
@@ -309,6 +320,7 @@ __all__ = [
     "heyoka",
     "jax",
     "numba",
+    "numba_of",
     "numpy",
     "numpy_of",
     "source",
