@@ -3,7 +3,9 @@
 from integrators.kernel.events.memory import FINE, FINEST
 from integrators.kernel.events.sample import is_finite, node
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, spread
+from integrators.kernel.simd.views import doubles
 
 NEAR = 0.1  # of the largest value: an extremum below this may reach zero
 UNRESOLVED = 1e-3  # of the largest coefficient: a tail as large says that there are too few samples
@@ -13,20 +15,23 @@ INFINITY = float("inf")
 @compiled
 def transform(search, degree):
     """Set the coefficients from the samples; return whether all are finite, and whether they are too few."""
-    stride, values, coefficients = FINE * FINEST // degree, search.values, search.coefficients
-    top, tail, finite = 0.0, 0.0, True
+    values, coefficients = search.values, search.coefficients
+    table = doubles(search.transforms[degree // 8])
+    damage = 0.0
     for i in range(degree + 1):
-        finite = finite and is_finite(values[i])
+        damage += values[i] * 0.0
+    if damage != 0.0:
+        return False, False
+    width = degree + 8
+    for first in range(0, width, 8):
+        total = splat8(0.0)
+        for i in range(degree + 1):
+            total = fma(get(table, width * i + first), spread(values, i), total)
+        put(coefficients, first, total)
+    top = 0.0
     for j in range(degree + 1):
-        total = 0.5 * (values[0] + (values[degree] if j % 2 == 0 else -values[degree]))
-        for i in range(1, degree):
-            total += search.cosines[((i * j) % (2 * degree)) * stride] * values[i]
-        coefficients[j] = total * ((1.0 if j == 0 or j == degree else 2.0) / degree)
-        size = abs(coefficients[j])
-        top = max(top, size)
-        if j >= degree - 1:
-            tail = max(tail, size)
-    return finite, finite and tail > UNRESOLVED * top
+        top = max(top, abs(coefficients[j]))
+    return True, max(abs(coefficients[degree - 1]), abs(coefficients[degree])) > UNRESOLVED * top
 
 
 @compiled
@@ -41,24 +46,35 @@ def keeps_away(search, degree):
 
 @compiled
 def refine(search, degree):
-    """Set values at finer places: samples where there is one, else the polynomial."""
-    stride, angles, room = FINEST // degree, search.cosines, search.weights
-    for first in range(0, FINE * degree, 8):
-        for i in range(8):
-            room[i] = angles[(first + i) * stride]
-        x = get(room, 0)
-        here, after = splat8(0.0), splat8(0.0)
+    """Set values at finer places: samples where there is one, else the polynomial (Clenshaw's scheme)."""
+    stride, angles = FINEST // degree, search.cosines
+    x, p, coefficients = search.places, search.fine, search.coefficients
+    for i in range(FINE * degree):
+        x[i] = angles[i * stride]
+    none = splat8(0.0)
+    for i in range(0, FINE * degree, 32):  # four at a time, which hides the latency of a product
+        x0, x1, x2, x3 = get(x, i), get(x, i + 8), get(x, i + 16), get(x, i + 24)
+        y0, y1, y2, y3 = 2.0 * x0, 2.0 * x1, 2.0 * x2, 2.0 * x3
+        b0, b1, b2, b3, c0, c1, c2, c3 = none, none, none, none, none, none, none, none
         for j in range(degree, 0, -1):
-            here, after = 2.0 * x * here - after + spread(search.coefficients, j), here
-        put(room, 8, x * here - after + spread(search.coefficients, 0))
-        for i in range(8):
-            search.places[first + i] = (1.0 - room[i]) / 2.0
-            search.fine[first + i] = room[8 + i]
+            c = spread(coefficients, j)
+            b0, c0 = fma(y0, b0, c - c0), b0
+            b1, c1 = fma(y1, b1, c - c1), b1
+            b2, c2 = fma(y2, b2, c - c2), b2
+            b3, c3 = fma(y3, b3, c - c3), b3
+        c = spread(coefficients, 0)
+        put(p, i, fma(x0, b0, c - c0))
+        put(p, i + 8, fma(x1, b1, c - c1))
+        put(p, i + 16, fma(x2, b2, c - c2))
+        put(p, i + 24, fma(x3, b3, c - c3))
+        put(x, i, 0.5 * (1.0 - x0))
+        put(x, i + 8, 0.5 * (1.0 - x1))
+        put(x, i + 16, 0.5 * (1.0 - x2))
+        put(x, i + 24, 0.5 * (1.0 - x3))
     for i in range(degree + 1):
-        search.fine[FINE * i] = search.values[i]
-    search.places[FINE * degree] = 1.0
+        p[FINE * i] = search.values[i]
+    x[FINE * degree] = 1.0
     search.n = FINE * degree + 1
-    search.smooth = 1
 
 
 @compiled
@@ -71,15 +87,24 @@ def keep_samples(search, degree):
             search.fine[n] = search.values[i]
             n += 1
     search.n = n
-    search.smooth = 0
 
 
 @compiled
 def suspect(search):
     """Whether zeros are possible; set `Search.scale`."""
+    p, whole = search.fine, search.n // 8 * 8
+    lows, highs, leasts = splat8(INFINITY), splat8(-INFINITY), splat8(INFINITY)
+    for i in range(0, whole, 8):  # side by side
+        values = get(p, i)
+        lows, highs, leasts = min(lows, values), max(highs, values), min(leasts, abs(values))
+    put(search.found, 0, lows)
+    put(search.block, 0, highs)
+    put(search.times, 0, leasts)
     low, high, least = INFINITY, -INFINITY, INFINITY
-    for i in range(search.n):
-        value = search.fine[i]
-        low, high, least = min(low, value), max(high, value), min(least, abs(value))
+    for i in range(8):
+        low, high = min(low, search.found[i]), max(high, search.block[i])
+        least = min(least, search.times[i])
+    for i in range(whole, search.n):
+        low, high, least = min(low, p[i]), max(high, p[i]), min(least, abs(p[i]))
     search.scale = max(abs(low), abs(high))
     return search.n > 0 and ((low <= 0.0 and high >= 0.0) or least < NEAR * search.scale)

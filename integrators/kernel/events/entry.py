@@ -23,6 +23,7 @@ from integrators.kernel.events.sample import (
     sample_first,
     sign,
     time_at,
+    weigh_first,
 )
 from integrators.kernel.events.value import context, forget_states, noise_at, state_at, value_at
 from integrators.kernel.events.zeros import find_zeros
@@ -99,6 +100,7 @@ def set_end(ctx, search):
 @compiled
 def begin(ctx, search):
     """Set what is known of the functions at the start: one that is zero there is no event."""
+    weigh_first(ctx, search)
     for event in range(search.count):
         search.event = event
         value = function(ctx, search, search.time, search.step_state)
@@ -232,18 +234,15 @@ def divide(ctx, search):
 @compiled
 def vanishes(ctx, search):
     """Whether the function is no more than rounding all along: at both ends, and where it is largest."""
+    if not (is_nothing(ctx, search, 0.0) and is_nothing(ctx, search, 1.0)):
+        return False
     top = -1
     for i in range(search.n):
         if search.places[i] > 0.0 and search.places[i] < 1.0:
             if top < 0 or abs(search.fine[i]) > abs(search.fine[top]):
                 top = i
     largest = search.places[top] if top >= 0 else 0.5
-    return (
-        is_nothing(ctx, search, 0.0)
-        and is_nothing(ctx, search, 1.0)
-        and is_nothing(ctx, search, largest)
-        and is_nothing(ctx, search, 0.5)
-    )
+    return is_nothing(ctx, search, largest) and is_nothing(ctx, search, 0.5)
 
 
 @compiled

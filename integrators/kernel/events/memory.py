@@ -26,13 +26,18 @@ class Search(Memory):
     directions = Array("count", of=int)  # 1, -1, or 0 for all
     limits = Array("count", of=int)  # the occurrence that ends the integration; 0: none
     dim = Integer()
+    terms = Integer()  # of the step's polynomial
+    chunks = Integer()  # of eight first samples
     degree = Integer()  # of the polynomials through the first samples; a power of 2
     steps = Integer()  # address of the compiled steps, for partial ones
     own = Integer()  # address of the trajectory's context
     side = Integer()  # address of that for partial steps
     asked = Integer()  # address of `part`
-    part = Real()  # length of the partial step
-    cosines = Array()  # of the angles pi i / (FINE FINEST), over one turn
+    part = Real()  # length of the partial step ...
+    part_known = Real()  # ... and of the last one from the same state, if there was one
+    cosines = Array()  # of the angles pi i / (FINE FINEST)
+    transforms = Array(of=int)  # addresses of tables, samples -> coefficients, by an eighth of the degree
+    first_weights = Array(16, "terms", "chunks")  # `weights` at the first samples of a whole step
 
     # --- what lasts from step to step ---
     ends = Array("count")  # values of the functions at the present state
@@ -78,14 +83,13 @@ class Search(Memory):
     times = Array(8)
     block = Array("dim", 8)  # states, one in a column
     found = Array(16)  # values of a function on a block; [8]: 1 where it has raised
-    weights = Array(16)
+    weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
     values = Array(FINEST + 1)  # samples
-    coefficients = Array(FINEST + 1)  # of Chebyshev polynomials
+    coefficients = Array(FINEST + 8)  # of Chebyshev polynomials
     n = Integer()  # places where something is known
     places = Array(PLACES)
     fine = Array(PLACES)  # values of the polynomial there, or samples
     scale = Real()  # the largest of them
-    smooth = Integer()  # 1: the samples show the function
     lows = Array(PLACES, of=int)
     low_count = Integer()
     marks = Array(ROOM)  # places where the sign of the function is known

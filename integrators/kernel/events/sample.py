@@ -1,7 +1,8 @@
 """Functions on states: on the polynomial of the step eight at a time, and on one state."""
 
-from integrators.kernel.events.memory import FINE, FINEST
+from integrators.kernel.events.memory import FINE, FINEST, WHOLE
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_field, get, put, splat8, spread
 
 ROUNDING = 4 * 2.0**-52
@@ -42,21 +43,19 @@ def part_at(search, t):
 
 
 @compiled
-def interpolate8(ctx, search):
-    """Write the polynomial of the solved step at eight times to the block.
+def put_nodes(search, chunk, degree):
+    """Put the places of samples 1 + 8 chunk and of those that follow to where times are."""
+    stride = FINE * FINEST // degree
+    for i in range(8):
+        search.times[i] = 0.5 * (1.0 - search.cosines[(1 + 8 * chunk + i) * stride])
 
-    As `integrators.kernel.step.sample.interpolate`, which has the formulas; coefficients are projected already.
+
+@compiled
+def weigh(ctx, c, table):
+    """Set the weights of the step's polynomial at eight parts ``c`` of it: for slopes, then for positions.
+
+    See `integrators.kernel.step.sample.interpolate`, which has the formulas.
     """
-    rows, second, h = ctx.rows, ctx.second, ctx.h
-    state, gamma, block = ctx.state, ctx.coefficients, search.block
-    c = ((get(search.times, 0) - search.time) - search.time_low) / h
-    for d in range(rows):
-        if second:
-            i = 8 * (d // 4) + d % 4
-            put(block, 8 * d, spread(ctx.error, i + 4))
-            put(block, 8 * (rows + d), spread(ctx.error, i))
-        else:
-            put(block, 8 * d, spread(ctx.error, d))
     x = 2.0 * c - 1.0
     lower, here = splat8(0.0), c
     before, legendre = splat8(1.0), x
@@ -65,41 +64,66 @@ def interpolate8(ctx, search):
         upper = splat8(0.0)
         if j + 1 < ctx.s:
             upper = (after - before) / (2.0 * (2.0 * j + 3.0) ** 0.5)
-        slope_weight = h * here
         weight = 0.5 * here
         if j > 0:
             weight = lower / (-2.0 * (4.0 * j * j - 1.0) ** 0.5)
-        weight = h * (weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
-        i = ctx.first + j
-        for d in range(rows):
-            value = gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
-            if second:
-                put(block, 8 * d, get(block, 8 * d) + (ctx.row_factor[d] * value) * weight)
-                put(block, 8 * (rows + d), get(block, 8 * (rows + d)) + slope_weight * value)
-            else:
-                put(block, 8 * d, get(block, 8 * d) + slope_weight * value)
+        put(table, 16 * j, here)
+        put(table, 16 * j + 8, weight + upper / (2.0 * (4.0 * (j + 1.0) * (j + 1.0) - 1.0) ** 0.5))
         lower, here = here, upper
         before, legendre = legendre, after
-    for d in range(rows):
-        if second:
-            i = 8 * (d // 4) + d % 4
-            drift = c * (ctx.drift_factor[i] * state[i])
-            put(block, 8 * d, spread(state, i + 4) + (drift + get(block, 8 * d)))
-            put(block, 8 * (rows + d), spread(state, i) + get(block, 8 * (rows + d)))
-        else:
-            put(block, 8 * d, spread(state, d) + get(block, 8 * d))
 
 
 @compiled
-def fill(ctx, search, chunk, degree):
+def combine8(ctx, row, table):
+    """Return the sum of a row's coefficients times the weights in every other vector of a table."""
+    gamma, group = ctx.coefficients, 8 * ctx.padded
+    total = splat8(0.0)
+    for j in range(ctx.s):
+        i = ctx.first + j
+        total = fma(get(table, 16 * j), spread(gamma, (i // 8) * group + 8 * row + i % 8), total)
+    return total
+
+
+@compiled
+def interpolate8(ctx, c, table, block):
+    """Write the polynomial of the solved step at eight parts of it; the coefficients are set."""
+    rows, h, state, error = ctx.rows, ctx.h, ctx.state, ctx.error
+    for d in range(rows):
+        moved = h * combine8(ctx, d, table)
+        if ctx.second:
+            i = 8 * (d // 4) + d % 4
+            drift = c * (ctx.drift_factor[i] * state[i])
+            bent = (ctx.row_factor[d] * h) * combine8(ctx, d, table + 8)
+            put(block, 8 * d, state[i + 4] + (drift + (error[i + 4] + bent)))
+            put(block, 8 * (rows + d), state[i] + (error[i] + moved))
+        else:
+            put(block, 8 * d, state[d] + (error[d] + moved))
+
+
+@compiled
+def fill(ctx, search, chunk, degree, known):
     """Put states to the block: at samples 1 + 8 chunk and those that follow, the exact one at the end."""
-    for i in range(8):
-        j = 1 + 8 * chunk + i
-        search.times[i] = time_at(search, node(search, j, degree)) if j < degree else search.end
-    interpolate8(ctx, search)
-    for i in range(max(degree - 1 - 8 * chunk, 0), 8):
+    start, end, time, low = search.start, search.end, search.time, search.time_low
+    put_nodes(search, chunk, degree)
+    put(search.times, 0, start + get(search.times, 0) * (end - start))
+    c = ((get(search.times, 0) - time) - low) * (1.0 / ctx.h)
+    if known == 0:
+        weigh(ctx, c, search.weights)
+        interpolate8(ctx, c, search.weights, search.block)
+    else:
+        interpolate8(ctx, c, search.first_weights + 16 * search.terms * chunk, search.block)
+    if 8 * chunk + 8 == degree:
+        search.times[7] = end
         for d in range(search.dim):
-            search.block[8 * d + i] = search.end_state[d]
+            search.block[8 * d + 7] = search.end_state[d]
+
+
+@compiled
+def weigh_first(ctx, search):
+    """Set the weights at the first samples of a whole step."""
+    for chunk in range(search.chunks):
+        put_nodes(search, chunk, search.degree)
+        weigh(ctx, get(search.times, 0), search.first_weights + 16 * search.terms * chunk)
 
 
 @compiled
@@ -118,10 +142,10 @@ def call(ctx, search, event):
 @compiled
 def sample(ctx, search, degree):
     """Set `Search.values` of the function that is looked for, at more samples of the stretch."""
-    for chunk in range((degree + 7) // 8):
-        fill(ctx, search, chunk, degree)
+    for chunk in range(degree // 8):
+        fill(ctx, search, chunk, degree, 0)
         call(ctx, search, search.event)
-        for i in range(min(8, degree - 8 * chunk)):
+        for i in range(8):
             search.values[1 + 8 * chunk + i] = search.found[i]
     search.values[0] = search.start_value
     search.values[degree] = search.end_value
@@ -130,12 +154,12 @@ def sample(ctx, search, degree):
 @compiled
 def sample_first(ctx, search):
     """Set `Search.sampled` of all functions."""
-    degree = search.degree
-    for chunk in range((degree + 7) // 8):
-        fill(ctx, search, chunk, degree)
+    degree, known = search.degree, search.mode == WHOLE
+    for chunk in range(search.chunks):
+        fill(ctx, search, chunk, degree, 1 if known else 0)
         for event in range(search.count):
             call(ctx, search, event)
-            for i in range(min(8, degree - 8 * chunk)):
+            for i in range(8):
                 search.sampled[FINEST * event + 8 * chunk + i] = search.found[i]
 
 

@@ -1,9 +1,11 @@
 """The search for events of one trajectory, as Python sees it."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from integrators.events.event import Event
 from integrators.events.finder import Hits
@@ -23,13 +25,34 @@ from integrators.kernel.events.memory import (
     WHOLE,
     Search,
 )
+from integrators.kernel.native.memory import aligned
 from integrators.protocol import Array, Status, UserError
 
 LEAST, MOST = 8, 64  # samples in a step to begin with
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
-COSINES = np.cos(np.pi * np.arange(2 * FINE * FINEST) / (FINE * FINEST))
-COSINES[FINE * FINEST // 2 :: FINE * FINEST] = 0.0
 LASTING = ("ends", "touched", "finite", "happened")
+
+
+@lru_cache(maxsize=1)
+def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
+    """Return cosines, tables from samples to coefficients of Chebyshev polynomials, and where these are.
+
+    The coefficients follow by the discrete cosine transform. Row i of a table is for sample i.
+    """
+    cosines = np.cos(np.pi * np.arange(FINE * FINEST + 1) / (FINE * FINEST))
+    cosines[FINE * FINEST // 2] = 0.0  # a place in the middle is exact
+    tables = [aligned(0)] * (FINEST // LEAST + 1)
+    degree = LEAST
+    while degree <= FINEST:
+        half = np.ones(degree + 1)
+        half[[0, -1]] = 0.5
+        table = aligned((degree + 1) * (degree + 8))
+        angles = np.outer(np.arange(degree + 1), np.arange(degree + 1)) * (np.pi / degree)
+        made = 2.0 / degree * half[:, None] * np.cos(angles) * half[None, :]
+        table.reshape(degree + 1, degree + 8)[:, : degree + 1] = made
+        tables[degree // LEAST] = table
+        degree *= 2
+    return cosines, tables, np.array([table.ctypes.data for table in tables])
 
 
 class KernelSearch:
@@ -62,9 +85,11 @@ class KernelSearch:
         self._context, side = contexts
         self._dim, n = self._context.shape.dim, len(events)
         degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
-        numbers = {"count": n, "dim": self._dim, "degree": degree, "steps": steps}
+        terms = self._context.s
+        numbers = {"count": n, "dim": self._dim, "degree": degree, "steps": steps, "terms": terms, "chunks": degree // 8}
         numbers |= {"own": self._context.address, "side": side.address}
-        self._memory = memory = Search(numbers, {"cosines": COSINES})
+        cosines, self._tables, transforms = _tables()
+        self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
         memory.asked = memory.address + 8 * Search.part.place
         memory.functions[:] = [function.address for function in functions]
         memory.directions[:] = [event.direction for event in events.values()]

@@ -38,6 +38,7 @@ def forget_states(search):
     for i in range(CACHED):
         search.cache_times[i] = NAN
     search.cache_next = 0
+    search.part_known = 0.0
 
 
 @compiled
@@ -63,6 +64,7 @@ def state_at(ctx, search, t):
     search.iterations += side.iterations
     search.evaluations += side.evaluations
     search.partial += 1
+    search.part_known = search.part if outcome == DONE else 0.0
     side.iterations = side.evaluations = side.restarts = 0
     if outcome != DONE:
         for d in range(search.dim):

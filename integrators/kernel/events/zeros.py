@@ -187,6 +187,9 @@ def direction_at_end(ctx, search, before):
 @compiled
 def solve(ctx, search, a, b, after):
     """Note the zero between two places where the function has different signs; there is none at a pole."""
+    wanted = search.directions[search.event]
+    if wanted != 0 and wanted != after:
+        return
     x = zero_between(ctx, search, a, b)
     if not is_pole(ctx, search, x, a, b):
         add_zero(search, x, after)
