@@ -4,7 +4,7 @@ from integrators.kernel.events.memory import FINE, FINEST
 from integrators.kernel.events.sample import is_finite, node
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
-from integrators.kernel.simd.memory import get, put, splat8, spread
+from integrators.kernel.simd.memory import get, largest, put, splat8, spread, total
 from integrators.kernel.simd.views import doubles
 
 NEAR = 0.1  # of the largest value: an extremum below this may reach zero
@@ -17,30 +17,37 @@ def transform(search, degree):
     """Set the coefficients from the samples; return whether all are finite, and whether they are too few."""
     values, coefficients = search.values, search.coefficients
     table = doubles(search.transforms[degree // 8])
-    damage = 0.0
-    for i in range(degree + 1):
-        damage += values[i] * 0.0
-    if damage != 0.0:
+    for i in range(1, 8):
+        values[degree + i] = 0.0
+    damage = splat8(0.0)
+    for i in range(0, degree + 8, 8):
+        damage += 0.0 * get(values, i)
+    if total(damage) != 0.0:
         return False, False
-    width = degree + 8
-    for first in range(0, width, 8):
-        total = splat8(0.0)
+    width, none, top = 32 * (degree // 32 + 1), splat8(0.0), splat8(0.0)
+    for first in range(0, width, 32):  # four at a time, which hides the latency of a product
+        a, b, c, d = none, none, none, none
         for i in range(degree + 1):
-            total = fma(get(table, width * i + first), spread(values, i), total)
-        put(coefficients, first, total)
-    top = 0.0
-    for j in range(degree + 1):
-        top = max(top, abs(coefficients[j]))
-    return True, max(abs(coefficients[degree - 1]), abs(coefficients[degree])) > UNRESOLVED * top
+            value, row = spread(values, i), table + (width * i + first)
+            a, b = fma(get(row, 0), value, a), fma(get(row, 8), value, b)
+            c, d = fma(get(row, 16), value, c), fma(get(row, 24), value, d)
+        put(coefficients, first, a)
+        put(coefficients, first + 8, b)
+        put(coefficients, first + 16, c)
+        put(coefficients, first + 24, d)
+        top = max(max(max(top, abs(a)), abs(b)), max(abs(c), abs(d)))
+    tail = max(abs(coefficients[degree - 1]), abs(coefficients[degree]))
+    return True, tail > UNRESOLVED * largest(top)
 
 
 @compiled
 def keeps_away(search, degree):
     """Whether the coefficients alone tell that there is no zero, nor an extremum near it."""
-    rest = 0.0
-    for j in range(1, degree + 1):
-        rest += abs(search.coefficients[j])
+    sizes = splat8(0.0)
+    for j in range(0, degree + 8, 8):
+        sizes += abs(get(search.coefficients, j))
     constant = abs(search.coefficients[0])
+    rest = total(sizes) - constant
     return constant - rest > NEAR * (constant + rest)
 
 

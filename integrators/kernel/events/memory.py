@@ -84,8 +84,8 @@ class Search(Memory):
     block = Array("dim", 8)  # states, one in a column
     found = Array(16)  # values of a function on a block; [8]: 1 where it has raised
     weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
-    values = Array(FINEST + 1)  # samples
-    coefficients = Array(FINEST + 8)  # of Chebyshev polynomials
+    values = Array(FINEST + 8)  # samples
+    coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
     n = Integer()  # places where something is known
     places = Array(PLACES)
     fine = Array(PLACES)  # values of the polynomial there, or samples

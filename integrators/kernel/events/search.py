@@ -28,7 +28,7 @@ from integrators.kernel.events.memory import (
 from integrators.kernel.native.memory import aligned
 from integrators.protocol import Array, Status, UserError
 
-LEAST, MOST = 8, 64  # samples in a step to begin with
+LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
 LASTING = ("ends", "touched", "finite", "happened")
 
@@ -46,10 +46,11 @@ def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
     while degree <= FINEST:
         half = np.ones(degree + 1)
         half[[0, -1]] = 0.5
-        table = aligned((degree + 1) * (degree + 8))
+        width = 32 * (degree // 32 + 1)
+        table = aligned((degree + 1) * width)
         angles = np.outer(np.arange(degree + 1), np.arange(degree + 1)) * (np.pi / degree)
         made = 2.0 / degree * half[:, None] * np.cos(angles) * half[None, :]
-        table.reshape(degree + 1, degree + 8)[:, : degree + 1] = made
+        table.reshape(degree + 1, width)[:, : degree + 1] = made
         tables[degree // LEAST] = table
         degree *= 2
     return cosines, tables, np.array([table.ctypes.data for table in tables])
