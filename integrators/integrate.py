@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from integrators import registry
 from integrators.events.event import Event, named
-from integrators.events.finder import Finder, outcome, started_with_events
+from integrators.events.finder import Ending, Finder, started_with_events
 from integrators.protocol import (
     SAMPLINGS,
     Array,
@@ -19,7 +19,6 @@ from integrators.protocol import (
     Samples,
     Stats,
     Status,
-    Stepper,
     UserError,
     as_numbers,
     check_problem,
@@ -178,22 +177,21 @@ class _Way:
         What `save` returned, of the same integration: it goes on from there.
     """
 
-    def __init__(self, stepper: Stepper, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
+    def __init__(self, stepper: Any, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
         self._stepper, self._grid, self._sample = stepper, grid, sample
         self._t, self._y = [grid[:0]], [np.empty((0, stepper.y.size))]
         self._made, self._before = 0, Stats()
         self._status, self._reason = Status.FINISHED, ""
         self.t = stepper.t
-        watched: Any = stepper
         self._search: Finder | None = getattr(stepper, "search", None)
         if grid.size:
-            watched.destination = float(grid[-1])  # collapsed steps are judged by the whole way
+            stepper.destination = float(grid[-1])  # collapsed steps are judged by the whole way
         if kept is not None:
             stepper.restore(kept["stepper"])
             self._t, self._y, self._made, self._before = [kept["t"]], [kept["y"]], kept["made"], kept["stats"]
             self._status, self._reason, self.t = kept["status"], kept["reason"], kept["here"]
             if "search" in kept:
-                watched.search.load(kept["search"])
+                stepper.search.load(kept["search"])
 
     @property
     def samples(self) -> Samples:
@@ -265,18 +263,13 @@ class _Way:
 
 def _with_events(solution: Solution, search: Finder) -> Solution:
     """Return the solution with what a search for events has found, up to where it ended."""
-    hits, stop = search.hits, solution.t_stop
-    if hits.terminal is not None:
-        stop = hits.stop
+    end = Ending.of(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
+    n = end.count(solution.t, search)
     stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
-    solution = replace(solution, stats=stats, events=hits.occurrences(), t_stop=stop)
-    if hits.terminal is not None:
-        n = np.count_nonzero(hits.sign * (solution.t - stop) <= 0.0)
-        return replace(solution, status=Status.EVENT, reason=hits.reason, t=solution.t[:n], y=solution.y[:n])
-    if solution.status.failed or (trouble := outcome(search, solution.problem.t0, stop)) is None:
-        return solution
-    status, reason, error = trouble
-    return replace(solution, status=status, reason=reason, error=error)
+    return replace(
+        solution, t=solution.t[:n], y=solution.y[:n], status=end.status, reason=end.reason, t_stop=end.stop,
+        stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
+    )  # fmt: skip
 
 
 def _grid(problem: Problem, times: ArrayLike | None) -> Array:

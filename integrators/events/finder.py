@@ -1,6 +1,7 @@
 """What every search for events has in common: what has happened, and how it ended."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -128,15 +129,47 @@ class Finder(Protocol):
         ...
 
 
-def outcome(search: Finder, start: float, stop: float) -> Trouble | None:
-    """Return why a search knows less than all that happened between two times, if it does."""
-    if search.trouble is not None or not search.unknown:
-        return search.trouble
-    reason = (
-        f"the event function {', '.join(search.unknown)} was finite at none of the states between "
-        f"t = {start!r} and t = {stop!r}, so nothing is known of the event."
-    )
-    return Status.NOT_FINITE, reason, None
+@dataclass(frozen=True)
+class Ending:
+    """How a trajectory ended whose events were looked for.
+
+    Attributes
+    ----------
+    status, reason, stop
+        How, why and when.
+    error : Exception or None
+        What an event's function raised.
+    """
+
+    status: Status
+    reason: str
+    stop: float
+    error: Exception | None = None
+
+    @classmethod
+    def of(cls, search: Finder, status: Status, reason: str, start: float, stop: float) -> "Ending":
+        """Return how it ended, from how the steps did, between two times."""
+        if search.hits.terminal is not None:
+            return cls(Status.EVENT, search.hits.reason, search.hits.stop)
+        if status.failed:
+            return cls(status, reason, stop)
+        if search.trouble is not None:
+            status, reason, error = search.trouble
+            return cls(status, reason, stop, error)
+        if search.unknown:
+            return cls(
+                Status.NOT_FINITE,
+                f"the event function {', '.join(search.unknown)} was finite at none of the states between "
+                f"t = {start!r} and t = {stop!r}, so nothing is known of the event.",
+                stop,
+            )
+        return cls(status, reason, stop)
+
+    def count(self, times: Array, search: Finder) -> int:
+        """Return how many of the times were reached."""
+        if self.status is not Status.EVENT:
+            return times.size
+        return int(np.count_nonzero(search.hits.sign * (times - self.stop) <= 0.0))
 
 
 def started_with_events(

@@ -238,9 +238,9 @@ def vanishes(ctx, search):
         return False
     top = -1
     for i in range(search.n):
-        if search.places[i] > 0.0 and search.places[i] < 1.0:
-            if top < 0 or abs(search.fine[i]) > abs(search.fine[top]):
-                top = i
+        inside = search.places[i] > 0.0 and search.places[i] < 1.0
+        if inside and (top < 0 or abs(search.fine[i]) > abs(search.fine[top])):
+            top = i
     largest = search.places[top] if top >= 0 else 0.5
     return is_nothing(ctx, search, largest) and is_nothing(ctx, search, 0.5)
 

@@ -116,7 +116,8 @@ class _Raised(threading.local):
 
 
 def _numbers(address: int, count: int) -> Any:
-    return np.frombuffer((ctypes.c_double * count).from_address(address)) if count else np.empty(0)
+    room: Any = (ctypes.c_double * count).from_address(address) if count else b""
+    return np.frombuffer(room)
 
 
 def _compiled(traced: Function) -> binary.Native:

@@ -74,8 +74,8 @@ class KernelSearch:
 
     Raises
     ------
-    Exception
-        What a function raises at the start.
+    UserError
+        With what a function raises at the start.
     """
 
     def __init__(
@@ -86,9 +86,10 @@ class KernelSearch:
         self._context, side = contexts
         self._dim, n = self._context.shape.dim, len(events)
         degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
-        terms = self._context.s
-        numbers = {"count": n, "dim": self._dim, "degree": degree, "steps": steps, "terms": terms, "chunks": degree // 8}
-        numbers |= {"own": self._context.address, "side": side.address}
+        numbers = {
+            "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
+            "steps": steps, "own": self._context.address, "side": side.address,
+        }  # fmt: skip
         cosines, self._tables, transforms = _tables()
         self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
         memory.asked = memory.address + 8 * Search.part.place
@@ -99,7 +100,8 @@ class KernelSearch:
         self._make_room(max(8, min(HITS, NUMBERS // self._dim)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
-            self._raise_error()
+            error = self._error
+            raise UserError(error) from error
         self._context.point({"look_memory": self._memory.words})  # keeps it alive
         self._context.look = look.code().address
 
@@ -120,9 +122,13 @@ class KernelSearch:
         self._memory.mode = WHOLE
         return outcome
 
-    def _raise_error(self) -> None:
-        """Raise what a function has raised."""
-        raise next(function.error for function in self._functions if function.error is not None)
+    @property
+    def _error(self) -> Exception:
+        """What a function has raised; Ctrl-C and the like are raised as they are."""
+        error = next(function.error for function in self._functions if function.error is not None)
+        if not isinstance(error, Exception):
+            raise error
+        return error
 
     def attend(self) -> bool:
         """Do what a look has come back for; return whether the integration goes on."""
@@ -148,10 +154,8 @@ class KernelSearch:
             )
             self.trouble = Status.STALLED, f"{reason} Events {known}", None
             return
-        try:
-            self._raise_error()
-        except Exception as error:
-            self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+        error = self._error
+        self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
 
     @property
     def hits(self) -> Hits:

@@ -75,7 +75,7 @@ def zero_between(ctx, search, a, b):
 
 @compiled
 def largest_beside(ctx, search, x, distance):
-    """Return the largest value, without its sign, at a distance from a place; -1 where there is none."""
+    """Return the largest size of a value at a distance from a place; -1 where there is none."""
     found = -1.0
     for place in (x - distance, x + distance):
         if place >= 0.0 and place <= 1.0:
@@ -87,7 +87,7 @@ def largest_beside(ctx, search, x, distance):
 
 @compiled
 def is_pole(ctx, search, x, a, b):
-    """Whether the sign changes at a place through infinity; ``a`` and ``b`` are places on both sides of it."""
+    """Whether the sign changes at a place through infinity; ``a`` and ``b`` are on both sides of it."""
     value = abs(value_at(ctx, search, x))
     if value <= max(abs(value_at(ctx, search, a)), abs(value_at(ctx, search, b))):
         return False  # times are so dense that it would be larger
@@ -99,7 +99,7 @@ def is_pole(ctx, search, x, a, b):
 
 @compiled
 def deepest(ctx, search, a, b, way):
-    """Return where ``way`` times the function is largest in a bracket, or the first found where it is positive.
+    """Return where ``way`` times the function is largest in a bracket, or first found to be positive.
 
     Brent's minimizer: parabolas, and golden sections where these do not close in (R. P. Brent, "Algorithms
     for Minimization without Derivatives", Prentice-Hall 1973, ch. 5).
@@ -152,14 +152,14 @@ def deepest(ctx, search, a, b, way):
                 b = u
             if fu <= fw or w == x:
                 v, fv, w, fw = w, fw, u, fu
-            elif fu <= fv or v == x or v == w:
+            elif fu <= fv or v in (x, w):
                 v, fv = u, fu
     return x
 
 
 @compiled
 def extremum(ctx, search, a, b, way):
-    """Return the place that `deepest` finds between two, and what is to be thought of the value there.
+    """Return the place that `deepest` finds between two.
 
     Where it is at one of the two, the polynomial has misplaced them, and they are moved.
     """

@@ -4,7 +4,7 @@ from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import signature
 
-from integrators.kernel.context import Context, DONE
+from integrators.kernel.context import DONE, Context
 from integrators.kernel.events.memory import CACHED
 from integrators.kernel.events.sample import NAN, function, noise_of, part_at, time_at
 from integrators.kernel.native.attributes import view
@@ -43,7 +43,7 @@ def forget_states(search):
 
 @compiled
 def state_at(ctx, search, t):
-    """Return the state at a time, by a partial step of the method; of numbers that are NaN where there is none."""
+    """Return the state at a time, by a partial step of the method; NaN where that fails."""
     if t == search.time:
         return search.step_state
     if t == search.stop:

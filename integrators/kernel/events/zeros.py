@@ -12,7 +12,6 @@ from integrators.kernel.events.solve import (
     EXTREMUM,
     extremum,
     is_pole,
-    largest_beside,
     zero_between,
 )
 from integrators.kernel.events.value import noise_at, value_at
@@ -77,9 +76,9 @@ def find_lows(search, first, last):
         size = abs(p[i])
         if size <= abs(p[i - 1]) and size < abs(p[i + 1]) and size < least:
             add_low(search, i)
-    if last == end and abs(p[end]) < least:
-        if turns_between(search, end - 1, search.places[end - 1], 1.0 + BESIDE):
-            add_low(search, end)
+    before = search.places[end - 1]
+    if last == end and abs(p[end]) < least and turns_between(search, end - 1, before, 1.0 + BESIDE):
+        add_low(search, end)
 
 
 @compiled

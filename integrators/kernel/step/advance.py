@@ -10,9 +10,9 @@ at the end, with what rounding took from it.
 
 from integrators.kernel.context import DONE, RUNNING
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
-from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.handover import reconsider, solve_implicitly
 from integrators.kernel.step.iterate import close, test
 from integrators.kernel.step.sweep import sweep, sweep_measured

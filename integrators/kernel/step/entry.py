@@ -14,8 +14,8 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
     WALK: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
-    PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is the length
-    of the last one from there, or 0.
+    PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
+    the length of the last one from there, or 0.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
     if what == RESET:

@@ -102,8 +102,8 @@ def interpolate(ctx, c, out):
 def part_step(ctx, side, part, known):
     """Solve in ``side`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
 
-    First stages come from the partial step of length ``known`` that ``side`` has made from there; if that is 0,
-    from inside the step ahead if that is solved, else from the step behind.
+    First stages come from the partial step of length ``known`` that ``side`` has made from there; if that
+    is 0, from inside the step ahead if that is solved, else from the step behind.
     """
     set_step(side, part)
     copy(ctx.state, side.state, vectors_of_state(ctx))
