@@ -187,7 +187,7 @@ def _integrate(
     if start is not None:
         batch = partial(_with_events, start, made)
     options = {"times": made.t, "t0": made.problem.t0}
-    if start is not None or getattr(program, "threaded", False):
+    if getattr(program, "threaded", False):
         options["threads"] = threads
     few = 1 if batch is None else threads if start is not None else FIRST * threads
     first, size, began, n = 0, few, perf_counter(), len(made)

@@ -1,6 +1,6 @@
 """What every search for events has in common: what has happened, and how it ended."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -32,6 +32,8 @@ class Hits:
     ----------
     names : list of str
         Of the events.
+    counts : list of int
+        How often each has happened.
     terminal : str or None
         The event that has ended the integration.
     stop : float
@@ -42,7 +44,7 @@ class Hits:
         self.names, self.sign, self._dim = list(events), sign, dim
         self._limits = [event.last for event in events.values()]
         self._pieces: list[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
-        self._counts = [0] * len(self.names)
+        self.counts = [0] * len(self.names)
         self.terminal: str | None = None
         self.stop = float("nan")
 
@@ -53,11 +55,11 @@ class Hits:
             return
         for i, limit in enumerate(self._limits):
             here = np.flatnonzero(event[order] == i)
-            left = limit - self._counts[i]
+            left = limit - self.counts[i]
             if limit and here.size >= left:
                 order, self.terminal = order[: here[left - 1] + 1], self.names[i]
         for i in range(len(self._limits)):
-            self._counts[i] += int(np.count_nonzero(event[order] == i))
+            self.counts[i] += int(np.count_nonzero(event[order] == i))
         if self.terminal is not None:
             self.stop = float(t[order[-1]])
         if order.size:
@@ -87,11 +89,11 @@ class Hits:
         """Return everything, for `load`."""
         joined = self._joined()
         self._pieces = [joined]
-        return {"pieces": joined, "counts": list(self._counts), "terminal": self.terminal, "stop": self.stop}
+        return {"pieces": joined, "counts": list(self.counts), "terminal": self.terminal, "stop": self.stop}
 
     def load(self, kept: Mapping[str, Any]) -> None:
         """Go on from what `save` returned."""
-        self._pieces, self._counts = [kept["pieces"]], list(kept["counts"])
+        self._pieces, self.counts = [kept["pieces"]], list(kept["counts"])
         self.terminal, self.stop = kept["terminal"], kept["stop"]
 
 
@@ -112,7 +114,7 @@ class Finder(Protocol):
         ...
 
     @property
-    def unknown(self) -> list[str]:
+    def unknown(self) -> Sequence[str]:
         """The events whose functions were finite nowhere."""
         ...
 

@@ -15,7 +15,7 @@ Member = tuple[Trajectories, dict[str, Occurrences]]
 
 
 def follow(
-    start: Callable[..., Any], starts: Array, par: Array, times: Array, t0: float, threads: int
+    start: Callable[..., Any], starts: Array, par: Array, times: Array, t0: float, threads: int = 1
 ) -> list[Member]:
     """Integrate trajectories one by one, or as many at once as there are threads, and look for their events.
 
