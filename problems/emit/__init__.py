@@ -289,35 +289,29 @@ def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
     problems.errors.MissingLibraryError
         If heyoka is not installed.
     """
-    try:
-        import heyoka as hy
-    except ImportError as error:
-        raise _missing("heyoka") from error
-    expressions = _expressions(system, source(system, what, "heyoka"))
-    return list(zip(_variables(system), expressions, strict=True)) if what == "field" else expressions
+    variables, expressions = _for_heyoka(system, source(system, what, "heyoka"))
+    return list(zip(variables, expressions, strict=True)) if what == "field" else expressions
 
 
 def heyoka_of(system: System, function: Function) -> Any:
     """Return a function of a system's state that is none of its own, such as one of `System.trace`."""
-    return _expressions(system, _written(function, "function", "heyoka", None))[0]
+    return _for_heyoka(system, _written(function, "function", "heyoka", None))[1][0]
 
 
-def _variables(system: System) -> list[Any]:
-    import heyoka as hy
-
+def _for_heyoka(system: System, made: Source) -> tuple[list[Any], list[Any]]:
+    """Return a system's variables, and a function of them as expressions."""
+    try:
+        import heyoka as hy
+    except ImportError as error:
+        raise _missing("heyoka") from error
     width = len(str(system.dim))
     if system.dof is None:
         names = [f"y{i:0{width}d}" for i in range(system.dim)]
     else:
         names = [f"{x}{i:0{width}d}" for x in "qp" for i in range(system.dof)]
-    return list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
-
-
-def _expressions(system: System, made: Source) -> list[Any]:
-    import heyoka as hy
-
-    expressions = _executed(made, {})(hy.time, _variables(system), hy.par, hy)
-    return [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
+    variables = list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
+    expressions = _executed(made, {})(hy.time, variables, hy.par, hy)
+    return variables, [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
 
 
 def _missing(library: str) -> MissingLibraryError:
