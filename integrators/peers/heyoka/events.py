@@ -1,6 +1,7 @@
 """heyoka's own search for events, as a `integrators.events.finder.Finder`."""
 
 from collections.abc import Callable, Mapping
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,7 @@ class TaylorSearch:
         self._events, self._start, self._end, self._present = list(events.values()), t, end, present
         self._hits = Hits(events, 1.0 if end >= t else -1.0, y.size)
         self._ahead: list[tuple[float, Array, int, int]] = []
+        self._counts = [0] * len(events)
         self._finished = False
         self.terminates = any(event.last for event in self._events)
         """Whether one of them is terminal."""
@@ -87,13 +89,17 @@ class TaylorSearch:
             return
         integrator.update_d_output(t)
         self._ahead.append((t, integrator.d_output.copy(), event, way))
-        limit, count = self._events[event].last, self._hits.counts[event]
-        count += sum(hit[2] == event for hit in self._ahead)
-        self.over = self.over or (bool(limit) and count >= limit)
+        self._counts[event] += 1
+        self.over = self.over or self._counts[event] == self._events[event].last
 
     def take_back(self, t: float) -> None:
         """Forget what happened after a time, from which a step is taken again."""
-        self._ahead = [hit for hit in self._ahead if self._hits.sign * (hit[0] - t) <= 0.0]
+        kept = len(self._ahead)
+        while kept and self._hits.sign * (self._ahead[kept - 1][0] - t) > 0.0:
+            kept -= 1
+        for hit in self._ahead[kept:]:
+            self._counts[hit[2]] -= 1
+        del self._ahead[kept:]
 
     def finish(self) -> None:
         """Let all count that has happened up to the end."""
@@ -102,11 +108,11 @@ class TaylorSearch:
     @property
     def hits(self) -> Hits:
         """What has happened up to the present."""
-        everything = self._finished or self.over
-        now = [
-            hit for hit in self._ahead if everything or self._hits.sign * (hit[0] - self._present()) <= 0.0
-        ]
-        self._ahead = self._ahead[len(now) :]
+        now, self._ahead = self._ahead, []
+        if not (self._finished or self.over):
+            ahead = [self._hits.sign * (hit[0] - self._present()) > 0.0 for hit in now]
+            self._ahead = list(compress(now, ahead))
+            now = list(compress(now, [not is_ahead for is_ahead in ahead]))
         if now:
             t, y, event, direction = (np.array(column) for column in zip(*now, strict=True))
             self._hits.take(t, y, event, direction)
@@ -118,9 +124,9 @@ class TaylorSearch:
 
     def save(self) -> Any:
         """Return what the rest of the search depends on."""
-        return {"hits": self.hits.save(), "ahead": list(self._ahead)}
+        return {"hits": self.hits.save(), "ahead": list(self._ahead), "counts": list(self._counts)}
 
     def load(self, kept: Any) -> None:
         """Go on from where `save` was called."""
         self._hits.load(kept["hits"])
-        self._ahead = list(kept["ahead"])
+        self._ahead, self._counts = list(kept["ahead"]), list(kept["counts"])

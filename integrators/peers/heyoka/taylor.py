@@ -31,6 +31,9 @@ COLD = "HBVM_BENCH_COLD_COMPILE"
 NEAR = 8
 """Times its last step that a sample must be away for the compiled loop to be called."""
 
+STEPS_BEYOND = 256
+"""Steps that may be taken in vain beyond a terminal event."""
+
 CITATION = """\
 @article{BiscaniIzzo2021,
   author = {Biscani, Francesco and Izzo, Dario},
@@ -301,15 +304,12 @@ class TaylorStepper(StepperBase):
 
     def _land(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
-        watch, search = crawl(self, self._ta.time, t), self.search
-        more: dict[str, Any] = {}
-        if search is not None and search.terminates:
-            more["callback"] = lambda integrator: not search.over
+        watch = crawl(self, self._ta.time, t)
+        few = self.search is not None and self.search.terminates
+        most = STEPS_BEYOND if few else CRAWL_STEPS
         while True:
             before = self._ta.time
-            outcome, _, _, steps, *_ = self._ta.propagate_until(
-                t, max_steps=CRAWL_STEPS, write_tc=write_tc, **more
-            )
+            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=most, write_tc=write_tc)
             self._stats.steps, self._stepped = self._stats.steps + steps, self._stepped or steps > 0
             if self._ends():
                 return False

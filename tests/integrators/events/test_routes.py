@@ -112,7 +112,7 @@ class TestMany:
 
     def test_what_a_function_raises_is_the_trajectorys_own(self, henon_heiles):
         def g(t, y):
-            if y[0] > 0.655:
+            if y[0] > 0.44:
                 raise LookupError("out of the table")
             return float(y[0])
 
@@ -166,9 +166,7 @@ class TestHeyoka:
 
     @pytest.mark.parametrize("method", [integrators.IAS15(), integrators.DOP853(rtol=1e-9, atol=1e-9)])
     def test_the_others_refuse(self, method):
-        with pytest.raises(
-            InputError, match=r"cannot find events: .* use HBVM, Gauss, LineIntegral or Taylor"
-        ):
+        with pytest.raises(InputError, match=r"cannot find events: .* LineIntegral or Taylor"):
             integrate(problems.load("figure_eight"), method, events=lambda q: q[0])
 
 
