@@ -55,6 +55,15 @@ class Solutions(Trajectories):
         What was integrated, and how.
     events : list of dict of str to Occurrences
         What happened in each trajectory, by the events' names; empty where none were looked for.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate_many
+    >>> pendulum, method = problems.load("pendulum"), Gauss(s=4, h=0.1)
+    >>> made = integrate_many(pendulum, method, starts=[[0, 1], [0, 1.5]], times=[5.0])
+    >>> made.y.shape, [str(status) for status in made.status]
+    ((2, 1, 2), ['finished', 'finished'])
     """
 
     starts: Array
