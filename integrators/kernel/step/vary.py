@@ -51,11 +51,12 @@ MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it loo
 FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
-# errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
-# MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
+# errors would allow so much longer ones. Its steps cost one or two of 24 sweeps through memory, and ten of
+# those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
+# to be tried where only low coefficients tell how much longer.
 HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
-GAIN, GAIN_PER_ROW, MOST_ROWS = 3.0, 0.1, 64
+GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 10.0, 0.1, 64
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
 # A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
 # find it.
@@ -141,7 +142,8 @@ def watch(ctx, factor):
     room = ctx.error_aim - ctx.error_ahead
     if ctx.allowed_defect < INFINITY:
         room = min(room, ctx.defect_aim - ctx.defect_ahead)
-    worth = log(GAIN + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
+    gain = GAIN_LIGHT if ctx.second or ctx.fused else GAIN
+    worth = log(gain + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
     held_back = factor < HELD_BACK
     if held_back and room <= worth and ctx.rows <= MOST_ROWS:
         room = log(ctx.error_decay) - log_decay(ctx)
