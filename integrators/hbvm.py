@@ -108,8 +108,8 @@ class HBVM(MethodBase):
         system is large. ``"blended"``: blended iteration, one real matrix. ``"auto"``:
         fixed point, and Newton from where that fails or takes a hundred iterations a
         step until it would contract well again. With ``tol`` steps are as short as the
-        fixed point needs, until errors would allow ten times longer ones or more; then
-        Newton takes over, and errors alone bound the steps. The Jacobian is traced, or taken
+        fixed point needs, until errors would allow so much longer ones that Newton's cost
+        less, four to twelve times; then Newton takes over. The Jacobian is traced, or taken
         by differences; its factors are kept while they serve. ``stats`` tells which solver did
         how much. Poisson systems: fixed point.
 

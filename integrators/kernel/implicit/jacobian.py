@@ -108,17 +108,20 @@ def factorize(ctx, m):
             lu = m.lu + size * group
             begins, ends = m.begins + rows * group, m.ends + rows * group
             z, w = get(m.powers, 16 * group), get(m.powers, 16 * group + 8)
-            for i in range(0, size, 8):
-                put(lu, i, splat8(0.0))
             for r in range(rows):
-                put(lu, 16 * (rows + 1) * r, splat8(1.0))
                 begins[r] = ends[r] = r
+            for j in range(m.entries.size):
+                r, c = m.entry_rows[j], m.entry_columns[j]
+                begins[r], ends[r] = min(begins[r], c), max(ends[r], c)
+            for r in range(rows):
+                for i in range(16 * begins[r], 16 * (ends[r] + 1), 8):
+                    put(lu, 16 * rows * r + i, splat8(0.0))
+                put(lu, 16 * (rows + 1) * r, splat8(1.0))
             for j in range(m.entries.size):
                 r, c = m.entry_rows[j], m.entry_columns[j]
                 i, slope = 16 * (rows * r + c), splat8(m.entries[j] * m.factor[c])
                 put(lu, i, fma(-z, slope, get(lu, i)))
                 put(lu, i + 8, fma(-w, slope, get(lu, i + 8)))
-                begins[r], ends[r] = min(begins[r], c), max(ends[r], c)
             if not factor(lu, m.pivots + rows * group, begins, ends, rows):
                 return False
     m.factored = 1

@@ -29,7 +29,7 @@ def factor(lu, pivots, begins, ends, n):
     Parameters
     ----------
     lu : (n, n, 2, 8) doubles
-        The matrices; then their factors.
+        The matrices, from the first to the last entry of each row; then their factors.
     pivots : n integers
         For the row that each row was exchanged for.
     begins, ends : n integers
@@ -61,6 +61,9 @@ def factor(lu, pivots, begins, ends, n):
             if begins[r] > c:
                 continue
             row = width * r
+            for j in range(16 * (ends[r] + 1), 16 * (end + 1), 8):
+                put(lu, row + j, splat8(0.0))
+            ends[r] = max(ends[r], end)
             x, y = get(lu, row + 16 * c), get(lu, row + 16 * c + 8)
             a, b = fma(x, inverse_re, -y * inverse_im), fma(x, inverse_im, y * inverse_re)
             put(lu, row + 16 * c, a)
@@ -69,7 +72,6 @@ def factor(lu, pivots, begins, ends, n):
                 u, v = get(lu, top + j), get(lu, top + j + 8)
                 put(lu, row + j, fma(b, v, fma(-a, u, get(lu, row + j))))
                 put(lu, row + j + 8, fma(-b, u, fma(-a, v, get(lu, row + j + 8))))
-            ends[r] = max(ends[r], end)
     return True
 
 

@@ -83,7 +83,7 @@ def estimate(ctx):
     of the size of the quadrature's error or larger. Both relative to the size of each
     block of the state; the largest of all. A block whose field is nothing beside that of
     others in its group may be moved by their rounding alone, which no step is short
-    enough for: its gamma counts as a part of theirs.
+    enough for: its gamma counts as a part of theirs, and what of it does not fall off is no kink.
 
     All this is true of coefficients that fall off geometrically. At a jump or a kink of
     the field they do not: |gamma_j| falls off like 1/j or 1/j^2, and the error of the
@@ -114,6 +114,8 @@ def estimate(ctx):
         if slope > 0.0:
             size = block_size(ctx, b)
             missing, unseen, high = ctx.missing[b], ctx.unseen[b], ctx.abrupt[b]
+            if slope > ctx.slope[b] and high <= UNSEEN * steepest[group[b]]:
+                high = 0.0
             most, most_unseen = INFINITY, INFINITY
             if doubtful and high > 0.0:
                 if ctx.kinks > 0 and h * max(high, max(missing, unseen)) <= negligible * size:

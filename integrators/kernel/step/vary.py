@@ -42,7 +42,9 @@ from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
-# and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
+# and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16. With 24 it costs a tenth
+# more; with 36 and a large J of one sign, rounding is multiplied like the terms of exp(-h J): an error of
+# 1e-14 in one step of a diffusion.
 BUSY, BUSY_FIRST = 18.0, 24.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
@@ -51,11 +53,12 @@ MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it loo
 FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
-# errors would allow so much longer ones: its matrices cost the more the more rows they have. Beyond
-# MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
+# errors would allow so much longer ones. Its steps cost one or two of 24 sweeps through memory, and ten of
+# those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
+# to be tried where only low coefficients tell how much longer.
 HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
-GAIN, GAIN_PER_ROW, MOST_ROWS = 3.0, 0.1, 64
+GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
 # A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
 # find it.
@@ -141,7 +144,8 @@ def watch(ctx, factor):
     room = ctx.error_aim - ctx.error_ahead
     if ctx.allowed_defect < INFINITY:
         room = min(room, ctx.defect_aim - ctx.defect_ahead)
-    worth = log(GAIN + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
+    gain = GAIN_LIGHT if ctx.second or ctx.fused else GAIN
+    worth = log(gain + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
     held_back = factor < HELD_BACK
     if held_back and room <= worth and ctx.rows <= MOST_ROWS:
         room = log(ctx.error_decay) - log_decay(ctx)

@@ -163,7 +163,7 @@ def test_any_other_error_is_the_users_to_see():
                 "a function of yours raised LookupError (no such table) in the step"
             )
             peer = not hasattr(method, "k")
-            assert peer or 7.5 < made.t_stop < 9.0  # nodes lie before the end of a step
+            assert peer or 4.0 < made.t_stop < 9.0  # nodes lie before the end of a step
             assert made.t[-1] <= made.t_stop
             assert peer or made.t[-1] > made.t_stop - 0.11
             assert times.count(0.0) <= 4, "integrated twice"

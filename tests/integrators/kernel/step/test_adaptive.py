@@ -172,6 +172,13 @@ def test_fast_modes_at_rest_do_not_make_the_iteration_slow():
     assert stats.rejections < stats.steps
 
 
+def test_rounding_at_the_nodes_of_a_standing_wave_is_no_kink():
+    problem = problems.load("nonlinear_wave", n=16, t_end=5.0)
+    stats = integrators.integrate(problem, HBVM(), [5.0]).stats
+    assert stats.steps < 50  # measured 17; 1429 where rounding there was taken for kinks
+    assert "kinks" not in stats.extra
+
+
 def test_a_collision_is_a_step_underflow_and_what_was_computed_is_kept():
     fall = problems.Hamiltonian(lambda q, p: p[0] ** 2 / 2 - 1 / q[0], dof=1, name="fall")
     problem = problems.Problem(fall, q0=[1.0], p0=[0.0], t_end=2.0)
