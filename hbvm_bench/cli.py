@@ -1,6 +1,7 @@
 """The command line: ``hbvm-bench list | run | report | show | cite | ...``."""
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -49,7 +50,7 @@ SEPARATE = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 2 for input errors, 130 for Ctrl-C."""
-    _attach(sys.argv[1:] if arguments is None else arguments)
+    attach(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(arguments, prog_name="hbvm-bench", standalone_mode=False)
     except InputError as error:
@@ -63,7 +64,8 @@ def main(arguments: list[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _attach(arguments: list[str]) -> None:
+def attach(arguments: Sequence[str] = ()) -> None:
+    """Import the command that is asked for and make it one of `app`'s; all of them where none is."""
     present = {
         command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands
     }
