@@ -16,9 +16,8 @@ from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.run import executors, loop, supervise, timing_pass, warm
 from hbvm_bench.run import task as execute
-from hbvm_bench.store.records import Record, decoded
 from hbvm_bench.store.store import Store
-from tests.hbvm_bench.conftest import SHORT
+from tests.hbvm_bench.conftest import SHORT, run_case
 
 GENEROUS = Limits(wall_seconds=30, memory_gib=2)
 PLAN = TimingPlan(rounds=2, samples=2, shortest=1e-4, budget=1)
@@ -33,14 +32,6 @@ def store(tmp_path):
 
 def case(method):
     return Case(problem=SHORT, method=method, grid=Grid(count=4))
-
-
-def run_case(case, directory, limits):
-    """Measure one case in a process of its own and store it."""
-    record, series = execute.execute(execute.task_of(resolve(case), limits))
-    made = decoded(record, Record)
-    Store(Path(directory)).save(made, series or None)
-    return made
 
 
 def run(store, method, limits=GENEROUS):
