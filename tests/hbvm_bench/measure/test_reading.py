@@ -8,6 +8,7 @@ import pytest
 from hbvm_bench.campaign.file import Campaign, Case, Checks, Grid, Limits, MethodEntry
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.measure import metrics, reading
+from hbvm_bench.run import loop
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries.rows import rows
 from tests.hbvm_bench.conftest import SHORT, run_case
