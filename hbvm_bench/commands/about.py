@@ -42,17 +42,14 @@ def engines(
     for name in names or []:
         if name not in problems.names():
             raise unknown("problem", name, problems.names())
+    table, reasons = engines_.table(names or [])
     if markdown:
-        print(engines_.markdown(names or []), end="")
+        from hbvm_bench.report.markdown import printed  # what draws costs seconds to import
+
+        print(printed(table), "", *(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1)), sep="\n")
         return
-    columns, rows = engines_.matrix(names or [])
-    listed = engines_.notes(rows)
-    cells = [
-        (name, *("yes" if row[c] is None else str(listed.index(row[c] or "") + 1) for c in columns))
-        for name, row in rows.items()
-    ]
-    terminal.print_table(Table("", ("problem", *columns), cells, words=range(len(columns) + 1)))
-    for i, reason in enumerate(listed, start=1):
+    terminal.print_table(table)
+    for i, reason in enumerate(reasons, start=1):
         terminal.console().print(f"{i}. {reason}", highlight=False)
 
 

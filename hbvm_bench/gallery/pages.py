@@ -9,6 +9,7 @@ from typing import Any
 import problems
 from hbvm_bench.gallery import pictures
 from hbvm_bench.reference import solutions as reference
+from hbvm_bench.report.markdown import printed
 from hbvm_bench.store.files import write_all
 from hbvm_bench.summaries import engines
 from problems import registry
@@ -162,12 +163,18 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     names = [name for name, picture in drawn.items() if not picture.arguments]
     made = {
         directory / "problems.md": text(names).encode(),
-        directory / "engines.md": (ENGINES + engines.markdown(names)).encode(),
+        directory / "engines.md": _engines(names).encode(),
     }
     for name in drawn if with_pictures else ():
         made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
     write_all(made)
     return list(made)
+
+
+def _engines(names: Sequence[str]) -> str:
+    table, reasons = engines.table(names)
+    listed = "\n".join(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1))
+    return f"{ENGINES}{printed(table)}\n\n{listed}\n"
 
 
 def _overview(loaded: dict[str, Problem]) -> str:

@@ -4,9 +4,8 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from pathlib import Path
 
-from hbvm_bench.campaign.file import Campaign, Case, Limits
+from hbvm_bench.campaign.file import Campaign, Limits
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError, execute, task_of
@@ -49,33 +48,6 @@ def is_kept(resolved: Resolved, store: Store, limits: Limits) -> bool:
     if record is None or not is_of(record.case, resolved.case) or not is_done(record, limits):
         return False
     return not damage(record, store.series(resolved.id), resolved.problem.system.dim)
-
-
-def run_case(case: Case, directory: str, limits: Limits) -> Record:
-    """Measure one case in a process of its own and store it.
-
-    Parameters
-    ----------
-    case : Case
-        What to run.
-    directory : str
-        The store.
-    limits : Limits
-        Wall time and memory of the process.
-
-    Returns
-    -------
-    Record
-        Whatever happens to the process: a failure is a record with its reason.
-
-    Raises
-    ------
-    hbvm_bench.run.task.InterruptedRunError
-        If the run was stopped meanwhile; nothing is stored then.
-    problems.errors.InputError
-        If the sources changed meanwhile; nothing is stored then either.
-    """
-    return _stored(Store(Path(directory)), *execute(task_of(resolve(case), limits)))
 
 
 def run_accuracy(

@@ -6,6 +6,7 @@ from typing import Any
 
 import integrators.registry
 import problems
+from hbvm_bench.summaries.table import Table
 from integrators.protocol import MethodBase
 from problems import emit
 from problems.errors import InputError
@@ -96,21 +97,12 @@ def matrix(names: Sequence[str] = ()) -> tuple[list[str], dict[str, dict[str, st
     return engines, rows
 
 
-def notes(rows: dict[str, dict[str, str | None]]) -> list[str]:
-    """Return the different reasons of a matrix, in the order in which they first appear."""
-    return list(dict.fromkeys(reason for row in rows.values() for reason in row.values() if reason))
-
-
-def markdown(names: Sequence[str] = ()) -> str:
-    """Return the matrix as a Markdown table with numbered reasons below it."""
+def table(names: Sequence[str] = ()) -> tuple[Table, list[str]]:
+    """Return the matrix as a table, ✓ or the number of a reason, with the reasons in that order."""
     engines, rows = matrix(names)
-    listed = notes(rows)
-    lines = ["| problem | " + " | ".join(engines) + " |", "|---" * (len(engines) + 1) + "|"]
-    for name, row in rows.items():
-        cells = [
-            "✓" if row[engine] is None else f"{listed.index(row[engine] or '') + 1}" for engine in engines
-        ]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    lines.append("")
-    lines += [f"{i}. {reason}" for i, reason in enumerate(listed, start=1)]
-    return "\n".join(lines) + "\n"
+    listed = list(dict.fromkeys(reason for row in rows.values() for reason in row.values() if reason))
+    cells = [
+        (name, *("✓" if row[one] is None else str(listed.index(row[one] or "") + 1) for one in engines))
+        for name, row in rows.items()
+    ]
+    return Table("", ("problem", *engines), cells, words=range(len(engines) + 1)), listed

@@ -133,7 +133,7 @@ def test_a_race_whose_problem_is_no_file_name_is_refused(tmp_path):
 
 @pytest.mark.parametrize("content", [b"\xff", b'"\xff"', b"[" * 100_000])
 def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
-    for name in ("kepler.json", "campaign.json", "one.json"):
+    for name in ("race.json", "campaign.json", "one.json"):
         (tmp_path / name).write_bytes(content)
     for read in (
         lambda: results.load(tmp_path),

@@ -5,6 +5,10 @@ from pathlib import Path
 import pytest
 
 import integrators.registry
+from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.run.task import execute, task_of
+from hbvm_bench.store.records import Record, decoded
+from hbvm_bench.store.store import Store
 
 HERE = Path(__file__).parent
 TOYS = (
@@ -50,3 +54,11 @@ def toys(toy_path, monkeypatch):
     yield
     integrators.registry._entries.cache_clear()
     sys.modules.pop("toy_methods", None)
+
+
+def run_case(case, directory, limits):
+    """Measure one case in a process of its own and store it."""
+    record, series = execute(task_of(resolve(case), limits))
+    made = decoded(record, Record)
+    Store(Path(directory)).save(made, series or None)
+    return made

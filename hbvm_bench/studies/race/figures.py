@@ -145,10 +145,9 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
                 label = name if family == OURS else FAMILIES[family].title
                 own = look[name]
                 handles.append(Line2D([], [], color=own.light, marker=own.marker, markersize=5, label=label))
-    for steps, face, style in ((FIXED, MUTED, "solid"), (OWN, PAPER, DOTTED)):
-        handles.append(
-            Line2D([], [], color=MUTED, marker="o", mfc=face, markersize=5, linestyle=style, label=steps)
-        )
+    mark = {"color": MUTED, "marker": "o", "markersize": 5}
+    handles.append(Line2D([], [], linestyle="solid", label=FIXED, **mark))
+    handles.append(Line2D([], [], linestyle=DOTTED, label=OWN, mfc=PAPER, **mark))
     axes.legend(handles=handles, loc="center left", borderaxespad=0.0, fontsize=8.5)
 
 

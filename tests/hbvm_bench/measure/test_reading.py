@@ -11,7 +11,7 @@ from hbvm_bench.measure import metrics, reading
 from hbvm_bench.run import loop
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries.rows import rows
-from tests.hbvm_bench.conftest import SHORT
+from tests.hbvm_bench.conftest import SHORT, run_case
 
 METHODS = ("Waving(h=0.3)", "Stalling()", "Cautious()")
 DOUBLED = replace(
@@ -29,7 +29,7 @@ def store(toys, tmp_path):
         Case(problem=SHORT, method=method, grid=Grid(count=4), checks=Checks(reversal=0.5))
         for method in METHODS
     ]
-    records = [loop.run_case(case, str(made.directory), Limits(wall_seconds=60)) for case in cases]
+    records = [run_case(case, str(made.directory), Limits(wall_seconds=60)) for case in cases]
     campaign = Campaign(
         name="x",
         problems=[SHORT],

@@ -17,7 +17,7 @@ from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.run import executors, loop, supervise, timing_pass, warm
 from hbvm_bench.run import task as execute
 from hbvm_bench.store.store import Store
-from tests.hbvm_bench.conftest import SHORT
+from tests.hbvm_bench.conftest import SHORT, run_case
 
 GENEROUS = Limits(wall_seconds=30, memory_gib=2)
 PLAN = TimingPlan(rounds=2, samples=2, shortest=1e-4, budget=1)
@@ -35,7 +35,7 @@ def case(method):
 
 
 def run(store, method, limits=GENEROUS):
-    record = loop.run_case(case(method), str(store.directory), limits)
+    record = run_case(case(method), str(store.directory), limits)
     assert store.load(record.id) == record
     return record
 
@@ -154,7 +154,7 @@ def test_cases_run_on_any_executor(toys, store):
 def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
     cases = [resolve(case(method)) for method in ("Steady()", "Crashing()", "Stalling()")]
     for one in cases:
-        loop.run_case(one.case, str(store.directory), GENEROUS)
+        run_case(one.case, str(store.directory), GENEROUS)
     assert timing_pass.missing_visits(cases, store, PLAN) == 2 * [cases[0].id]
     visits = []
     timing_pass.time_cases(
@@ -174,7 +174,7 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
 
 def test_a_timing_that_fails_says_why(toys, store):
     one = resolve(case("Steady(wait=0.5)"))
-    loop.run_case(one.case, str(store.directory), GENEROUS)
+    run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
     record = store.load(one.id)
     assert record.timing.why == "not timed: the time limit"
@@ -193,7 +193,7 @@ def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
     methods = ("Steady()", "Steady(h=0.2)", "Crashing()", "Straying()")
     cases = [resolve(case(method)) for method in methods]
     for one in cases:
-        loop.run_case(one.case, str(store.directory), GENEROUS)
+        run_case(one.case, str(store.directory), GENEROUS)
     assert timing_pass.missing_visits(cases, store, TOGETHER) == [cases[0].id]
     visits = []
     timing_pass.time_cases(
@@ -219,7 +219,7 @@ def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_round
     """As after a kill between two records: rounds of different processes do not belong together."""
     cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
     for one in cases:
-        loop.run_case(one.case, str(store.directory), GENEROUS)
+        run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases(cases, store, TOGETHER, GENEROUS)
     before = store.load(cases[0].id)
     store.save(msgspec.structs.replace(store.load(cases[1].id), timing=None))
@@ -232,7 +232,7 @@ def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_round
 
 def test_an_interleaved_timing_that_ends_at_its_limit_says_why(toys, store):
     one = resolve(case("Steady(wait=0.5)"))
-    loop.run_case(one.case, str(store.directory), GENEROUS)
+    run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, TOGETHER, Limits(wall_seconds=0.1))
     assert store.load(one.id).timing.why == "not timed: the time limit"
     assert timing_pass.missing_visits([one], store, TOGETHER) == [one.id]
@@ -240,7 +240,7 @@ def test_an_interleaved_timing_that_ends_at_its_limit_says_why(toys, store):
 
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
     pool = concurrent.futures.ThreadPoolExecutor(1)
-    future = pool.submit(loop.run_case, case("Endless()"), str(store.directory), GENEROUS)
+    future = pool.submit(run_case, case("Endless()"), str(store.directory), GENEROUS)
     while not supervise._children:
         time.sleep(0.01)
     (child,) = supervise._children
@@ -310,7 +310,7 @@ def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
     warm.close()
     before = set(psutil.Process().children())
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        future = pool.submit(loop.run_case, case("Waving(h=0.3, wait=1.0)"), str(store.directory), GENEROUS)
+        future = pool.submit(run_case, case("Waving(h=0.3, wait=1.0)"), str(store.directory), GENEROUS)
         while not supervise._children:
             time.sleep(0.01)
         for process in set(psutil.Process().children()) - before:
@@ -320,13 +320,13 @@ def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
     assert record.result.compile is not None  # in a process that began with nothing
 
 
-def test_no_process_outlives_a_runner_that_is_killed(toys, tmp_path):
+def test_no_process_outlives_a_runner_that_is_killed(toys):
     code = (
-        "import sys; from hbvm_bench.run import loop; from hbvm_bench.campaign.file import *;"
-        f"[loop.run_case(Case(problem={SHORT!r}, method=method), {str(tmp_path)!r}, Limits())"
+        "from hbvm_bench.run.task import execute, task_of; from hbvm_bench.campaign.file import *;"
+        "from hbvm_bench.campaign.identity import resolve;"
+        f"[execute(task_of(resolve(Case(problem={SHORT!r}, method=method)), Limits()))"
         " for method in ('Steady()', 'Endless()')]"
     )
-    (tmp_path / "cases").mkdir()
     parent = subprocess.Popen([sys.executable, "-c", code], env=os.environ)
     left = []
     deadline = time.monotonic() + 60

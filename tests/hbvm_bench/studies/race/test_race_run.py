@@ -54,7 +54,7 @@ def test_the_settings_are_printed_without_running(capsys):
     assert main(["race", "--settings", "--problem", "kepler"]) == 0
     said = capsys.readouterr().out
     assert "Gauss(s=16, h=0.5)" in said
-    assert "heyoka, Taylor, 16" in said
+    assert "heyoka, Taylor, own steps, 16" in said
 
 
 COMMAND = ["race", "--quick", "--problem", "kepler", "--rounds", "2"]
@@ -78,7 +78,7 @@ def stopped(directory, sent, sign):
 
 
 def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
-    code, said = stopped(tmp_path, r"\[1/15\]", signal.SIGINT)
+    code, said = stopped(tmp_path, r"\[1/21\]", signal.SIGINT)
     assert code == 130
     assert "interrupted" in said
 
@@ -86,7 +86,7 @@ def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
 def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     """Nothing is lost, and nothing is done twice, whether it was measuring or timing."""
     pytest.importorskip("heyoka")
-    stopped(tmp_path, r"\[3/15\]", signal.SIGKILL)
+    stopped(tmp_path, r"\[3/21\]", signal.SIGKILL)
     before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert len(before) >= 3
     code, _ = stopped(tmp_path, "round 1", signal.SIGKILL)
@@ -94,7 +94,7 @@ def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     measured = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert before.items() <= measured.items()
     assert main([*COMMAND, "--out", str(tmp_path)]) == 0
-    assert "15, 15 already there" in capsys.readouterr().err
+    assert "21, 21 already there" in capsys.readouterr().err
     after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert after == measured
     (race,) = results.load(tmp_path)
