@@ -23,20 +23,21 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from hbvm_bench.campaign.file import Case, TimingPlan
+from hbvm_bench.campaign.file import Case, Ensemble, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
 from hbvm_bench.measure.solve import solve, solve_with_bare_end
-from hbvm_bench.measure.timing import Run
+from hbvm_bench.measure.timing import Run, Timeable
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import NAME, encode_series
-from integrators.protocol import Program, Status
+from integrators.protocol import MethodBase, Program, Status
 from integrators.solution import Solution
 from problems.errors import InputError
+from problems.problem import Problem
 from problems.systems.base import System
 
 COMPILED = "compiled"  # the file that says that compiling has ended
@@ -247,10 +248,16 @@ def _time(request: Request, directory: Path) -> TimingReply:
 def _interleave(request: Request, directory: Path) -> InterleavedReply:
     asked = {request.id: request.case, **request.beside}
     found = [_checked(case, key) for key, case in asked.items()]
-    runs = [Run.of(one.problem, one.method) for one in found]  # compiled
+    runs = [_run(one.problem, one.method, one.case.ensemble) for one in found]  # compiled
     (directory / COMPILED).touch()
     made = together.time_together(runs, request.plan)
     return InterleavedReply(timings=[Timing(why=one) if isinstance(one, str) else one for one in made])
+
+
+def _run(problem: Problem, method: MethodBase, asked: Ensemble | None) -> Timeable:
+    if asked is None:
+        return Run.of(problem, method)
+    return ensemble.EnsembleRun.of(problem, method, asked)
 
 
 class _Telling:
