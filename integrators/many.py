@@ -77,10 +77,10 @@ def integrate_many(
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
-    Trajectories of HBVM and Gauss with a fixed step and up to 16 stages go one in each lane of
-    the vector unit; those of heyoka go through its batch integrator; all others one by one. What
-    comes out for a trajectory depends neither on the others nor on their order or the number of
-    threads; it is what `integrate` gives, up to rounding. Ctrl-C ends the integration: what was
+    Trajectories of HBVM and Gauss with up to 16 stages go one in each lane of the vector unit; those
+    of heyoka go through its batch integrator; all others one by one. What comes out for a
+    trajectory depends neither on the others nor on their order or the number of threads; it is
+    what `integrate` gives, up to rounding, or up to the tolerance where steps vary. Ctrl-C ends the integration: what was
     reached is returned, and the trajectories that are missing have the status ``INTERRUPTED``.
 
     Parameters
