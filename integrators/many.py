@@ -3,7 +3,7 @@
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,14 +74,16 @@ def integrate_many(
     times: ArrayLike | None = None,
     threads: int = 1,
     progress: bool | Report = False,
+    backend: str | None = None,
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
     Trajectories of HBVM and Gauss with up to 16 stages go one in each lane of the vector unit; those
     of heyoka go through its batch integrator; all others one by one. What comes out for a
     trajectory depends neither on the others nor on their order or the number of threads; it is
-    what `integrate` gives, up to rounding, or up to the tolerance where steps vary. Ctrl-C ends the integration: what was
-    reached is returned, and the trajectories that are missing have the status ``INTERRUPTED``.
+    what `integrate` gives, up to rounding, or up to the tolerance where steps vary. Ctrl-C ends the
+    integration: what was reached is returned, and the trajectories that are missing have the status
+    ``INTERRUPTED``.
 
     Parameters
     ----------
@@ -100,6 +102,8 @@ def integrate_many(
     progress : bool or callable
         Whether to show a bar on a terminal; or what is called now and then, in this thread, with an
         `integrators.watch.Progress`: the part of the trajectories that are at their end, and their steps.
+    backend : {"jax"}, optional
+        Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
 
     Returns
     -------
@@ -109,8 +113,8 @@ def integrate_many(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or for starts, parameters, times or threads that cannot
-        be used.
+        If the method does not accept the problem, or for starts, parameters, times, threads or a backend
+        that cannot be used.
 
     Examples
     --------
@@ -144,7 +148,7 @@ def integrate_many(
             raise InputError(f"parameter {name!r} has {len(value)} values, and {first} {n}; give as many.")
         par[:, np.asarray(places[name], dtype=int)] = value
     check_batch(rows, par, grid, system)
-    program = method.compile(system)
+    program = _program(system, method, backend)
     made = Solutions(
         t=grid,
         y=np.full((n, grid.size, system.dim), np.nan),
@@ -164,13 +168,24 @@ def integrate_many(
     return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
 
 
+def _program(system: System, method: MethodBase, backend: str | None) -> Program:
+    if backend is None:
+        return method.compile(system)
+    if backend != "jax":
+        raise unknown("backend", backend, ["jax"])
+    from integrators.plugins.diffrax.many import JaxProgram  # an optional library, and seconds to import
+
+    return cast("Program", JaxProgram(system, method))
+
+
 def _integrate(program: Program, made: Solutions, threads: int, report: Report | None) -> None:
     """Integrate piece by piece, each of which takes about `SOON`."""
     batch: Any = getattr(program, "batch", None)
     options = {"times": made.t, "t0": made.problem.t0}
     if getattr(program, "threaded", False):
         options["threads"] = threads
-    first, size, began, n = 0, 1 if batch is None else FIRST * threads, perf_counter(), len(made)
+    size = 1 if batch is None else getattr(program, "piece", FIRST * threads)
+    first, began, n = 0, perf_counter(), len(made)
     while first < n:
         before = perf_counter()
         here = slice(first, first + size)
