@@ -1,5 +1,6 @@
 """Many trajectories on the JAX solver: what ``integrate_many(..., backend="jax")`` runs."""
 
+import importlib
 from time import perf_counter
 from typing import Any
 
@@ -19,7 +20,10 @@ import diffrax as dx  # isort: skip
 import jax  # isort: skip
 import jax.numpy as jnp  # isort: skip
 
-DOUBLE: Any = getattr(jax, "enable_x64", None) or jax.experimental.enable_x64  # where it was before JAX 0.8
+# Newer versions of JAX have it at the top only.
+DOUBLE: Any = (
+    jax.enable_x64 if hasattr(jax, "enable_x64") else importlib.import_module("jax.experimental").enable_x64
+)
 
 SIDE_BY_SIDE = {"cpu": 256, "gpu": 1 << 17}
 """Trajectories that go through the solver at once: what fits in a processor's caches, what fills a GPU."""
