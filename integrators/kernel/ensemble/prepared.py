@@ -10,9 +10,10 @@ from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
 from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import GOAL, MOST, Form, compile_steps
+from integrators.kernel.ensemble.steps import MOST, Form, compile_steps
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import Numbers, aligned
+from integrators.kernel.step.rule import FALL, LEAST
 from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
@@ -76,7 +77,7 @@ class Lanes:
         a = self._constants.arrays
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
-        falls = 3.0 * GOAL * 1e15 ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
+        falls = 3.0 * LEAST * FALL ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
         extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
         found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
         found |= {"into_modes": a["into_modes"], "recurrence": tables.recurrence(self._constants.modes)}

@@ -20,17 +20,23 @@ from integrators.kernel.ensemble.writer import Index, Writer
 from integrators.kernel.native import binary, field, store
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.values import Value
+from integrators.kernel.step.rule import (
+    FLOOR,
+    LARGE,
+    LEAST,
+    NOTHING,
+    PATIENCE,
+    ROUNDING,
+    SMALLEST,
+    STAGNATION,
+    STEEP,
+    TOLERANCE,
+)
 from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
-
-# The stopping rule; see `Steps.rule`.
-TOLERANCE = 1e-16
-GOAL, STEEP = 3e-17, 0.15
-PATIENCE, ROUNDING, STAGNATION = 5, 1e-15, 1e-13
-FLOOR, SMALLEST, LARGE = 1e-3, 1e-200, 1e200
 AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
 MOST = 80  # sweeps after which a trajectory leaves
 
@@ -76,7 +82,7 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     """
     what = "force" if form.second else "field"
     source = emit.source(system, what, "numba")
-    modules = binary.sources(*field.SOURCES, "ensemble")
+    modules = binary.sources(*field.SOURCES, "ensemble", "step/rule")
     name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
@@ -247,6 +253,8 @@ class Steps(Writer):
             def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
                 start = self.at(block, width, first)
                 size = self.get(self.size, start)
+                if form.varying:
+                    size = size.max(Value(self.b, self.b.load(largest)) * NOTHING)
                 floor = size.max(Value(self.b, self.b.load(largest)) * FLOOR)
                 inverses = [(self.one / x).where(x.compare(">", SMALLEST), LARGE) for x in (size, floor)]
                 for i in range(width):
@@ -397,7 +405,7 @@ class Steps(Writer):
         steep = b.and_(falling, last.compare("<", 1.0))
         for condition in (
             strict.compare("<=", last * STEEP),
-            (strict * strict).compare("<=", last * GOAL),
+            (strict * strict).compare("<=", last * LEAST),
             b.fcmp_ordered("<=", strict.value, fall.value),
         ):
             steep = b.and_(steep, condition)
