@@ -5,7 +5,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from time import perf_counter
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,14 +93,16 @@ def integrate_many(
     threads: int = 1,
     progress: bool | Report = False,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
+    backend: str | None = None,
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
-    Trajectories of HBVM and Gauss with a fixed step and up to 16 stages go one in each lane of
-    the vector unit; those of heyoka go through its batch integrator; all others one by one. What
-    comes out for a trajectory depends neither on the others nor on their order or the number of
-    threads; it is what `integrate` gives, up to rounding. Ctrl-C ends the integration: what was
-    reached is returned, and the trajectories that are missing have the status ``INTERRUPTED``.
+    Trajectories of HBVM and Gauss with up to 16 stages go one in each lane of the vector unit; those
+    of heyoka go through its batch integrator; all others one by one. What comes out for a
+    trajectory depends neither on the others nor on their order or the number of threads; it is
+    what `integrate` gives, up to rounding, or up to the tolerance where steps vary. Ctrl-C ends the
+    integration: what was reached is returned, and the trajectories that are missing have the status
+    ``INTERRUPTED``.
 
     Parameters
     ----------
@@ -122,6 +124,8 @@ def integrate_many(
     events : Event or callable, or a sequence of them, optional
         What to look for, as in `integrate`. Trajectories then go one by one, or one in each thread, and a
         terminal event ends its own: what of ``times`` comes later is NaN.
+    backend : {"jax"}, optional
+        Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
 
     Returns
     -------
@@ -131,8 +135,8 @@ def integrate_many(
     Raises
     ------
     problems.errors.InputError
-        If the method does not accept the problem, or for starts, parameters, times or threads that cannot
-        be used.
+        If the method does not accept the problem, or for starts, parameters, times, threads or a backend
+        that cannot be used.
 
     Examples
     --------
@@ -166,8 +170,10 @@ def integrate_many(
             raise InputError(f"parameter {name!r} has {len(value)} values, and {first} {n}; give as many.")
         par[:, np.asarray(places[name], dtype=int)] = value
     check_batch(rows, par, grid, system)
-    program = method.compile(system)
+    program = _program(system, method, backend)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
+    if looked_for and backend is not None:
+        raise InputError(f"events are not looked for with backend={backend!r}; leave it out.")
     start = started_with_events(program, problem, looked_for) if looked_for else None
     made = Solutions(
         t=grid,
@@ -188,6 +194,16 @@ def integrate_many(
     return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
 
 
+def _program(system: System, method: MethodBase, backend: str | None) -> Program:
+    if backend is None:
+        return method.compile(system)
+    if backend != "jax":
+        raise unknown("backend", backend, ["jax"])
+    from integrators.plugins.diffrax.many import JaxProgram  # an optional library, and seconds to import
+
+    return cast("Program", JaxProgram(system, method))
+
+
 def _integrate(
     program: Program, made: Solutions, threads: int, report: Report | None, start: Callable[..., Any] | None
 ) -> None:
@@ -198,8 +214,9 @@ def _integrate(
     options = {"times": made.t, "t0": made.problem.t0}
     if getattr(program, "threaded", False):
         options["threads"] = threads
-    few = 1 if batch is None else threads if start is not None else FIRST * threads
-    first, size, began, n = 0, few, perf_counter(), len(made)
+    few = getattr(program, "piece", FIRST * threads)
+    size = 1 if batch is None else threads if start is not None else few
+    first, began, n = 0, perf_counter(), len(made)
     while first < n:
         before = perf_counter()
         here = slice(first, first + size)

@@ -87,7 +87,7 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reversal: Annotated[float, Meta(ge=0, le=1)] = 0.0
 
 
-class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
     """Many trajectories at once, through a method's batch path where it has one.
 
     Attributes
@@ -96,10 +96,13 @@ class Ensemble(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Trajectories.
     spread : float
         Every number of the start is multiplied by 1 + ``spread`` x, |x| <= 1.
+    vary : tuple of (str, float)
+        The same of parameters, by name.
     """
 
     count: Count
     spread: Positive = 1e-2
+    vary: tuple[tuple[str, Positive], ...] = ()
 
 
 class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
@@ -229,8 +232,10 @@ class EnsembleEntry(
     ----------
     problem : str
         The problem as it prints; its start is the centre of the ensemble.
-    count, spread
-        See `Ensemble`.
+    name : str
+        What goals and the pages call it; the problem's name by default.
+    count, spread, vary
+        See `Ensemble`; ``vary`` is a table of parameters.
     methods : list of MethodEntry
         Which methods take it.
     """
@@ -238,7 +243,9 @@ class EnsembleEntry(
     problem: str
     count: int
     methods: Annotated[list[MethodEntry], Meta(min_length=1)]
+    name: str = ""
     spread: Positive = 1e-2
+    vary: dict[str, Positive] = {}
 
     def __post_init__(self) -> None:
         if self.count < 1:
@@ -248,4 +255,9 @@ class EnsembleEntry(
     @property
     def ensemble(self) -> Ensemble:
         """What its cases carry."""
-        return Ensemble(count=self.count, spread=self.spread)
+        return Ensemble(count=self.count, spread=self.spread, vary=tuple(self.vary.items()))
+
+    @property
+    def entry(self) -> ProblemEntry:
+        """Its problem as an entry, for goals."""
+        return ProblemEntry(use=self.problem, name=self.name)

@@ -77,9 +77,11 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
         known = {name_of(entry) for entry in self.entries()}
-        for name in (name for one in (*self.methods, *self.goals) for name in one.only):
-            if name not in known:
-                raise unknown("problem of the campaign", name, known)
+        many = {name_of(one.entry) for one in self.ensembles}
+        for entries, there in ((self.methods, known), (self.goals, known | many)):
+            for name in (name for one in entries for name in one.only):
+                if name not in there:
+                    raise unknown("problem of the campaign", name, there)
 
     def entries(self) -> list[ProblemEntry]:
         """Return the problems' entries; one that is a text alone has neither values nor a sweep."""

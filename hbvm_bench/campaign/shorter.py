@@ -11,7 +11,9 @@ from hbvm_bench.reference import solutions
 from problems.errors import unknown
 
 QUICK_SHARE = 0.1
-"""Of the span, in a quick run."""
+"""Of the span, or of an ensemble's trajectories, in a quick run."""
+
+QUICK_ROUNDS = 3
 
 
 def chosen(campaign: Campaign, names: list[str]) -> Campaign:
@@ -45,10 +47,14 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
 
 
 def quick_run(campaign: Campaign, rounds: int) -> Campaign:
-    """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds."""
+    """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds.
+
+    Of ensembles, a tenth of the trajectories.
+    """
     return replace(
         campaign,
         problems=[_shortened(entry) for entry in campaign.entries()],
+        ensembles=[replace(one, count=max(1, int(QUICK_SHARE * one.count))) for one in campaign.ensembles],
         quick=True,
         timing=replace(campaign.timing, rounds=rounds),
     )

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from hbvm_bench.campaign.file import Campaign, name_of
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.campaign.shorter import chosen, quick_run
+from hbvm_bench.campaign.shorter import QUICK_ROUNDS, chosen, quick_run
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import as_typed, carry_out
@@ -24,8 +24,6 @@ from hbvm_bench.studies.race.families import FIXED, OURS, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes, probe
 from hbvm_bench.studies.race.results import Race
 from hbvm_bench.summaries import goals
-
-QUICK_ROUNDS = 3
 
 
 def race(

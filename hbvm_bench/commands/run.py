@@ -11,6 +11,7 @@ import typer
 
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, load
 from hbvm_bench.campaign.identity import Resolved, make_method
+from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
@@ -48,16 +49,21 @@ def run(
     timing: Annotated[
         bool, typer.Option("--timing/--no-timing", help="The serial timing pass, on this machine.")
     ] = True,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="A tenth of the spans and trajectories, few settings and rounds."),
+    ] = False,
 ) -> None:
     """Run a campaign, or the given problems and methods; a rerun does only what is missing.
 
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step)
+    campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
     if report_to is not None:
         ensure_writable(report_to, keep=False)
-    command = _command(name, problem, method, step)
-    out = out or Path("runs") / campaign.name
+    command = _command(name, problem, method, step) + " --quick" * quick
+    out = out or Path("runs") / (campaign.name + "-quick" * quick)
     store = carry_out(campaign, out, command, executor=executor, jobs=jobs, timing=timing)
     records = reading.records(store)
     if len(records) <= PRINTED:

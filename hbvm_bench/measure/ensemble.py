@@ -6,7 +6,7 @@ of a few of them against 128-bit Taylor solutions, and the time of all.
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import partial
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Ensemble, TimingPlan
 from hbvm_bench.measure.measured import Measured, ahead, largest_distance, position_error, positions
-from hbvm_bench.measure.starts import cloud
+from hbvm_bench.measure.starts import members
 from hbvm_bench.measure.timing import no_collection, sampled
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.reference.solutions import Reference
@@ -58,16 +58,19 @@ class Members:
     seconds: float
 
 
-def prepared(program: Program, starts: Array, problem: Problem) -> Callable[[], Any] | None:
+def prepared(
+    program: Program, starts: Array, problem: Problem, par: Array | None = None
+) -> Callable[[], Any] | None:
     """Return the call of a program's batch, compiled, checked and allocated where it can prepare one.
 
     ``None`` where it has no batch. Preparing one compiles what the program leaves to its first batch.
     """
+    par = problem.par if par is None else par
     arguments = {"times": np.array([problem.t_end]), "t0": problem.t0}
     if prepare := getattr(program, "prepare_batch", None):
-        return prepare(starts, problem.par, **arguments)
+        return prepare(starts, par, **arguments)
     batch = getattr(program, "batch", None)
-    return None if batch is None else partial(batch, starts, problem.par, **arguments)
+    return None if batch is None else partial(batch, starts, par, **arguments)
 
 
 def integrate(
@@ -76,6 +79,7 @@ def integrate(
     problem: Problem,
     sample: str | None = None,
     clock: Callable[[], float] = time.perf_counter,
+    par: Array | None = None,
 ) -> Members:
     """Integrate every start to the end of the problem's span.
 
@@ -92,9 +96,12 @@ def integrate(
         How one trajectory meets the end; see `integrators.protocol.MethodBase.to_end`.
     clock : callable
         Returns seconds.
+    par : ndarray, shape (n, n_par), optional
+        Parameters of each; the problem's own by default.
     """
     end = np.array([problem.t_end])
-    go = prepared(program, starts, problem)
+    par = np.tile(problem.par, (len(starts), 1)) if par is None else par
+    go = prepared(program, starts, problem, par)
     if go is not None:
         begin = clock()
         made = go()
@@ -113,7 +120,7 @@ def integrate(
     reason, steps, evaluations, spent = "", 0, 0, 0.0
     counted = True
     for i, start in enumerate(starts):
-        stepper = program.start(start, problem.par, problem.t0)
+        stepper = program.start(start, par[i], problem.t0)
         begin = clock()
         samples = stepper.advance(end, sample=sample)
         spent += clock() - begin
@@ -139,26 +146,26 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
     reason : str
         One sentence on it.
     """
-    starts = cloud(problem, ensemble.count, ensemble.spread)
-    members = integrate(program, starts, problem)
-    failed = [one for one in members.status if one is not Status.FINISHED]
+    starts, par = members(problem, ensemble)
+    made = integrate(program, starts, problem, par=par)
+    failed = [one for one in made.status if one is not Status.FINISHED]
     witnesses = np.unique(np.linspace(0, ensemble.count - 1, WITNESSES).astype(int))
-    known = _truth(problem, starts[witnesses])
+    known = _truth(problem, starts[witnesses], par[witnesses])
     with np.errstate(all="ignore"):
-        distance = largest_distance(problem, positions(problem, members.y))
-        errors = _errors(problem, starts, members.y)
+        distance = largest_distance(problem, positions(problem, made.y))
+        errors = _errors(problem, starts, par, made.y)
         position = phase = np.empty(0)
         if known is not None:
-            gap = (members.y[witnesses] - known.high) - known.low
+            gap = (made.y[witnesses] - known.high) - known.low
             position = position_error(problem, gap, known.high)
             phase = np.abs(ahead(problem, known.t, known.high, gap))
     t = np.full(ensemble.count, problem.t_end)
     measured = Measured(
         problem=problem,
         t=t,
-        y=members.y,
+        y=made.y,
         errors=errors,
-        guards={name: np.asarray(v, float) for name, v in problem.guards(members.y, t).items()},
+        guards={name: np.asarray(v, float) for name, v in problem.guards(made.y, t).items()},
         distance=distance,
         position_t=np.full(len(position), problem.t_end),
         position=np.sort(position),  # the last is the largest
@@ -166,11 +173,11 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
         reference=known,
         complete=not failed,
         t_stop=problem.t_end,
-        counters=Counters(steps=members.steps, evaluations=members.evaluations),
+        counters=Counters(steps=made.steps, evaluations=made.evaluations),
         compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
         trajectories=ensemble.count,
     )
-    reason = f"{len(failed)} of {ensemble.count} trajectories failed; {members.reason}" if failed else ""
+    reason = f"{len(failed)} of {ensemble.count} trajectories failed; {made.reason}" if failed else ""
     return measured, failed[0] if failed else Status.FINISHED, reason
 
 
@@ -188,62 +195,73 @@ class EnsembleRun:
         Parameters and span.
     sample : str or None
         How one trajectory meets the end.
+    par : ndarray, shape (n, n_par), optional
+        Parameters of each; the problem's own by default.
     """
 
     program: Program
     starts: Array
     problem: Problem
     sample: str | None
+    par: Array | None = None
+
+    @classmethod
+    def of(cls, problem: Problem, method: MethodBase, asked: Ensemble) -> "EnsembleRun":
+        """Return the run of a method on an ensemble of a problem, compiled."""
+        starts, par = members(problem, asked)
+        return cls(method.compile(problem.system), starts, problem, method.to_end, par)
+
+    def until(self, share: float) -> "EnsembleRun":
+        """Return the run of a few of the trajectories, over the first ``share`` of the span."""
+        end = self.problem.t0 + share * (self.problem.t_end - self.problem.t0)
+        problem = _from(self.problem, self.problem.y0, self.problem.par, end)
+        par = None if self.par is None else self.par[:WARM_UP]
+        return replace(self, starts=self.starts[:WARM_UP], par=par, problem=problem)
 
     def seconds(
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
     ) -> tuple[float, Samples]:
         """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
         with no_collection():
-            spent = 0.0
-            for _ in range(repeats - 1):
-                spent += integrate(self.program, self.starts, self.problem, self.sample, clock).seconds
-            members = integrate(self.program, self.starts, self.problem, self.sample, clock)
-            spent += members.seconds
-        failed = [one for one in members.status if one is not Status.FINISHED]
+            spent, made = 0.0, None
+            for _ in range(repeats):
+                made = integrate(self.program, self.starts, self.problem, self.sample, clock, self.par)
+                spent += made.seconds
+        assert made is not None
+        failed = [one for one in made.status if one is not Status.FINISHED]
         status = failed[0] if failed else Status.FINISHED
-        return spent / repeats, Samples(np.array([self.problem.t_end]), members.y[:1], status)
+        return spent / repeats, Samples(np.array([self.problem.t_end]), made.y[:1], status)
 
 
 def time_round(
     problem: Problem, method: MethodBase, ensemble: Ensemble, plan: TimingPlan
 ) -> TimingRound | str:
     """Take the samples of one round; see `hbvm_bench.measure.timing.time_round`."""
-    program = method.compile(problem.system)
-    starts = cloud(problem, ensemble.count, ensemble.spread)
-    EnsembleRun(program, starts[:WARM_UP], problem, method.to_end).seconds()
-    return sampled(EnsembleRun(program, starts, problem, method.to_end), program, plan)
+    run = EnsembleRun.of(problem, method, ensemble)
+    run.until(1.0).seconds()
+    return sampled(run, run.program, plan)
 
 
-def _errors(problem: Problem, starts: Array, y: Array) -> dict[str, Array]:
+def _errors(problem: Problem, starts: Array, par: Array, y: Array) -> dict[str, Array]:
     """Return the errors of the invariants, each trajectory's against its own start, shape (n,)."""
     found: dict[str, Array] = {}
     for name in problem.system.invariant_names:
         function = problem.system.function(f"invariant:{name}")
-        before = evaluate(function, problem.t0, np.ascontiguousarray(starts.T), problem.par)
-        after = evaluate(function, problem.t_end, np.ascontiguousarray(y.T), problem.par)
+        before = evaluate(function, problem.t0, np.ascontiguousarray(starts.T), par.T)
+        after = evaluate(function, problem.t_end, np.ascontiguousarray(y.T), par.T)
         gaps = np.stack([(a - b).rounded() for a, b in zip(after, before, strict=True)])
         size = np.linalg.norm(np.stack([b.hi for b in before]), axis=0)
         found[name] = np.linalg.norm(gaps, axis=0) / np.where(size == 0.0, 1.0, size)
     return found
 
 
-def _truth(problem: Problem, starts: Array) -> Reference | None:
+def _truth(problem: Problem, starts: Array, par: Array) -> Reference | None:
     """Return the 128-bit ends of a few trajectories, one row each; ``None`` without heyoka."""
     span = np.array([problem.t0, problem.t_end])
     rows: list[list[Decimal]] = []
-    parameters = {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in problem.system.unpack(problem.par).items()
-    }
     try:
-        for start in starts:
-            one = Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=problem.t_end)
+        for start, own in zip(starts, par, strict=True):
+            one = _from(problem, start, own, problem.t_end)
             rows.append(reference.taylor(one, span, reference.TOLERANCE)[-1])
     except InputError:  # heyoka is missing, or it does not arrive
         return None
@@ -251,3 +269,12 @@ def _truth(problem: Problem, starts: Array) -> Reference | None:
     low = np.array([[float(value - Decimal(float(value))) for value in row] for row in rows])
     made = {"method": f"heyoka taylor_adaptive, fp_type=real128, tol={reference.TOLERANCE}"}
     return Reference(np.full(len(rows), problem.t_end), high, low, made)
+
+
+def _from(problem: Problem, start: Array, par: Array, t_end: float) -> Problem:
+    """Return a problem with another start, other parameters and another end."""
+    parameters = {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in problem.system.unpack(par).items()
+    }
+    return Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=t_end)

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign.entries import Ensemble
 from hbvm_bench.campaign.grid import GOLDEN
+from problems.errors import unknown
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -37,7 +39,7 @@ def cloud(problem: Problem, count: int, spread: float) -> Array:
     """Return the starts of an ensemble, shape (count, dim); the first is the problem's own.
 
     Every number is multiplied by 1 + ``spread`` x, where x runs evenly through [-1, 1] in
-    all of them together: the Weyl sequence of the roots of x^(dim+1) = x + 1.
+    all of them together: the Weyl sequence of the root of x^(dim+1) = x + 1.
 
     Parameters
     ----------
@@ -48,10 +50,35 @@ def cloud(problem: Problem, count: int, spread: float) -> Array:
     spread : float
         Relative size.
     """
-    dim = problem.system.dim
+    return problem.y0 * (1.0 + spread * _evenly(count, problem.system.dim))
+
+
+def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
+    """Return the starts and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
+
+    As `cloud`, of the start and of each parameter that varies, together; all numbers of a
+    parameter that is a list are multiplied by one.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a parameter that the problem does not have.
+    """
+    system = problem.system
+    places = system.unpack(np.arange(system.n_par, dtype=np.float64))
+    x = _evenly(asked.count, system.dim + len(asked.vary))
+    par = np.tile(problem.par, (asked.count, 1))
+    for i, (name, spread) in enumerate(asked.vary, system.dim):
+        if name not in places:
+            raise unknown(f"parameter of {system.name}", name, places)
+        par[:, np.atleast_1d(places[name]).astype(int)] *= 1.0 + spread * x[:, i : i + 1]
+    return problem.y0 * (1.0 + asked.spread * x[:, : system.dim]), par
+
+
+def _evenly(count: int, dim: int) -> Array:
+    """Return ``count`` points that fill [-1, 1]^dim evenly; the first is 0."""
     root = 1.5
     for _ in range(64):
         root = (1.0 + root) ** (1.0 / (dim + 1))
     steps = root ** -np.arange(1.0, dim + 1.0)
-    x = 2.0 * ((0.5 + np.arange(count)[:, None] * steps) % 1.0) - 1.0
-    return problem.y0 * (1.0 + spread * x)
+    return 2.0 * ((0.5 + np.arange(count)[:, None] * steps) % 1.0) - 1.0

@@ -203,8 +203,19 @@ def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> Timing
 class Timeable(Protocol):
     """What can be timed: a `Run`, or an ensemble."""
 
-    def seconds(self, repeats: int = 1) -> tuple[float, Samples]:
+    @property
+    def program(self) -> Program:
+        """What runs, compiled."""
+        ...
+
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
         """Return the mean seconds of some runs, and what the last returned."""
+        ...
+
+    def until(self, share: float) -> "Timeable":
+        """Return a shorter run, over the first ``share`` of the span."""
         ...
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from hbvm_bench.campaign.file import TimingPlan
-from hbvm_bench.measure.timing import WARM_UP, Run, calibrate, interleaved, repeats_for, spread_evenly
+from hbvm_bench.measure.timing import WARM_UP, Timeable, calibrate, interleaved, repeats_for, spread_evenly
 from hbvm_bench.store.records import Compile, Load, Timing, TimingRound
 from integrators.protocol import Status
 
@@ -17,7 +17,7 @@ CALLS = 20
 CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "thread": time.thread_time}
 
 
-def time_together(runs: Sequence[Run], plan: TimingPlan) -> list[Timing | str]:
+def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing | str]:
     """Take all samples of the runs of one problem, interleaved round by round in this process.
 
     Every round begins with a garbage collection and one sample of the calibration. A run
@@ -25,7 +25,7 @@ def time_together(runs: Sequence[Run], plan: TimingPlan) -> list[Timing | str]:
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of Timeable
         Compiled.
     plan : TimingPlan
         How many rounds, in which order and by which clock.
@@ -87,7 +87,7 @@ def time_together(runs: Sequence[Run], plan: TimingPlan) -> list[Timing | str]:
     return made
 
 
-def _mean_seconds(run: Run, repeats: int, clock: Callable[[], float]) -> float:
+def _mean_seconds(run: Timeable, repeats: int, clock: Callable[[], float]) -> float:
     return run.seconds(repeats, clock)[0]
 
 

@@ -110,11 +110,11 @@ def _missing_together(
 
     Rounds of different processes do not belong together, so that one missing case has all of them visited.
     """
-    groups: dict[str, list[Resolved]] = {}
+    groups: dict[object, list[Resolved]] = {}
     for resolved in cases:
         record = store.load(resolved.id)
-        if record is not None and timeable(record) and resolved.case.ensemble is None and plan.rounds:
-            groups.setdefault(resolved.case.problem, []).append(resolved)
+        if record is not None and timeable(record) and plan.rounds:
+            groups.setdefault((resolved.case.problem, resolved.case.ensemble), []).append(resolved)
     return [group for group in groups.values() if not _timed_together(group, store, plan, here)]
 
 

@@ -22,20 +22,21 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy as np
 
-from hbvm_bench.campaign.file import Case, Limits, TimingPlan
+from hbvm_bench.campaign.file import Case, Ensemble, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
 from hbvm_bench.measure.solve import solve, solve_with_bare_end
-from hbvm_bench.measure.timing import Run
+from hbvm_bench.measure.timing import Run, Timeable
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing, Value
 from hbvm_bench.store.store import NAME, encode_series
-from integrators.protocol import Program, Status
+from integrators.protocol import MethodBase, Program, Status
 from integrators.solution import Solution
 from problems.errors import InputError
+from problems.problem import Problem
 from problems.systems.base import System
 
 REPLY = "reply.json"
@@ -232,9 +233,15 @@ def _time(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[
 
 
 def _interleave(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[Timing | str]:
-    runs = [Run.of(one.problem, one.method) for one in cases]  # compiled
+    runs = [_run(one.problem, one.method, one.case.ensemble) for one in cases]  # compiled
     (directory / COMPILED).touch()
     return together.time_together(runs, plan)
+
+
+def _run(problem: Problem, method: MethodBase, asked: Ensemble | None) -> Timeable:
+    if asked is None:
+        return Run.of(problem, method)
+    return ensemble.EnsembleRun.of(problem, method, asked)
 
 
 class _Telling:

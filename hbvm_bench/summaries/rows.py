@@ -113,7 +113,10 @@ def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[R
 
 def at_once(ensemble: Ensemble | None) -> str:
     """Return what follows a problem's name where it is an ensemble, else ``""``."""
-    return f", {ensemble.count} trajectories at once" if ensemble else ""
+    if ensemble is None:
+        return ""
+    varied = "".join(f", {name} ± {100 * spread:g} %" for name, spread in ensemble.vary)
+    return f", {ensemble.count} trajectories at once{varied}"
 
 
 def title_of(group: str, found: Sequence[Row]) -> str:

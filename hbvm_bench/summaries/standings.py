@@ -12,7 +12,7 @@ from hbvm_bench.campaign.sweep import combinations, fill
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.rows import group_of, tasks
 
 TIME = "warm_seconds"
 
@@ -35,13 +35,16 @@ class Comparison:
 
 
 def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:
-    """Return the problems of a campaign, in its order, each with the records of its cases."""
-    found = []
+    """Return the problems of a campaign, then its ensembles, each with the records of its cases."""
+    found: list[tuple[ProblemEntry, list[Record]]] = []
+    tables = tasks(records)
     for entry in campaign.entries():
         for chosen in combinations(entry.sweep):
             problem = repr(make_problem(fill(entry.use, entry.values | chosen)))
-            here = [one for one in records if one.case.problem == problem and one.case.ensemble is None]
-            found.append((entry, here))
+            found.append((entry, tables.get((problem, None), [])))
+    for many in campaign.ensembles:
+        problem = repr(make_problem(many.problem))
+        found.append((many.entry, tables.get((problem, many.ensemble), [])))
     return found
 
 

@@ -3,7 +3,7 @@
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
-from integrators.kernel.ensemble.engine import run
+from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.events.engine import look
 from integrators.kernel.implicit.engine import solver
 from integrators.kernel.line.engine import line
@@ -14,6 +14,7 @@ ENGINES = {
     "implicit solvers": solver,
     "line integrals": line,
     "ensembles": run,
+    "ensembles with own steps": run_own,
     "events": look,
 }
 

@@ -1,9 +1,10 @@
 """Many trajectories of one system: starts and parameters differ, times do not.
 
 They go in lanes, one in each lane of the vector unit (`integrators.kernel.ensemble`), and
-one by one where that cannot be: with steps of varying length, an implicit solver, more than
-sixteen stages, a field that does not run on lanes. One whose equations the iteration does
-not solve leaves its lane and goes by itself, from its start.
+one by one where that cannot be: with an implicit solver, more than sixteen stages, steps that
+something else than the tolerance limits, a field that does not run on lanes. One whose equations
+the iteration does not solve, or is slow to solve, leaves its lane and goes by itself, from its start;
+so does one with steps of its own length whose field has a kink.
 """
 
 from collections.abc import Callable
@@ -11,14 +12,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.kernel.ensemble.engine import run
-from integrators.kernel.ensemble.group import Group
+from integrators.kernel.context import Context
+from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.prepared import Lanes
+from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
@@ -52,9 +54,12 @@ class BatchProgram(Protocol):
 
     system: System
     h: float
+    first: float | None
+    solver: Solver
 
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
     def in_lanes(self) -> Lanes | None: ...
+    def contexts(self) -> tuple[Context, Context]: ...
 
 
 def prepare_batch(
@@ -80,7 +85,9 @@ def prepare_batch(
     )  # fmt: skip
     work = _Work(program, result, starts, parameters, t0, sample or "side", threads)
     lanes = program.in_lanes() if work.sample == "side" else None
-    return work.all_alone if lanes is None else partial(work.run, _InLanes.of(lanes, work))
+    if lanes is None:
+        return work.all_alone
+    return partial(work.run, (_Own if lanes.varying else _Fixed).of(lanes, work))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +110,7 @@ class _Work:
         size = max(1, n // (width * JOBS * self.threads)) * width
         self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)])
         stayed = lanes.arrived == 1
-        result.steps[stayed] = lanes.steps
+        result.steps[stayed] = lanes.steps[stayed]
         result.iterations[stayed] = lanes.sweeps[stayed]
         result.evaluations[stayed] = lanes.lanes.k * lanes.sweeps[stayed]
         self.share(self.alone, np.flatnonzero(~stayed).tolist())
@@ -159,33 +166,41 @@ class _InLanes:
     h: float
     numbers: dict[str, int]
     arrays: dict[str, Any]
-    spare: list[tuple[Group, Group]] = field(default_factory=list)
+    spare: list[Any] = field(default_factory=list)
 
     @classmethod
-    def of(cls, lanes: Lanes, work: _Work) -> "_InLanes":
-        """Plan the steps to the samples; allocate."""
-        result, t0 = work.result, work.t0
-        h = -work.program.h if result.t[-1] < t0 else work.program.h
-        targets, parts = plan(result.t, np.full(result.t.size, t0), h)
-        n = len(work.starts)
+    def of(cls, lanes: Lanes, work: _Work) -> Self:
+        """Plan; allocate."""
+        result, n = work.result, len(work.starts)
+        h, more = cls.plan(lanes, work)
         arrays = {
             "starts": work.starts, "all_par": work.parameters,
             "all_velocity": lanes.velocities(work.parameters),
-            "times": np.ascontiguousarray(result.t), "targets": targets, "out": result.y,
-            **lanes.parts(parts, h),
+            "times": np.ascontiguousarray(result.t), "out": result.y, **more,
             "arrived": np.zeros(n, np.int64), "all_sweeps": np.zeros(n, np.int64),
         }  # fmt: skip
         made = cls(lanes, work, h, {"count": result.t.size, "trajectories": n}, arrays)
-        made.spare.append(made._memory())
+        made.spare.append(made.memory())
         return made
 
-    def _memory(self) -> tuple[Group, Group]:
+    @classmethod
+    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+        """Return the step that the matrix is for, and what else `Group` has."""
+        raise NotImplementedError
+
+    def memory(self) -> Any:
+        """Return memory for one thread."""
         return self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
 
+    def advance(self, memory: Any, budget: int) -> int:
+        """Go on; return 1 at the end, or 0 after so many steps."""
+        group, side = memory
+        return run(group.address, side.address, budget)
+
     @property
-    def steps(self) -> int:
+    def steps(self) -> Counts:
         """Own steps of every trajectory."""
-        return int(self.arrays["targets"].max(initial=0))
+        raise NotImplementedError
 
     @property
     def arrived(self) -> Counts:
@@ -198,16 +213,55 @@ class _InLanes:
         return self.arrays["all_sweeps"]
 
     def run(self, members: range) -> None:
-        """Integrate some trajectories, group by group."""
+        """Integrate some trajectories."""
         try:
             memory = self.spare.pop()
         except IndexError:  # another thread has it
-            memory = self._memory()
-        group, side = memory
+            memory = self.memory()
+        group = memory[0]
         group.at, group.end, group.sample = members.start, members.stop, -1
         pace = Pace(CHUNK, self.work.starts.shape[1])
         done = False
         while not done and not self.work.stop.is_set():
             with pace:
-                done = run(group.address, side.address, pace.steps) == 1
+                done = self.advance(memory, pace.steps) == 1
         self.spare.append(memory)
+
+
+class _Fixed(_InLanes):
+    """Steps of one length: a group of trajectories after the other."""
+
+    @classmethod
+    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+        times, t0 = work.result.t, work.t0
+        h = -work.program.h if times[-1] < t0 else work.program.h
+        targets, parts = plan(times, np.full(times.size, t0), h)
+        return h, {"targets": targets, **lanes.parts(parts, h)}
+
+    @property
+    def steps(self) -> Counts:
+        return np.full(len(self.arrived), self.arrays["targets"].max(initial=0))
+
+
+class _Own(_InLanes):
+    """Steps of varying length: in each lane one trajectory after the other."""
+
+    @classmethod
+    def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
+        return 1.0, {"all_steps": np.zeros(len(work.starts), np.int64)}
+
+    def memory(self) -> Any:
+        contexts = [self.work.program.contexts()[0] for _ in range(self.lanes.width)]
+        for one in contexts:
+            one.strategy = self.work.program.solver.strategy
+        group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
+        group.point({"contexts": np.array([one.address for one in contexts])})
+        group.first_length = self.work.program.first or 0.0
+        return group, contexts
+
+    def advance(self, memory: Any, budget: int) -> int:
+        return run_own(memory[0].address, budget)
+
+    @property
+    def steps(self) -> Counts:
+        return self.arrays["all_steps"]

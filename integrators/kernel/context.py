@@ -249,6 +249,8 @@ class Context(Memory):
     longest = Real()  # no step is longer, for what the user allows
     busy_implicit = Real()  # corrections of a step by the implicit solver to aim at, at most
     stop = Real()  # no step passes this time; infinite: none
+    attempts = Integer()  # at the step ahead that were rejected,
+    doubts = Integer()  # and those of them that did not look smooth
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
     negligible = Real()  # part of a block's size that the error at a kink may be

@@ -25,14 +25,13 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
+from integrators.kernel.step.rule import TOLERANCE
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem, System
-
-TOLERANCE = 1e-16
 
 FIRST_RATE = math.log2(0.01)
 
@@ -85,6 +84,8 @@ class HBVMProgram(Compiled):
 
     varying = False
     """Whether steps vary in length."""
+    first: float | None = None
+    """Length of the first step, where steps vary; ``None``: chosen."""
     threaded = True
     """Whether `batch` takes threads."""
     _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
@@ -152,6 +153,11 @@ class HBVMProgram(Compiled):
         c, form = self.constants, "second" if self.second else "first"
         kept = f", {self.kept.description}" if self.kept else ""
         return f"HBVM(k={c.k}, s={c.s}, h={self.h!r}, form={form!r}, solver={self._named!r}{kept})"
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing but time and tolerance says where steps end."""
+        return True
 
     @property
     def lanes(self) -> bool:
@@ -241,8 +247,10 @@ class HBVMProgram(Compiled):
         """Return the method on trajectories in lanes, compiled the first time; ``None`` where it has none."""
         if self._in_lanes is None:
             made, seconds = None, 0.0
-            if self.lanes and not self.kept and not self.varying and self.solver.strategy != ALWAYS_IMPLICIT:
-                made, seconds = lanes_of(self.system, self.constants, self.second, self.shape.unit)
+            if self.lanes and not self.kept and self.free and self.solver.strategy != ALWAYS_IMPLICIT:
+                made, seconds = lanes_of(
+                    self.system, self.constants, self.second, self.shape.unit, self.varying
+                )
             self.compile_seconds += seconds
             self.from_cache = self.from_cache and (made is None or made.from_cache)
             self._in_lanes = (made,)
@@ -376,6 +384,11 @@ class AdaptiveProgram(HBVMProgram):
         looks = sees_kinks(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing but the tolerance limits the steps."""
+        return self.max_step is None and self.max_steps is None and not self.breakpoints.size
 
     @property
     def description(self) -> str:

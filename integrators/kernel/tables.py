@@ -266,11 +266,11 @@ def fixed(constants: Constants) -> dict[str, Array]:
         "weights_low": _vector(a["weights_low"]),
         "position_weights": _vector(a["position_weights"]),
         "position_weights_low": _vector(a["position_weights_low"]),
-        "recurrence": _recurrence(constants.modes),
+        "recurrence": recurrence(constants.modes),
     }
 
 
-def _recurrence(modes: int) -> Array:
+def recurrence(modes: int) -> Array:
     """Return pairs a, b with P_{j+1} = a x P_j - b P_{j-1}, x = 2 c - 1, for the orthonormal basis."""
     j = np.arange(modes, dtype=np.float64)
     up = np.sqrt(2.0 * j + 3.0)

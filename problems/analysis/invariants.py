@@ -44,8 +44,8 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
         One time, or one per state.
     y : ndarray, shape (dim, n)
         States, one per column.
-    par : ndarray, shape (n_par,)
-        Parameters.
+    par : ndarray, shape (n_par,) or (n_par, n)
+        Parameters, of all states or of each.
 
     Returns
     -------
@@ -57,9 +57,11 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
     columns = max(1, _BLOCK // largest)
     n = y.shape[1]
     times = np.broadcast_to(np.asarray(t, dtype=np.float64), (n,))
+    own = par if par.ndim == 2 else par[:, np.newaxis]
+    blocks = [slice(low, low + columns) for low in range(0, max(n, 1), columns)]
     parts = [
-        _Interpreter(times[low : low + columns], y[:, low : low + columns], par).outputs(function)
-        for low in range(0, max(n, 1), columns)
+        _Interpreter(times[here], y[:, here], own[:, here] if par.ndim == 2 else own).outputs(function)
+        for here in blocks
     ]
     return [
         DD(np.concatenate([p[i].hi for p in parts]), np.concatenate([p[i].lo for p in parts]))
@@ -69,7 +71,7 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
 
 class _Interpreter:
     def __init__(self, t: Array, y: Array, par: Array) -> None:
-        self.inputs = {"t": t[np.newaxis, :], "y": y, "par": par[:, np.newaxis]}
+        self.inputs = {"t": t[np.newaxis, :], "y": y, "par": par}
         self.n = y.shape[1]
         self.known: dict[int, DD] = {}
 

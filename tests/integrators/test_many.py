@@ -27,7 +27,8 @@ def morse(D=1.0, a=1.0):
     [
         (Gauss(s=6, h=0.25), 2e-15),  # measured 3e-16
         (HBVM(k=12, s=4, h=0.25), 2e-15),
-        (HBVM(k=8, s=4, tol=1e-10), 0.0),
+        (HBVM(k=8, s=4, tol=1e-10), 1e-8),  # steps end at the times: measured 1e-9
+        (HBVM(k=8, s=4, tol=1e-10, max_step=0.3), 0.0),
         (HBVM(k=18, s=2, h=0.25), 0.0),
         ("Taylor", 1e-13),  # its batch lands on the times: measured 3e-15
         ("DOP853", 0.0),

@@ -1,4 +1,4 @@
-"""The compiled loop over groups in this process."""
+"""The compiled loops over groups in this process."""
 
 from typing import Any
 
@@ -15,3 +15,13 @@ def _run() -> Any:
 
 run = Engine(_run, "group side budget", *SOURCES)
 """``run(group, side, budget)``: see `integrators.kernel.ensemble.loop`."""
+
+
+def _run_own() -> Any:
+    from integrators.kernel.ensemble.own import run
+
+    return run
+
+
+run_own = Engine(_run_own, "group budget", *SOURCES, "context", "tables", "step")
+"""``run_own(group, budget)``: see `integrators.kernel.ensemble.own`."""

@@ -53,7 +53,16 @@ class Group(Memory):
     floored = Array("rows", "lanes")  # and beside its block, small ones raised to a part of the largest
     size = Array("rows", "lanes")
 
-    # --- trajectories one group after another; see `ensemble.loop` ---
+    # --- steps of varying length ---
+    modes = Integer()  # Legendre coefficients of the values that are extrapolated
+    into_modes = Array()  # values -> coefficients, (modes, k)
+    recurrence = Array()  # pairs; see `Context.recurrence`
+    ratio = Array("lanes")  # of the length to that of the step that `values` belong to; 0: none
+    begin = Array("lanes")  # where on that step this one begins: at its end, 1, or at its start, 0
+    next_state = Array("dim", "lanes")
+    next_error = Array("dim", "lanes")
+
+    # --- trajectories, one group after another; see `ensemble.loop` ---
     starts = Array()  # (n, dim)
     all_par = Array()  # (n, parameters)
     all_velocity = Array()  # (n, rows)
@@ -72,3 +81,13 @@ class Group(Memory):
     at = Integer()  # first trajectory of the group,
     end = Integer()  # and the one after the last to be done
     sample = Integer()  # the next one to be made; -1: the group is not loaded
+
+    # --- or one in each lane after another; see `ensemble.own` ---
+    contexts = Array(of=int)  # (lanes): address of a `Context` for each lane
+    start_time = Real()
+    first_length = Real()  # of the first step; 0: what the field there suggests
+    member = Array("lanes", of=int)  # which trajectory is on a lane; -1: none
+    made = Array("lanes", of=int)  # its samples
+    before = Array("lanes")  # its sweeps before the present step
+    mark = Array("lanes")  # the time at which it was last seen to get anywhere
+    all_steps = Array(of=int)  # (n)

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
-from integrators.kernel.ensemble.engine import run
+from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import GOAL, MOST, Form, compile_steps
+from integrators.kernel.ensemble.steps import MOST, Form, compile_steps
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import Numbers, aligned
+from integrators.kernel.step.rule import FALL, LEAST
 from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
@@ -37,6 +38,8 @@ class Lanes:
         Whether in second-order form.
     unit : bool
         Whether the rows' factors can be in the matrix; see `integrators.kernel.tables.unit`.
+    varying : bool
+        Whether each trajectory has steps of its own length.
 
     Raises
     ------
@@ -44,8 +47,9 @@ class Lanes:
         If parameters that differ from lane to lane keep the field from running on lanes.
     """
 
-    def __init__(self, system: System, constants: Constants, second: bool, unit: bool):
-        self.system, self.second, self.unit, self._constants = system, second, unit, constants
+    def __init__(self, system: System, constants: Constants, second: bool, unit: bool, varying: bool):
+        self.system, self.second, self._constants = system, second, constants
+        self.unit, self.varying = unit and not varying, varying
         self.rows = system.dof if second and system.dof is not None else system.dim
         width = width_of_blocks(system)
         starts = [0] if second or system.dof is None else [0, system.dof]
@@ -53,8 +57,11 @@ class Lanes:
         groups = tuple((start, size // width, width) for start in starts)
         self.k = constants.k
         self.width = width_for(system, second, self.rows)
-        self._code = compile_steps(system, Form(self.width, self.k, self.rows, second, unit, groups))
-        loop = run.code()
+        self._code = compile_steps(
+            system,
+            Form(self.width, self.k, self.rows, second, self.unit, varying, constants.modes, groups),
+        )
+        loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
         self._scaled: dict[float, Numbers] = {}
 
@@ -70,9 +77,10 @@ class Lanes:
         a = self._constants.arrays
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
-        falls = 3.0 * GOAL * 1e15 ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
+        falls = 3.0 * LEAST * FALL ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
         extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
         found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
+        found |= {"into_modes": a["into_modes"], "recurrence": tables.recurrence(self._constants.modes)}
         return {name: _aligned(values) for name, values in found.items()}
 
     def _matrix(self, h: float) -> Numbers:
@@ -132,6 +140,7 @@ class Lanes:
         group, side = (Group(shape, {**self._fixed, **arrays, "matrix": matrix}) for _ in range(2))
         group.reach = float(_reach(matrix))
         group.h[:], group.t0[:] = h, t0
+        group.start_time = t0
         return group, side
 
 
@@ -148,13 +157,15 @@ def width_for(system: System, second: bool, rows: int) -> int:
     return 4 * LANES if rows == 1 else 2 * LANES
 
 
-def lanes_of(system: System, constants: Constants, second: bool, unit: bool) -> tuple[Lanes | None, float]:
+def lanes_of(
+    system: System, constants: Constants, second: bool, unit: bool, varying: bool
+) -> tuple[Lanes | None, float]:
     """Return a method on trajectories in lanes, or ``None`` where it cannot be; and the seconds that took."""
     started = binary.clock()
     found = None
     if Lanes.takes(system, constants, second):
         try:
-            found = Lanes(system, constants, second, unit)
+            found = Lanes(system, constants, second, unit, varying)
         except Exception as error:
             from numba.core.errors import NumbaError  # has been imported to compile
 

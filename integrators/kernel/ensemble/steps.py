@@ -20,17 +20,23 @@ from integrators.kernel.ensemble.writer import Index, Writer
 from integrators.kernel.native import binary, field, store
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.values import Value
+from integrators.kernel.step.rule import (
+    FLOOR,
+    LARGE,
+    LEAST,
+    NOTHING,
+    PATIENCE,
+    ROUNDING,
+    SMALLEST,
+    STAGNATION,
+    STEEP,
+    TOLERANCE,
+)
 from problems import emit
 from problems.systems.base import System
 
 INFINITY = float("inf")
 UNROLLED = 640  # products of a sweep up to which stages and rows are written out
-
-# The stopping rule; see `Steps.rule`.
-TOLERANCE = 1e-16
-GOAL, STEEP = 3e-17, 0.15
-PATIENCE, ROUNDING, STAGNATION = 5, 1e-15, 1e-13
-FLOOR, SMALLEST, LARGE = 1e-3, 1e-200, 1e200
 AGAIN = 40  # sweeps after which a start that was extrapolated is given up for one without values
 MOST = 80  # sweeps after which a trajectory leaves
 
@@ -47,6 +53,11 @@ class Form:
         Second-order form: stages hold positions, the state is (q, p).
     unit : bool
         Whether the rows' factors h q' / p are in the matrix.
+    varying : bool
+        Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
+        step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
+    modes : int
+        Legendre coefficients that such a step is extrapolated by.
     groups : tuple of tuple of int
         First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
     """
@@ -56,6 +67,8 @@ class Form:
     rows: int
     second: bool
     unit: bool
+    varying: bool
+    modes: int
     groups: tuple[tuple[int, int, int], ...]
 
 
@@ -69,7 +82,7 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     """
     what = "force" if form.second else "field"
     source = emit.source(system, what, "numba")
-    modules = binary.sources(*field.SOURCES, "ensemble")
+    modules = binary.sources(*field.SOURCES, "ensemble", "step/rule")
     name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
@@ -177,11 +190,13 @@ class Steps(Writer):
         def row(d: Index) -> None:
             error = self.get(self.error, d)
             if not form.second:
+                if form.varying:
+                    self.put(self.h, self.factor, d)
                 self.each(form.k, lambda i: self.put(error, self.base, self.at(i, form.rows, d)))
                 return
             kh = self.h * self.get(self.velocity, d)
             if not form.unit:
-                self.put(kh, self.factor, d)
+                self.put(self.h * kh if form.varying else kh, self.factor, d)
             u, u_low = self.drift(d, kh)
 
             def stage(i: Index) -> None:
@@ -238,6 +253,8 @@ class Steps(Writer):
             def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
                 start = self.at(block, width, first)
                 size = self.get(self.size, start)
+                if form.varying:
+                    size = size.max(Value(self.b, self.b.load(largest)) * NOTHING)
                 floor = size.max(Value(self.b, self.b.load(largest)) * FLOOR)
                 inverses = [(self.one / x).where(x.compare(">", SMALLEST), LARGE) for x in (size, floor)]
                 for i in range(width):
@@ -268,14 +285,46 @@ class Steps(Writer):
     def predict(self) -> None:
         """First values: the last step's polynomial at the nodes of this one."""
         k, rows = self.form.k, self.form.rows
-        table = self.table(Group.slots["extrapolation"])
+        if self.form.varying:
+            self.predict_elsewhere()
+            return
+        self.product(self.table(Group.slots["extrapolation"]), k)
+        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
+
+    def product(self, table: Any, count: int) -> None:
+        """Set so many rows of `ahead` to those of a table times the values."""
+
+        def one(i: Index) -> None:
+            total = self.combination(table, i)
+            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, self.form.rows, d)))
+
+        self.each(count, one)
+
+    def predict_elsewhere(self) -> None:
+        """As `predict`, by the polynomial's coefficients: this step's length may be another one."""
+        slots, rows, modes = Group.slots, self.form.rows, self.form.modes
+        ratio, begin = (self.get(self.array(slots[name])) for name in ("ratio", "begin"))
+        recurrence = self.array(slots["recurrence"])
+        there = ratio.compare("!=", 0.0)
+        self.product(self.table(slots["into_modes"]), modes)
 
         def stage(i: Index) -> None:
-            total = self.combination(table, i)
-            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, rows, d)))
+            x = ratio.fma(self.number(self.nodes, i), begin) * 2.0 - 1.0
+            basis, before = [self.one], self.zero
+            for j in range(modes - 1):
+                a, b = (self.number(recurrence, 2 * j + part) for part in (0, 1))
+                basis.append((a * x).fma(basis[j], -(b * before)))
+                before = basis[j]
 
-        self.each(k, stage)
-        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
+            def row(d: Index) -> None:
+                total = self.zero
+                for j, value in enumerate(basis):
+                    total = value.fma(self.get(self.ahead, self.at(j, rows, d)), total)
+                self.put(total.where(there, 0.0), self.values, self.at(i, rows, d))
+
+            self.each_row(row)
+
+        self.each(self.form.k, stage)
 
     def iterate(self) -> None:
         """Sweep until every lane is solved, or has left."""
@@ -356,7 +405,7 @@ class Steps(Writer):
         steep = b.and_(falling, last.compare("<", 1.0))
         for condition in (
             strict.compare("<=", last * STEEP),
-            (strict * strict).compare("<=", last * GOAL),
+            (strict * strict).compare("<=", last * LEAST),
             b.fcmp_ordered("<=", strict.value, fall.value),
         ):
             steep = b.and_(steep, condition)
@@ -371,10 +420,14 @@ class Steps(Writer):
         b.store(best.where(best.compare("<=", strict), strict).value, self.best)
         b.store(stalled.value, self.stalled)
 
-        over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in (AGAIN, MOST)]
+        ends = (AGAIN,) if form.varying else (AGAIN, MOST)
+        over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
         all_of_them, none = (ir.Constant(active.type, [bit] * form.lanes) for bit in (1, 0))
         late = [b.select(flag, all_of_them, none) for flag in over]
-        failing = b.and_(b.and_(active, b.not_(solved)), b.or_(b.not_(finite), b.or_(*late)))
+        gives_up = b.not_(finite)
+        for mask in late:
+            gives_up = b.or_(gives_up, mask)
+        failing = b.and_(b.and_(active, b.not_(solved)), gives_up)
         active = b.and_(active, b.not_(solved))
         b.store(active, self.active)
         with b.if_then(self.any(failing), likely=False):
@@ -383,6 +436,10 @@ class Steps(Writer):
     def restart(self, failing: Any) -> None:
         """Begin again without values where that has not been tried, or else let the trajectory leave."""
         b, form = self.b, self.form
+        if form.varying:  # a shorter step is tried
+            for mask in (self.active, self.alive):
+                b.store(b.and_(b.load(mask), b.not_(failing)), mask)
+            return
         leaves = b.and_(failing, b.load(self.again))
         anew = b.and_(failing, b.not_(b.load(self.again)))
         b.store(b.or_(b.load(self.again), anew), self.again)
@@ -401,6 +458,10 @@ class Steps(Writer):
         """Set the state at the end, as a sum of two doubles; the displacement is formed first."""
         b, form = self.b, self.form
         alive = self.variable(self.bits, b.load(self.alive))
+        ends = [(self.state, self.state), (self.error, self.error)]
+        if form.varying:
+            ahead = [self.array(Group.slots[name]) for name in ("next_state", "next_error")]
+            ends = [(ahead[0], self.state), (ahead[1], self.error)]
 
         def mean(d: Index, high: Any, low: Any) -> Value:
             total = None
@@ -415,8 +476,8 @@ class Steps(Writer):
             new, lost = before.two_sum(small)
             good = b.and_(b.load(alive), (new - new).compare("==", 0.0))
             b.store(good, self.alive)
-            for value, base in ((new, self.state), (lost, self.error)):
-                self.put(value.where(good, self.get(base, d)), base, d)
+            for value, base, now in ((new, *ends[0]), (lost, *ends[1])):
+                self.put(value.where(good, self.get(now, d)), base, d)
 
         def row(d: Index) -> None:
             impulse = self.h * mean(d, self.weights, self.weights_low)

@@ -136,7 +136,7 @@ def _log(x: Value) -> Value:
 
 
 def _function(name: str, formula: Any, limit: float | None) -> Any:
-    """Emit calls of a function that evaluates ``formula``, or the C library beyond ``limit``."""
+    """Emit calls of a function that evaluates ``formula``, or the C library in lanes beyond ``limit``."""
 
     def emit(builder: Any, x: Any) -> Any:
         kind = x.type
@@ -147,13 +147,16 @@ def _function(name: str, formula: Any, limit: float | None) -> Any:
             function.linkage = "linkonce_odr"
             inner = ir.IRBuilder(function.append_basic_block())
             argument = Value(inner, function.args[0])
+            value = formula(argument)
             if limit is not None:
                 mask = inner.fcmp_unordered(">", argument.absolute().value, argument.of(limit).value)
                 bits: Any = inner.bitcast(mask, ir.IntType(kind.count))
                 far = inner.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
                 with inner.if_then(far, likely=False):
-                    inner.ret(llvm_call(inner, name, argument.value))
-            inner.ret(formula(argument).value)
+                    # in these alone: what comes out in a lane depends on no other lane
+                    library = Value(inner, llvm_call(inner, name, argument.value))
+                    inner.ret(library.where(mask, value).value)
+            inner.ret(value.value)
         return builder.call(function, [x])
 
     return emit

@@ -7,7 +7,7 @@ from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
-from integrators.kernel.step.size import NOTHING
+from integrators.kernel.step.rule import NOTHING
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 

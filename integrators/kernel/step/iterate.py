@@ -6,20 +6,13 @@ from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RU
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
-from integrators.kernel.step.size import ROUNDING, STAGNATION, change, is_rounding, take_sizes
+from integrators.kernel.step.rule import FALL, LEAST, PATIENCE, ROUNDING, STAGNATION, STEEP
+from integrators.kernel.step.size import change, is_rounding, take_sizes
 from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
 MAX_ITERATIONS = 200
-# Changes that do not decrease, to end it between ROUNDING and STAGNATION. Where the iteration's matrix is
-# far from normal the changes fall in waves: two end it early (a drift of 2.4e-16 per step, period annulus,
-# s = 2, h = 1; with five 3e-18).
-PATIENCE = 5
-# Once a change is small, how fast it has fallen tells how fast the rest will, if that is steep. One steep
-# fall may be a part of a wave (Penning trap, s = 2, h = .2: an error of 5e-15 in one step); so the average
-# fall, from a first change as large as the state to 1e-15, must promise next to nothing. Binary logarithms.
-LOG_TRUSTED, STEEP = log2(1e-11), log2(0.15)
-LEAST = 3e-17  # smaller changes are rounding
-LOG_PROMISE, FALL = log2(3.0 * LEAST), log2(1e15)
+LOG_TRUSTED, LOG_STEEP = log2(1e-11), log2(STEEP)
+LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
 # What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
 # stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
 # than rounding adds. With 3e-18 it still was 1e-20 (h = .5); with 1e-18 nothing is seen of it.
@@ -53,8 +46,8 @@ def test(ctx, strict):
         polish(ctx, ctx.tolerance)
     elif strict < ctx.best:
         ctx.best, ctx.stalled = strict, 0
-        steep = follows and rate <= STEEP and size <= LOG_TRUSTED
-        if steep and ctx.tried * (size - LOG_PROMISE) <= FALL:
+        steep = follows and rate <= LOG_STEEP and size <= LOG_TRUSTED
+        if steep and ctx.tried * (size - LOG_PROMISE) <= LOG_FALL:
             polish(ctx, strict)
         elif ctx.tried >= MAX_ITERATIONS:
             restart(ctx, DIVERGED)

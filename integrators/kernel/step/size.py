@@ -7,17 +7,10 @@ its group, so there are two measures: `strict`, by the block's own size, and `fl
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
+from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, ROUNDING, SMALLEST, STAGNATION
 from integrators.kernel.step.stages import offset
 
-FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
-# Of the same, where steps vary: a smaller block is judged as if it had this size, as its errors are. A block
-# that is 0 at first grows by one power of t in each iteration, far from the others by many.
-NOTHING = 1e-6
-SMALLEST, LARGE = 1e-200, 1e200  # a block smaller than that has no size to divide by
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good
-
-STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
-ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
 
 
 @compiled

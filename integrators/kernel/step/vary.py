@@ -37,7 +37,7 @@ from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
 from integrators.kernel.step.kinks import kink
-from integrators.kernel.step.size import ROUNDING
+from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -209,13 +209,11 @@ def ready(ctx):
         if ctx.solver == 0:
             return want_solver(ctx)
         take_over(ctx)
-    t = ctx.t0
-    allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
-    ctx.rejected = 0
-    grow, failure, doubts = GROW, UNDERFLOW, 0
+    begin_attempts(ctx)
+    failure = UNDERFLOW
     while True:
         h = within(ctx, ctx.next_length)
-        if not abs(h) > SHORTEST * abs(t):
+        if not abs(h) > SHORTEST * abs(ctx.t0):
             return failure
         before = ctx.iterations
         implicit = ctx.implicit
@@ -225,47 +223,66 @@ def ready(ctx):
         ctx.solved = UNSOLVED
         if outcome == NOT_KEPT:
             return outcome
-        error, defect = INFINITY, INFINITY
-        if outcome == DONE:
-            error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
-            if implicit == 0:
-                fits = error <= allowed and defect <= allowed_defect
-                if ctx.kinked:
-                    doubts += 1
-                    ctx.doubt_end = t + h
-                if (fits or doubts >= SURE) and kink(ctx, fits):
-                    error = INFINITY
-        factor = longer(ctx, error, defect, grow)
-        if error <= allowed and defect <= allowed_defect:
-            if doubts >= SURE and ctx.kinks:
-                ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
-            limit = ctx.length_limit * APPROACH
-            ctx.length_limit = limit
-            busy = ctx.busy_implicit if implicit else BUSY if ctx.second else BUSY_FIRST
-            factor = min(factor, max(busy / (ctx.iterations - before), 0.5))
-            factor = min(factor, limit / abs(h))
-            if implicit and 1.0 < factor < STEADY:
-                factor = 1.0
-            elif implicit == 0 and ctx.strategy != FIXED_POINT:
-                watch(ctx, factor)
-            ctx.length_after = h * factor
+        if accepts(ctx, outcome, ctx.iterations - before, implicit):
             ctx.solved = BY_VALUES
             return DONE
-        failure = UNDERFLOW
-        if implicit:
-            ctx.implicit_steps -= 1
-        if outcome == DONE:
-            ctx.length = h
-            ctx.rejected = 1
-        else:
-            failure = outcome
-            ctx.length = 0.0
-            ctx.length_limit = RETREAT * abs(h)
-            if outcome in (DIVERGED, SCATTERED):
-                factor = RETREAT
-        ctx.next_length = h * min(factor, SAFETY)
-        ctx.rejections += 1
-        grow = 1.0
+        failure = UNDERFLOW if outcome == DONE else outcome
+
+
+@compiled
+def begin_attempts(ctx):
+    """Begin to look for the length of the step ahead."""
+    ctx.rejected = ctx.attempts = ctx.doubts = 0
+
+
+@compiled
+def accepts(ctx, outcome, iterations, implicit):
+    """Whether the attempted step of length `Context.h` is good enough.
+
+    If it is, `Context.length_after` is the length of the step after it; else `Context.next_length` is that
+    of the next attempt.
+    """
+    t, h = ctx.t0, ctx.h
+    allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
+    error, defect = INFINITY, INFINITY
+    if outcome == DONE:
+        error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
+        if implicit == 0:
+            fits = error <= allowed and defect <= allowed_defect
+            if ctx.kinked:
+                ctx.doubts += 1
+                ctx.doubt_end = t + h
+            if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
+                error = INFINITY
+    factor = longer(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
+    if error <= allowed and defect <= allowed_defect:
+        if ctx.doubts >= SURE and ctx.kinks:
+            ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
+        limit = ctx.length_limit * APPROACH
+        ctx.length_limit = limit
+        busy = ctx.busy_implicit if implicit else BUSY if ctx.second else BUSY_FIRST
+        factor = min(factor, max(busy / iterations, 0.5))
+        factor = min(factor, limit / abs(h))
+        if implicit and 1.0 < factor < STEADY:
+            factor = 1.0
+        elif implicit == 0 and ctx.strategy != FIXED_POINT:
+            watch(ctx, factor)
+        ctx.length_after = h * factor
+        return True
+    if implicit:
+        ctx.implicit_steps -= 1
+    if outcome == DONE:
+        ctx.length = h
+        ctx.rejected = 1
+    else:
+        ctx.length = 0.0
+        ctx.length_limit = RETREAT * abs(h)
+        if outcome in (DIVERGED, SCATTERED):
+            factor = RETREAT
+    ctx.next_length = h * min(factor, SAFETY)
+    ctx.rejections += 1
+    ctx.attempts += 1
+    return False
 
 
 @compiled

@@ -9,10 +9,11 @@ from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.solve import solve
-from hbvm_bench.measure.starts import PERTURBATION, cloud, scaled
+from hbvm_bench.measure.starts import PERTURBATION, cloud, members, scaled
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
 from integrators.protocol import Status
+from problems.errors import InputError
 
 
 def measured_with(problem, method, checks, grid=None):
@@ -95,3 +96,20 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     # a method without a batch path takes one after the other, to the same end
     other, _, _ = ensemble.measure(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)
     assert np.abs(other.y - measured.y).max() < 1e-12  # 1.2e-14 measured
+
+
+def test_parameters_of_an_ensemble_vary_by_their_names():
+    pytest.importorskip("heyoka")
+    problem = problems.load("morse", t_end=10.0)
+    asked = Ensemble(count=9, spread=0.1, vary=(("D", 0.1), ("a", 0.2)))
+    starts, par = members(problem, asked)
+    assert np.array_equal(starts[0], problem.y0)
+    assert np.array_equal(par[0], problem.par)
+    assert np.ptp(par, axis=0).tolist() == pytest.approx([0.2, 0.4, 0.0], rel=0.3)
+    measured, status, _ = ensemble.measure(problem, Gauss(s=12, h=0.25).compile(problem.system), asked)
+    assert status is Status.FINISHED
+    metrics = evaluate(measured)
+    assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: witnesses have their parameters
+    assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
+    with pytest.raises(InputError, match="unknown parameter of morse"):
+        members(problem, Ensemble(count=2, vary=(("depth", 0.1),)))

@@ -9,7 +9,7 @@ import pytest
 import problems
 from integrators.kernel.batch import _Work
 from integrators.kernel.ensemble import prepared
-from integrators.kernel.program import HBVMProgram
+from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField
 from problems.errors import InputError
@@ -214,3 +214,104 @@ def test_threads_share_the_work_of_an_implicit_solver_too(monkeypatch, solver):
     assert np.array_equal(program.batch(starts, times=[1.0], threads=2).y, alone)
     assert names
     assert current_thread().name not in names
+
+
+OWN = {
+    "eccentric": ("kepler", {"e": 0.9}, [3.0, 7.0, 20.0], 1e-12),  # measured 1.2e-13
+    "planets": (
+        "outer_solar_system",
+        {},
+        [300.0, 1000.0],
+        4e-11,
+    ),  # measured 6e-12; each is 6e-12 from the 128-bit solution
+    "pendulum": ("double_pendulum", {}, [0.73, 0.74, 10.0], 3e-14),  # first-order form; measured 3e-15
+    "oscillator": ("morse", {}, [-1.0, -30.0], 1e-13),  # backwards; measured 1.1e-14
+}
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_trajectories_with_own_steps_in_lanes_are_those_of_integrate_up_to_the_tolerance(name):
+    problem_name, values, times, close = OWN[name]
+    problem = problems.load(problem_name, **values)
+    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    starts = problem.y0 * (1 + 1e-2 * rng.normal(size=(20, 1)))
+    parameters = problem.par * (1 + 1e-2 * rng.normal(size=(20, 1)))
+    batch = program.batch(starts, parameters, times=times)
+    assert program.in_lanes() is not None
+    assert batch.status == [Status.FINISHED] * 20
+    expected = singles(program, starts, parameters, times)
+    assert distance(batch.y, expected) < close
+    alone = program.start(starts[0], parameters[0])
+    alone.advance(times[-1:])
+    assert batch.steps[0] == pytest.approx(alone.stats.steps, abs=2 + 2 * len(times))
+    assert (batch.evaluations == 16 * batch.iterations).all()
+
+
+@pytest.mark.parametrize("name", ["kepler", "double_pendulum"])
+def test_own_steps_in_lanes_are_the_same_bits_in_any_place_and_on_any_threads(name):
+    problem = problems.load(name)
+    program = AdaptiveProgram(problem.system, k=8, s=7, tol=1e-12)
+    n = 50  # lanes take up several, one after another
+    starts = problem.y0 * (1 + 0.05 * rng.uniform(-1, 1, size=(n, 1)))
+    parameters = problem.par * (1 + 0.1 * rng.uniform(-1, 1, size=(n, 1)))
+    times = [0.0, 0.3, 0.31, 5.0, 20.0]
+    whole = program.batch(starts, parameters, times=times)
+    for order in (rng.permutation(n), [5], [3, 5], [7, 3, 5, 8, 8, 8, 7, 7, 8, 7]):
+        for threads in (1, 2):
+            part = program.batch(starts[order], parameters[order], times=times, threads=threads)
+            assert np.array_equal(part.y, whole.y[order])
+            assert part.steps.tolist() == whole.steps[order].tolist()
+            assert part.iterations.tolist() == whole.iterations[order].tolist()
+
+
+def test_own_steps_keep_the_energy_of_eccentric_orbits():
+    problem = problems.load("kepler", e=0.9)
+    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    starts = problem.y0 * (1 + 1e-3 * rng.normal(size=(8, 1)))
+    batch = program.batch(starts, times=[628.0])
+    for start, end in zip(starts, batch.y[:, 0], strict=True):
+        before, after = (problem.invariants(y[np.newaxis])["energy"][0] for y in (start, end))
+        assert abs(after / before - 1) < 5e-13  # measured 6e-14: 2200 steps
+
+
+def test_with_own_steps_too_one_failure_leaves_the_others_alone():
+    def H(q, p, m):
+        return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
+
+    problem = Problem(Hamiltonian(H, dof=1, name="root"), q0=[1.0], p0=[0.0], t_end=4.0)
+    program = AdaptiveProgram(problem.system, k=8, s=7, tol=1e-12)
+    starts = [[1.0, 0.0], [1.0, -2.0], [2.0, 0.5]]  # the second crosses q = 0
+    times = np.arange(0.5, 4.1, 0.5)
+    batch = program.batch(starts, times=times)
+    assert batch.status[0] is batch.status[2] is Status.FINISHED
+    alone = program.start(starts[1]).advance(times)
+    assert batch.status[1] is alone.status
+    assert batch.status[1].failed
+    assert np.array_equal(batch.y[1, : alone.t.size], alone.y)
+    assert np.isnan(batch.y[1, alone.t.size :]).all()
+
+
+def test_a_kink_and_a_stiff_system_go_one_by_one_from_own_steps():
+    def f(t, y, m):
+        return [y[1], -y[0] - m.abs(y[0] - 0.3)]
+
+    kinked = AdaptiveProgram(VectorField(f, dim=2), k=8, s=6, tol=1e-10)
+
+    def g(t, y, m):
+        return [-1e4 * (y[0] - m.cos(t))]
+
+    stiff = AdaptiveProgram(VectorField(g, dim=1), k=8, s=4, tol=1e-6)
+    for program, starts in ((kinked, np.array([[1.0, 0.0], [0.9, 0.1]])), (stiff, np.array([[1.0], [0.5]]))):
+        batch = program.batch(starts, times=[10.0])
+        assert program.in_lanes() is not None
+        assert batch.status == [Status.FINISHED] * len(starts)
+        steppers = [program.start(y) for y in starts]
+        assert np.array_equal(batch.y, [stepper.advance([10.0]).y for stepper in steppers])
+        extra = steppers[0].stats.extra
+        assert extra["kinks"] if program is kinked else "implicit" in extra
+
+
+def test_where_something_else_says_where_steps_end_they_go_one_by_one():
+    system = problems.load("kepler").system
+    for more in ({"max_step": 0.1}, {"max_steps": 10}, {"breakpoints": [1.0]}):
+        assert AdaptiveProgram(system, k=8, s=7, tol=1e-10, **more).in_lanes() is None

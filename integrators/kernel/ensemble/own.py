@@ -1,0 +1,213 @@
+"""Trajectories in lanes, each with steps of its own length, and the next one where one has ended.
+
+Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`. Whether a
+step is good enough and how long the next one is follows, lane by lane, as it does for a single
+trajectory (`integrators.kernel.step.vary`): each lane has a `Context` of its own. A step does not pass
+the time of the next sample, but ends there.
+"""
+
+from integrators.kernel.context import DIVERGED, DONE, Context
+from integrators.kernel.ensemble.group import Group
+from integrators.kernel.native.attributes import view
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_steps
+from integrators.kernel.step.begin import FARTHEST, INFINITY
+from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.loop import reset
+from integrators.kernel.step.vary import HELD_BACK_STEPS, accepts, begin_attempts, remaining, take, within
+from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
+
+group_at = view(Group)
+context_at = view(Context)
+
+
+@compiled
+def place(ctx, d):
+    """Return where component d of (q, p), or of y, is in a state of a `Context`."""
+    if ctx.second == 0:
+        return d
+    rows = ctx.rows
+    return 8 * (d // 4) + 4 + d % 4 if d < rows else 8 * ((d - rows) // 4) + (d - rows) % 4
+
+
+@compiled
+def clear(group, lane):
+    """Forget the lane's values of the field."""
+    for i in range(group.k * group.rows):
+        group.values[group.lanes * i + lane] = 0.0
+
+
+@compiled
+def load(group, lane):
+    """Put the next trajectory on a lane, at its start."""
+    i, lanes, parameters, rows = group.at, group.lanes, group.parameters, group.rows
+    ctx = context_at(group.contexts[lane])
+    group.at += 1
+    group.member[lane] = i
+    for d in range(parameters):
+        ctx.par[d] = group.all_par[parameters * i + d]
+        group.par[lanes * d + lane] = ctx.par[d]
+    for d in range(rows):
+        ctx.velocity[d] = group.all_velocity[rows * i + d]
+        group.velocity[lanes * d + lane] = ctx.velocity[d]
+    for j in range(ctx.padded * ctx.lanes):
+        ctx.values[j] = 0.0
+    ctx.t0, ctx.time_low = group.start_time, 0.0
+    ctx.stop = ctx.length_limit = INFINITY
+    ctx.next_length, ctx.length_behind = group.first_length, 0.0
+    ctx.doubt_end = group.start_time
+    ctx.slow = ctx.kinks = ctx.steps = 0
+    begin_attempts(ctx)
+    reset(ctx, group.starts + group.dim * i)
+    for d in range(group.dim):
+        group.state[lanes * d + lane] = ctx.state[place(ctx, d)]
+        group.error[lanes * d + lane] = 0.0
+    if group.times[group.count - 1] < group.start_time:
+        ctx.next_length = -ctx.next_length
+    clear(group, lane)
+    group.sweeps[lane] = 0.0
+    group.mark[lane] = group.start_time
+    group.made[lane] = 0
+    write(group, lane, ctx)
+
+
+@compiled
+def unload(group, lane, arrived):
+    """Take the trajectory from a lane."""
+    i = group.member[lane]
+    group.arrived[i] = arrived
+    group.all_sweeps[i] = int(group.sweeps[lane])
+    group.all_steps[i] = context_at(group.contexts[lane]).steps
+    group.member[lane] = -1
+
+
+@compiled
+def write(group, lane, ctx):
+    """Write the samples that are at the present time; after the last one the trajectory is at its end."""
+    i, dim, made = group.member[lane], group.dim, group.made[lane]
+    while made < group.count:
+        ctx.stop = group.times[made]
+        if remaining(ctx, ctx.stop) != 0.0:
+            break
+        out = group.out + dim * (group.count * i + made)
+        for d in range(dim):
+            out[d] = group.state[group.lanes * d + lane]
+        made += 1
+    group.made[lane] = made
+    if made == group.count:
+        unload(group, lane, 1)
+
+
+@compiled
+def aim(group, lane):
+    """Set the length of a lane's next step; return 0 if none is short enough."""
+    ctx = context_at(group.contexts[lane])
+    h, length = within(ctx, ctx.next_length), ctx.length
+    if not abs(h) > SHORTEST * abs(ctx.t0):
+        return 0
+    group.h[lane], group.t0[lane], group.time_low[lane] = h, ctx.t0, ctx.time_low
+    # Where the step begins and how long it is on the one whose values are there; 0: on none.
+    group.ratio[lane] = h / length if length != 0.0 and abs(h / length) <= FARTHEST else 0.0
+    group.begin[lane] = 0.0 if ctx.rejected else 1.0
+    group.before[lane] = group.sweeps[lane]
+    group.alive[lane] = 1.0
+    return 1
+
+
+@compiled
+def enter(group, lane):
+    """Have a lane ready for a step, with the next trajectory if it has none; return 0 if there is none."""
+    while True:
+        if group.member[lane] < 0:
+            if group.at >= group.end:
+                group.alive[lane] = 0.0
+                return 0
+            load(group, lane)
+        elif aim(group, lane):
+            return 1
+        else:
+            unload(group, lane, 0)
+
+
+@compiled
+def settle(group, lane):
+    """Take the step that was tried in a lane, if it is good enough."""
+    lanes, dim, rows, k = group.lanes, group.dim, group.rows, group.k
+    ctx = context_at(group.contexts[lane])
+    ctx.h = group.h[lane]
+    outcome = DONE if group.alive[lane] == 1.0 else DIVERGED
+    if outcome == DONE:
+        for d in range(dim):
+            ctx.next_state[place(ctx, d)] = group.next_state[lanes * d + lane]
+            ctx.next_error[place(ctx, d)] = group.next_error[lanes * d + lane]
+        for d in range(rows):
+            ctx.row_state[d] = group.state[lanes * d + lane]
+            for i in range(k):
+                ctx.values[ctx.lanes * d + i] = group.values[lanes * (rows * i + d) + lane]
+    else:
+        clear(group, lane)
+    if accepts(ctx, outcome, int(group.sweeps[lane] - group.before[lane]), 0):
+        step(group, lane, ctx)
+    elif ctx.kinks:
+        unload(group, lane, 0)
+
+
+@compiled
+def step(group, lane, ctx):
+    """Take the step of a lane, which is good enough."""
+    wanted = ctx.next_length
+    take(ctx)
+    if ctx.h != wanted:  # it was to end at a sample: what comes after it need not be as short
+        ctx.length_behind = 0.0
+        if abs(ctx.next_length) < abs(wanted):
+            ctx.next_length = wanted
+    begin_attempts(ctx)
+    for d in range(group.dim):
+        group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
+        group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
+    write(group, lane, ctx)
+    if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or crawls(group, lane, ctx)):
+        unload(group, lane, 0)
+
+
+@compiled
+def crawls(group, lane, ctx):
+    """Whether a trajectory does not get anywhere; see `integrators.watchdog`."""
+    if ctx.steps % CRAWL_STEPS:
+        return False
+    mark = group.mark[lane]
+    group.mark[lane] = ctx.t0
+    return abs(ctx.t0 - mark) < CRAWL_SHARE * abs(group.times[group.count - 1] - mark)
+
+
+@compiled
+def run(first, budget):
+    """Integrate the trajectories from ``at`` to ``end``; return 1 at their end, or 0 after ``budget`` steps.
+
+    Parameters
+    ----------
+    first : int
+        Address of a `Group`.
+    budget : int
+        Steps of all lanes.
+    """
+    group = group_at(first)
+    lanes = group.lanes
+    if group.sample < 0:
+        group.sample = 0
+        for lane in range(lanes):
+            group.member[lane] = -1
+    while True:
+        running = 0
+        for lane in range(lanes):
+            running += enter(group, lane)
+        if running == 0:
+            return 1
+        if budget <= 0:
+            return 0
+        budget -= 1
+        group.n = 0
+        call_steps(group.code, group, 1)
+        for lane in range(lanes):
+            if group.member[lane] >= 0:
+                settle(group, lane)
