@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.identity import typed_problem
 from hbvm_bench.report import terminal
 from hbvm_bench.summaries.table import Table
 
@@ -19,7 +19,7 @@ def advise(
     """Say which of our methods and which step reach an accuracy, at what cost: a few short runs."""
     from integrators.advice import advise as advise_
 
-    advice = advise_(make_problem(problem), accuracy)
+    advice = advise_(typed_problem(problem), accuracy)
     if as_json:
         terminal.print_json(
             {

@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import msgspec
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Limits
 from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
@@ -48,12 +49,15 @@ class Task(msgspec.Struct, frozen=True, kw_only=True):
         Behind the id, to name what differs.
     limits : Limits
         Wall time and memory of the process.
+    beside : own.Beside
+        What must be known of its problem.
     """
 
     case: Case
     id: str
     versions: dict[str, str]
     limits: Limits
+    beside: own.Beside = own.Beside()
 
 
 class UnfinishedRunError(Exception):
@@ -62,7 +66,13 @@ class UnfinishedRunError(Exception):
 
 def task_of(resolved: Resolved, limits: Limits) -> bytes:
     """Return the JSON of a `Task`, which `execute` takes."""
-    task = Task(case=resolved.case, id=resolved.id, versions=versions_of(resolved.method), limits=limits)
+    task = Task(
+        case=resolved.case,
+        id=resolved.id,
+        versions=versions_of(resolved.method),
+        limits=limits,
+        beside=own.beside(resolved.problem),
+    )
     return msgspec.json.encode(task)
 
 
@@ -94,6 +104,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         If the sources changed meanwhile.
     """
     asked = msgspec.json.decode(task, type=Task)
+    own.learn(asked.beside)
     try:
         resolved = resolve(asked.case)
     except InputError as error:
@@ -102,7 +113,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         raise UnfinishedRunError(_difference(asked, resolved))
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         core = getattr(_thread, "core", None)
-        request = Request(case=resolved.case, id=resolved.id, core=core)
+        request = Request(case=resolved.case, id=resolved.id, core=core, beside=asked.beside)
         loads = resolved.method.library, parse_spec(resolved.case.problem).name
         ended = start(Path(scratch), request, asked.limits, loads)
         result, series = _result(Path(scratch), ended, asked.limits)

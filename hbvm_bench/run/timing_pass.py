@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import msgspec
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine
@@ -148,7 +149,8 @@ def _visit_together(
         request = Request(
             case=on[0].case,
             id=on[0].id,
-            beside={one.id: one.case for one in on[1:]},
+            others={one.id: one.case for one in on[1:]},
+            beside=own.beside(on[0].problem),
             mode="interleave",
             plan=plan,
             core=core,
@@ -167,7 +169,14 @@ def _visit_together(
 
 
 def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
-    request = Request(case=resolved.case, id=resolved.id, mode="time", plan=plan, core=core)
+    request = Request(
+        case=resolved.case,
+        id=resolved.id,
+        mode="time",
+        plan=plan,
+        core=core,
+        beside=own.beside(resolved.problem),
+    )
     reply, why = _asked(request, limits, TimingReply)
     if reply is None:
         return msgspec.structs.replace(timing, why=why)

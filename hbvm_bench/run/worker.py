@@ -23,6 +23,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy as np
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import ensemble, timing, together
@@ -67,8 +68,10 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         The id that the runner gave it.
     mode : {"measure", "time", "interleave"}
         The accuracy run, one round of the timing pass, or all of its rounds of several cases.
-    beside : dict of Case
-        The other cases of an interleaved timing, by their ids.
+    others : dict of Case
+        The other cases of an interleaved timing, by their ids; of the same problem.
+    beside : own.Beside
+        What must be known of the problem.
     plan : TimingPlan
         For the timing pass.
     core : int or None
@@ -78,7 +81,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     case: Case
     id: str
     mode: Literal["measure", "time", "interleave"] = "measure"
-    beside: dict[str, Case] = {}
+    others: dict[str, Case] = {}
+    beside: own.Beside = own.Beside()
     plan: TimingPlan = TimingPlan()
     core: int | None = None
 
@@ -116,6 +120,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         What this process has not loaded itself but found loaded, being a fork of ``parent``.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
+    own.learn(request.beside)
     _limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
@@ -245,7 +250,7 @@ def _time(request: Request, directory: Path) -> TimingReply:
 
 
 def _interleave(request: Request, directory: Path) -> InterleavedReply:
-    asked = {request.id: request.case, **request.beside}
+    asked = {request.id: request.case, **request.others}
     found = [_checked(case, key) for key, case in asked.items()]
     runs = [Run.of(one.problem, one.method) for one in found]  # compiled
     (directory / COMPILED).touch()
