@@ -30,7 +30,8 @@ def starts() -> np.ndarray:
 def main() -> None:
     """Integrate all of them, and their neighbours at a distance of 1e-8."""
     star = problems.Problem(problems.Hamiltonian(H, dof=2), q0=[0.0, 0.1], p0=[0.5, 0.0], t_end=200.0)
-    first, beside = starts(), starts() + [0.0, 1e-8, 0.0, 0.0]
+    first = starts()
+    beside = first + np.array([0.0, 1e-8, 0.0, 0.0])
     ours = clocked(f"{METHOD!r}", lambda: integrators.integrate_many(star, METHOD, starts=first))
     clocked("heyoka", lambda: integrators.integrate_many(star, integrators.Taylor(tol=1e-15), starts=first))
     others = integrators.integrate_many(star, METHOD, starts=beside)

@@ -22,7 +22,7 @@ import problems
 from constants import G
 
 def swing(*, g: float = G, p: float = 1.0):
-    H = lambda q, p, par, m: p[0]**2/2 - par.g*m.cos(q[0])
+    H = lambda q, p, par, m: p[0]**2/6 - par.g*m.cos(q[0])
     return problems.Problem(problems.Hamiltonian(H, dof=1, parameters={"g": g}), q0=[0.0], p0=[p], t_end=4.0)
 
 rest = swing(p=0.0)
