@@ -9,10 +9,12 @@ from integrators.options import Count
 from integrators.protocol import MethodBase, check_problem
 from integrators.solution import Solution
 from problems import Problem
+from problems.calls import readable
 from problems.checks import checked
 from problems.errors import InputError
 
 
+@readable
 def section(
     problem: Problem,
     method: MethodBase,
