@@ -10,7 +10,7 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "examples"
 
 SAYS = {
-    "geodesics.py": ["from 3", "energy kept: True"],
+    "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
     "lattice.py": ["energy kept: True"],
     "ensemble.py": ["28% of 10000 orbits are chaotic"],
     "own_campaign.py": ["exit code: 0 report: True", "DOP853"],
