@@ -7,7 +7,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
 
-.PHONY: bench reports test lint format venv lock clean
+.PHONY: bench reports test docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
@@ -17,6 +17,13 @@ reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov dr
 
 test: venv  ## the test suite
 	$(BIN)/python -m pytest
+
+docs: venv  ## the site: docs/_build/html/index.html
+	@lock="$$(sha256sum < requirements-docs.lock)"; \
+	if [ "$$(cat $(VENV)/.docs 2>/dev/null)" != "$$lock" ]; then \
+	  $(PIP) --require-hashes -r requirements-docs.lock && echo "$$lock" > $(VENV)/.docs; \
+	fi
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 lint: venv  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .
@@ -48,9 +55,11 @@ $(STAMP): FORCE
 .PHONY: FORCE
 FORCE:
 
-lock:  ## rewrite requirements.lock (needs uv)
+lock:  ## rewrite both locks (needs uv)
 	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url \
 	  pyproject.toml --extra peers --extra dask --extra export --group dev -o requirements.lock
+	uv pip compile --universal --generate-hashes --no-header --no-annotate --no-emit-index-url \
+	  -c requirements.lock pyproject.toml --extra peers --group docs -o requirements-docs.lock
 
 clean:
 	rm -rf $(VENV) .pytest_cache .ruff_cache .hypothesis

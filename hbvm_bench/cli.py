@@ -1,6 +1,7 @@
 """The command line: ``hbvm-bench list | run | report | show | cite | ...``."""
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -30,29 +31,26 @@ app = typer.Typer(
 
 # Commands with an implementation of their own; each is imported only when it is asked for.
 SEPARATE = {
-    "advise": "hbvm_bench.commands.advise",
-    "automatic": "hbvm_bench.commands.automatic",
-    "race": "hbvm_bench.commands.race",
-    "endure": "hbvm_bench.commands.endure",
-    "paper": "hbvm_bench.commands.paper",
-    "compare": "hbvm_bench.commands.compare",
-    "doctor": "hbvm_bench.commands.doctor",
-    "engines": "hbvm_bench.commands.engines",
-    "export": "hbvm_bench.commands.export",
-    "headline": "hbvm_bench.commands.headline",
-    "gallery": "hbvm_bench.commands.gallery",
-    "inspect": "hbvm_bench.commands.inspect",
-    "report": "hbvm_bench.commands.report",
-    "merge": "hbvm_bench.commands.merge",
-    "plugins": "hbvm_bench.commands.plugins",
-    "run": "hbvm_bench.commands.run",
-    "warm": "hbvm_bench.commands.warm",
+    command: f"hbvm_bench.commands.{module}"
+    for module, commands in {
+        "about": ("advise", "engines", "inspect"),
+        "automatic": ("automatic",),
+        "doctor": ("doctor", "warm"),
+        "endure": ("endure",),
+        "paper": ("paper",),
+        "plugins": ("plugins",),
+        "race": ("race",),
+        "reports": ("gallery", "headline", "report"),
+        "run": ("run",),
+        "stores": ("compare", "export", "merge"),
+    }.items()
+    for command in commands
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 2 for input errors, 130 for Ctrl-C."""
-    _attach(sys.argv[1:] if arguments is None else arguments)
+    attach(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app(arguments, prog_name="hbvm-bench", standalone_mode=False)
     except InputError as error:
@@ -66,11 +64,12 @@ def main(arguments: list[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _attach(arguments: list[str]) -> None:
+def attach(arguments: Sequence[str] = ()) -> None:
+    """Import the command that is asked for and make it one of `app`'s; all of them where none is."""
     present = {
         command.name or getattr(command.callback, "__name__", "") for command in app.registered_commands
     }
-    asked = next((word for word in arguments if not word.startswith("-")), None)
+    asked = next((word for word in arguments if not word.startswith("-")), "")
     if asked in present:
         return
     # all of them for --help, and for the suggestions where there is no such command

@@ -144,6 +144,7 @@ def advise(problem: Problem, accuracy: float = 1e-10) -> Advice:
     Examples
     --------
     >>> import problems
+    >>> from integrators import advise
     >>> advice = advise(problems.load("kepler", e=0.2), 1e-8)
     >>> advice.reached
     True

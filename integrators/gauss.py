@@ -59,6 +59,14 @@ class Gauss(MethodBase):
     ------
     problems.errors.InputError
         For values outside these ranges.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate
+    >>> solution = integrate(problems.load("kepler", e=0.6), Gauss(s=3, h=0.1), [0.0, 500.0])
+    >>> bool(solution.errors()["angular_momentum"].max() < 1e-13)  # quadratic
+    True
     """
 
     s: Stages

@@ -42,7 +42,7 @@ class HBVM(MethodBase):
     Properties, each asserted in ``tests/integrators``:
 
     * order 2s for every k >= s (`test_order`);
-    * symmetric and perfectly A-stable: |R(iy)| = 1 (`test_tableau`, `test_hbvm`);
+    * symmetric and perfectly A-stable: ``|R(iy)| = 1`` (`test_tableau`, `test_hbvm`);
     * k = s is the Gauss-Legendre method, which is symplectic and keeps quadratic
       invariants; with k > s it is neither (`test_energy`);
     * a polynomial Hamiltonian of degree nu is conserved to round-off if and only
@@ -136,6 +136,17 @@ class HBVM(MethodBase):
 
     P. Amodio, L. Brugnano, F. Iavernaro, *Arbitrarily high-order energy-conserving
     methods for Poisson problems*, Numer. Algorithms (2022), doi:10.1007/s11075-022-01285-z.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import HBVM, integrate
+    >>> problem = problems.load("henon_heiles", t_end=1000.0)
+    >>> solution = integrate(problem, HBVM(k=6, s=4, h=0.5), [0.0, 1000.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-14)  # of degree 3, so that 6 nodes do
+    True
+    >>> integrate(problem, HBVM(), [1000.0]).status  # chooses everything itself
+    <Status.FINISHED: 'finished'>
     """
 
     k: Stages | None = None

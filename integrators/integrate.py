@@ -99,6 +99,14 @@ def integrate(
     Exception
         What a `problems.Foreign` field raises in the very first step. Later errors, and those of an event's
         function, end the integration as ``USER_ERROR``, with the trajectory up to there.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import HBVM, integrate
+    >>> solution = integrate(problems.load("kepler", e=0.6), HBVM(k=8, s=4, h=0.05), [0.0, 10.0, 20.0])
+    >>> solution.y.shape, bool(solution.errors()["energy"].max() < 1e-13)
+    ((3, 4), True)
     """
     if method is None:
         method = registry.create("HBVM")

@@ -107,6 +107,15 @@ class LineIntegral(MethodBase):
     ----------
     L. Brugnano, F. Iavernaro, *Line integral methods which preserve all invariants of
     conservative problems*, J. Comput. Appl. Math. 236 (2012) 3905-3919.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import LineIntegral, integrate
+    >>> method = LineIntegral(k=12, s=3, h=0.1, invariants=("energy", "angular_momentum"))
+    >>> errors = integrate(problems.load("kepler", e=0.6), method, [0.0, 100.0]).errors()
+    >>> bool(max(errors["energy"].max(), errors["angular_momentum"].max()) < 1e-13)
+    True
     """
 
     k: Stages

@@ -48,6 +48,15 @@ class Solutions(Trajectories):
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
         What was integrated, and how.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate_many
+    >>> pendulum, method = problems.load("pendulum"), Gauss(s=4, h=0.1)
+    >>> made = integrate_many(pendulum, method, starts=[[0, 1], [0, 1.5]], times=[5.0])
+    >>> made.y.shape, [str(status) for status in made.status]
+    ((2, 1, 2), ['finished', 'finished'])
     """
 
     starts: Array

@@ -57,7 +57,7 @@ def order_of(method: Tableau | MethodBase) -> int:
 
     Examples
     --------
-    >>> from integrators import HBVM
+    >>> from integrators import HBVM, order_of
     >>> order_of(HBVM(k=6, s=3, h=0.1))
     6
     """
@@ -105,6 +105,12 @@ def stability(method: Tableau | MethodBase, z: ArrayLike) -> NDArray[np.complex1
     ------
     problems.errors.InputError
         For a method without a tableau.
+
+    Examples
+    --------
+    >>> from integrators import HBVM, stability
+    >>> round(float(abs(stability(HBVM(k=4, s=2, h=1.0), 3j))), 12)
+    1.0
     """
     return _tableau(method).stability(z)
 

@@ -55,7 +55,14 @@ SAMPLINGS = ("side", "steps", "land", "dense")
 
 
 class Status(StrEnum):
-    """How an integration stands, or how it ended."""
+    """How an integration stands, or how it ended.
+
+    Examples
+    --------
+    >>> from integrators import Status
+    >>> Status.STALLED.failed, Status.EVENT.failed, str(Status.FINISHED)
+    (True, False, 'finished')
+    """
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -109,6 +116,14 @@ class Stats:
     extra : dict
         Anything else worth telling, by name; arrays for histories such as
         ``{"dt_history": (n, 2) array of t and dt}``.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate
+    >>> stats = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [10.0]).stats
+    >>> stats.steps, stats.rejections, stats.solver
+    (100, 0, 'fixed point')
     """
 
     steps: int = 0
@@ -134,6 +149,16 @@ class Samples:
         ``FINISHED`` when all times asked for were reached.
     reason : str
         One sentence on a failure; empty otherwise.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> problem = problems.load("pendulum")
+    >>> stepper = Gauss(s=4, h=0.1).compile(problem.system).start(problem.y0, problem.par)
+    >>> samples = stepper.advance([1.0, 2.0])
+    >>> samples.t, samples.y.shape, samples.status
+    (array([1., 2.]), (2, 2), <Status.FINISHED: 'finished'>)
     """
 
     t: Array
@@ -295,6 +320,13 @@ class MethodBase(Called):
         For an option that does not exist, with the nearest names.
     problems.errors.InputError
         For an option that is missing, not given by name, or not what its annotation says.
+
+    Examples
+    --------
+    >>> from integrators import HBVM
+    >>> method = HBVM(k=8, s=4, h=0.5)
+    >>> method, method.order, method.library
+    (HBVM(k=8, s=4, h=0.5), 8, 'hbvm-bench')
     """
 
     library: ClassVar[str] = "hbvm-bench"

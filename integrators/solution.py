@@ -86,6 +86,14 @@ class Solution:
         Times, states and directions of the events that were asked for, by name.
     error : Exception or None
         What a function of the user raised, where ``status`` is ``USER_ERROR``.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate
+    >>> solution = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [0.0, 5.0, 10.0])
+    >>> solution.status, solution.stats.steps, solution.q.shape, solution(2.5).shape
+    (<Status.FINISHED: 'finished'>, 100, (3, 1), (2,))
     """
 
     t: Array
@@ -338,6 +346,16 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
     ------
     problems.errors.InputError
         For a file that is not there, is damaged, or is none of these.
+
+    Examples
+    --------
+    >>> import tempfile, problems
+    >>> from pathlib import Path
+    >>> from integrators import Gauss, integrate, load
+    >>> path = Path(tempfile.mkdtemp()) / "pendulum.npz"
+    >>> integrate(problems.load("pendulum"), Gauss(s=2, h=0.1), [0.0, 1.0]).save(path)
+    >>> load(path).method
+    Gauss(s=2, h=0.1)
     """
     try:
         with Path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:

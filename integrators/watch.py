@@ -41,6 +41,15 @@ class Progress:
         Own steps until now.
     seconds, left : float
         Since it began, or was resumed; and until its end, if it goes on as fast.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate
+    >>> said = []
+    >>> made = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [10.0], progress=said.append)
+    >>> said[-1].fraction, said[-1].steps
+    (1.0, 100)
     """
 
     t: float

@@ -8,15 +8,42 @@ from difflib import get_close_matches
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used; the command line exits with code 2."""
+    """Something the user gave cannot be used; the command line exits with code 2.
+
+    Examples
+    --------
+    >>> import problems
+    >>> try:
+    ...     problems.load("kepler", e=1.5)
+    ... except problems.InputError as error:
+    ...     print(error)
+    e=1.5 of kepler must be an eccentricity, 0 <= e < 1.
+    """
 
 
 class UnknownNameError(InputError):
-    """A name (problem, method, option, parameter, metric) that does not exist."""
+    """A name (problem, method, option, parameter, metric) that does not exist.
+
+    Examples
+    --------
+    >>> import problems
+    >>> try:
+    ...     problems.load("keplr")
+    ... except problems.UnknownNameError as error:
+    ...     print(error)
+    unknown problem 'keplr'; did you mean 'kepler'?
+    """
 
 
 class MissingLibraryError(InputError, ImportError):
-    """A library that a method needs is not installed."""
+    """A library that a method needs is not installed.
+
+    Examples
+    --------
+    >>> import problems
+    >>> issubclass(problems.MissingLibraryError, problems.InputError)
+    True
+    """
 
 
 def shown(value: object, longest: int = 80) -> str:

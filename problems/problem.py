@@ -54,7 +54,7 @@ class Problem:
 
     Examples
     --------
-    >>> from problems import Hamiltonian
+    >>> from problems import Hamiltonian, Problem
     >>> def H(q, p, m):
     ...     return p[0]**2/2 - m.cos(q[0])
     >>> Problem(Hamiltonian(H, dof=1), q0=[0.0], p0=[1.9], t_end=1000.0)

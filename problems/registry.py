@@ -41,7 +41,14 @@ def built_in() -> list[str]:
 
 
 def names() -> list[str]:
-    """Return the names of all installed problems, sorted."""
+    """Return the names of all installed problems, sorted.
+
+    Examples
+    --------
+    >>> import problems
+    >>> "sitnikov" in problems.names()
+    True
+    """
     return sorted(_entries())
 
 
@@ -96,6 +103,12 @@ def load(name: str, **arguments: Any) -> Problem:
     ------
     problems.errors.InputError
         For an unknown name or argument, with the nearest ones, or a value out of range.
+
+    Examples
+    --------
+    >>> import problems
+    >>> problems.load("kepler", e=0.6)
+    kepler(e=0.6)
     """
     make = factory(name)
     if entry(name) is None:  # the others check their own

@@ -12,3 +12,15 @@ settings.load_profile("ci" if os.environ.get("CI") else "home")
 
 # A shell starts background jobs deaf to Ctrl-C, and their children inherit it; some tests send it to a child.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Say loudly that nobody looked at the pages."""
+    skipped = [one for one in terminalreporter.stats.get("skipped", []) if "no chromium" in str(one.longrepr)]
+    if skipped:
+        terminalreporter.write_line(
+            f"NOT TESTED: {len(skipped)} tests look at pages in a browser, and there is no chromium here. "
+            "Install one, or run .venv/bin/playwright install chromium and set CHROMIUM to its path.",
+            red=True,
+            bold=True,
+        )

@@ -35,6 +35,7 @@ WORKER = "hbvm_bench.run.worker"  # what it imports of the room measure makes th
 MEASURE = "hbvm_bench.measure."
 # They say, name and keep what is run; all that a number can depend on of it is in the key.
 BOOKKEEPING = ("hbvm_bench.campaign.", "hbvm_bench.store.", "integrators.plain", "problems.picture")
+TOLERANCES = ("tol", "rtol", "epsilon")  # a method that has one takes h for its first step alone
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
@@ -117,7 +118,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
 
     Notes and settings labels are left out: they are words about the case.
     """
-    grid = case.grid.times(problem, getattr(method, "h", None))
+    grid = case.grid.times(problem, fixed_step(method))
     return (
         {
             "problem": case.problem,
@@ -150,6 +151,12 @@ def versions_of(method: MethodBase) -> dict[str, str]:
 def version_of_library(library: str) -> str:
     """Return the installed version of a method's library, or ``"not installed"``."""
     return _version(library.lower())
+
+
+def fixed_step(method: MethodBase) -> float | None:
+    """Return the length that all steps of a method have; ``None`` where it chooses its steps."""
+    tolerances = (getattr(method, name, None) for name in TOLERANCES)
+    return None if any(tolerances) else getattr(method, "h", None)
 
 
 def is_ours(method: MethodBase) -> bool:

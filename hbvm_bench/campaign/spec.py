@@ -12,6 +12,7 @@ import re
 import sys
 import warnings
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 from problems.errors import InputError
@@ -42,6 +43,7 @@ class Spec:
         return f"{self.name}({inside})"
 
 
+@lru_cache(maxsize=100_000)  # a large campaign asks for each of its texts a dozen times
 def parse_spec(text: str) -> Spec:
     """Read one specification.
 

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from hbvm_bench.commands import measuring
-from hbvm_bench.commands.run import carry_out
+from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
@@ -61,7 +60,7 @@ def automatic(
     if out is not None:
         ensure_writable(out)
     words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
-    command = measuring.command([*words, *(["--avx2"] if avx2 else [])], out)
+    command = as_typed([*words, *(["--avx2"] if avx2 else [])], out)
     store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
     run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))

@@ -1,5 +1,6 @@
-"""The command ``hbvm-bench doctor``."""
+"""``hbvm-bench doctor | warm``: this machine."""
 
+import os
 import sys
 import tempfile
 from dataclasses import asdict
@@ -10,10 +11,10 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from hbvm_bench.commands import measuring
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable, write_json
+from integrators.kernel.ahead import compile_ahead
 from problems.errors import InputError
 
 UNHEALTHY = 1
@@ -60,8 +61,7 @@ def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
         ensure_writable(out.parent)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         made = Path(scratch) / "result.json"
-        request = check.Request(out=str(made), rounds=rounds or check.ROUNDS)
-        code = measuring.measure("hbvm_bench.studies.peers.check", request)
+        code = check.in_a_process(made, rounds or check.ROUNDS)
         result = peers.load(made)
     if code != 0 or result is None:
         print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
@@ -99,4 +99,7 @@ def _print(findings: dict[str, list[examining.Finding]]) -> None:
     )
 
 
-__all__ = ["doctor"]
+def warm() -> None:
+    """Compile the kernel ahead, once for a machine: the first result then takes a second."""
+    for name, seconds in compile_ahead(os.cpu_count() or 1).items():
+        print(f"{name}: " + ("compiled before" if seconds is None else f"compiled in {seconds:.1f} s"))

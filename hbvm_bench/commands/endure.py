@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
-from hbvm_bench.commands import measuring
 from hbvm_bench.commands.listing import as_json as run_as_json
-from hbvm_bench.commands.run import carry_out
+from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import machine
 from hbvm_bench.report import terminal
 from hbvm_bench.studies.endure import law, runs
@@ -85,4 +84,4 @@ def _command(
     words += ["--starts", str(starts)] if starts is not None else []
     words += [word for text in method or [] for word in ("--method", text)]
     words += ["--quick"] if quick else []
-    return measuring.command(words, out)
+    return as_typed(words, out)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -44,7 +45,7 @@ def tables(what: str = "") -> list[Table]:
 
 
 def citations(texts: Sequence[str]) -> list[str]:
-    """Return the citations of methods, each once.
+    """Return the citations of methods, each BibTeX entry once.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def citations(texts: Sequence[str]) -> list[str]:
     """
     names = [text.partition("(")[0].strip() for text in texts] or integrators.registry.names()
     found = [integrators.registry.get(name).citation.strip() for name in names]
-    return list(dict.fromkeys(text for text in found if text))
+    return list(dict.fromkeys(entry for text in found if text for entry in re.split(r"\n+(?=@)", text)))
 
 
 def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:

@@ -9,21 +9,20 @@ import typer
 from msgspec.structs import replace
 from rich.text import Text
 
-from hbvm_bench.campaign.file import Campaign, Case, name_of
+from hbvm_bench.campaign.file import Campaign, name_of
 from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.commands import measuring
 from hbvm_bench.commands.listing import as_json as run_as_json
-from hbvm_bench.commands.run import carry_out
+from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable, write_json
 from hbvm_bench.studies.race import results, tables
-from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.families import FIXED, OURS, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes, probe
-from hbvm_bench.studies.race.results import OURS, Race
+from hbvm_bench.studies.race.results import Race
 from hbvm_bench.summaries import goals
 
 QUICK_ROUNDS = 3
@@ -116,18 +115,13 @@ def _probe(campaign: Campaign, directory: Path) -> None:
     for entry in campaign.entries():
         part = chosen(campaign, [name_of(entry)])
         cases = part.cases()
-        families = list(dict.fromkeys(_family(case) for case in cases))
-        ours = next(case for case in cases if _family(case) == OURS)
+        families = list(dict.fromkeys(row_of(case).family for case in cases))
+        ours = next(case for case in cases if row_of(case) == (OURS, FIXED))
         h = float(parse_spec(ours.method).arguments["h"])
         fresh += probe(name_of(entry), ours.problem, h, families)
     names = {one.problem for one in fresh}
     old = load_probes(path) if path.is_file() else []
     write_json(path, [*(one for one in old if one.problem not in names), *fresh])
-
-
-def _family(case: Case) -> str:
-    name = parse_spec(case.method).name
-    return name if name in FAMILIES else OURS
 
 
 def _declare(campaign: Campaign, *, error: bool) -> None:
@@ -136,9 +130,9 @@ def _declare(campaign: Campaign, *, error: bool) -> None:
     for entry in campaign.entries():
         cases = chosen(campaign, [name_of(entry)]).cases()
         console.print(Text(f"{name_of(entry)}: {cases[0].problem}", style="bold"))
-        for family in dict.fromkeys(map(_family, cases)):
-            methods = [resolve(case).case.method for case in cases if _family(case) == family]
-            console.print(Text(f"  {FAMILIES[family].title}, {len(methods)}: {'  '.join(methods)}"))
+        for row in dict.fromkeys(map(row_of, cases)):
+            methods = [resolve(case).case.method for case in cases if row_of(case) == row]
+            console.print(Text(f"  {row.title}, {len(methods)}: {'  '.join(methods)}"))
 
 
 def _show(races: Sequence[Race]) -> None:
@@ -163,4 +157,4 @@ def _command(
     words += ["--rounds", str(rounds)] if rounds else []
     words += [] if compile_times is None else ["--compile" if compile_times else "--no-compile"]
     words += ["--avx2"] if avx2 else []
-    return measuring.command(words, out)
+    return as_typed(words, out)

@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -74,6 +75,12 @@ def run(
         from hbvm_bench.report.campaign import document
 
         publish(document(store), report_to, stderr=False)
+
+
+def as_typed(words: Sequence[str], out: Path | None) -> str:
+    """Return how to run a command again; a path of this machine, which is nobody else's, is left out."""
+    place = [] if out is None or out.is_absolute() else ["--out", str(out)]
+    return shlex.join(["hbvm-bench", *words, *place])
 
 
 def carry_out(

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Checks
+from hbvm_bench.campaign.identity import fixed_step
 from hbvm_bench.measure import drift
 from hbvm_bench.measure.measured import Measured, largest_distance, positions
 from hbvm_bench.measure.starts import scaled
@@ -93,7 +94,7 @@ def _errors(problem: Problem, start: Array, t: Array, y: Array) -> dict[str, Arr
 
 def _reversal(problem: Problem, method: MethodBase, program: Program, share: float) -> float | str:
     way = share * (problem.t_end - problem.t0)
-    step = getattr(method, "h", None)
+    step = fixed_step(method)
     if step:  # a whole number of steps, so that the way back meets the same ones
         way = float(np.copysign(max(1, round(abs(way) / step)) * step, way))
     turn = problem.t0 + way

@@ -28,12 +28,13 @@ from hbvm_bench.report.document import (
     Section,
     attempt,
 )
-from hbvm_bench.report.figures.style import looks, method_name
+from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store.files import csv_of, json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, again, damage, progress
 from hbvm_bench.summaries import fairness, goals
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import columns, group_of, status_of, tasks
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
@@ -204,7 +205,7 @@ def _overall(records: Sequence[Record], *, several: bool) -> list[Block]:
     look = looks(record.case.method for record in records)
     numbers: dict[str, int] = {}
     for record in records:
-        numbers.setdefault(method_name(record), look[record.case.method].number)
+        numbers.setdefault(family_of(record), look[record.case.method].number)
     made = attempt(
         ("which integrator for which need", partial(overview.needed, records)),
         ("which integrator on which problem", partial(overview.outcome, records)),

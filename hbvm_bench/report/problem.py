@@ -20,9 +20,10 @@ from hbvm_bench.report.figures import motion, over_time, portraits, views
 from hbvm_bench.report.figures.canvas import Picture, styled
 from hbvm_bench.report.figures.drift import drift_figure
 from hbvm_bench.report.figures.over_time import Drawn, OverTime
-from hbvm_bench.report.figures.style import Look, method_name
+from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import GROUPS, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
@@ -161,7 +162,7 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
     kept: dict[str, Drawn] = {}
     by_name: dict[str, list[Drawn]] = {}
     for case in cases:
-        by_name.setdefault(method_name(case.record), []).append(case)
+        by_name.setdefault(family_of(case.record), []).append(case)
     for members in by_name.values():
         best = min(members, key=_rank)
         default = next((case for case in members if case.record.case.settings == "default"), best)
@@ -183,7 +184,7 @@ OVER_TIME = (
         caption="Relative error of the energy. A line is the largest value in each of "
         f"{over_time.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
         label="|H − H₀| / |H₀|",
-        get=lambda series: _pair(series, "t", "error.energy"),
+        values="error.energy",
         low=-17,
         high=2,
     ),
@@ -192,7 +193,8 @@ OVER_TIME = (
         title="Position error over time",
         caption="Position error at the times of the stored 128-bit reference.",
         label="position error",
-        get=lambda series: _pair(series, "position_t", "position"),
+        values="position",
+        t="position_t",
         low=-17,
         high=4,
         joined=False,
@@ -202,7 +204,7 @@ OVER_TIME = (
         title="Angular momentum error over time",
         caption="2-norm of the error of the angular momentum vector, relative to its length.",
         label="|L − L₀| / |L₀|",
-        get=lambda series: _pair(series, "t", "error.angular_momentum"),
+        values="error.angular_momentum",
         low=-17,
         high=2,
     ),
@@ -212,7 +214,7 @@ OVER_TIME = (
         caption="What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
         "what is smaller than the lowest power is drawn just above it.",
         label="distance from the axis",
-        get=lambda series: _guard(series),
+        values="guard.",
         low=-24,
         high=4,
         zero=True,
@@ -222,7 +224,7 @@ OVER_TIME = (
         title="Largest distance from the origin over time",
         caption="Shows what escaped, and when.",
         label="largest distance",
-        get=lambda series: _pair(series, "t", "distance"),
+        values="distance",
         low=0,
         high=5,
     ),
@@ -246,21 +248,12 @@ def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
                 title=f"{words_.capitalize()}: error over time",
                 caption="Relative error, or absolute where the value at the start is 0; a vector's 2-norm.",
                 label=f"error of {words_}",
-                get=lambda series, name=name: _pair(series, "t", name),
+                values=name,
                 low=-17,
                 high=2,
             )
         )
     return made
-
-
-def _pair(series: dict[str, Array], t: str, values: str) -> tuple[Array, Array] | None:
-    return (series[t], series[values]) if values in series and series[t].size else None
-
-
-def _guard(series: dict[str, Array]) -> tuple[Array, Array] | None:
-    names = [name for name in series if name.startswith("guard.")]
-    return (series["t"], series[names[0]]) if names else None
 
 
 def _truth(problem: Problem, known: Reference | None) -> Items | None:

@@ -6,8 +6,8 @@ from statistics import median
 from hbvm_bench.measure import ensemble
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE, METRICS
-from hbvm_bench.report.figures.style import method_name
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import group_of, seconds, status_of
 
 # The levels of the summary's question "who is fastest among those that are right?"
@@ -140,7 +140,7 @@ def settings_count(records: Sequence[Record]) -> list[tuple[str, str, dict[str, 
     """Return method, library and how many settings it has of each kind."""
     counted: dict[tuple[str, str], dict[str, int]] = {}
     for record in records:
-        kinds = counted.setdefault((method_name(record), record.library), {})
+        kinds = counted.setdefault((family_of(record), record.library), {})
         kinds[record.case.settings] = kinds.get(record.case.settings, 0) + 1
     return [(name, library, kinds) for (name, library), kinds in counted.items()]
 

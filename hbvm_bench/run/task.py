@@ -13,13 +13,13 @@ from typing import TypeVar
 import msgspec
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Case, Limits
+from hbvm_bench.campaign.file import Limits
 from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.run import supervise, warm
 from hbvm_bench.run.supervise import Ended
-from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, STALE, Request
+from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
 from hbvm_bench.store import records
 from hbvm_bench.store.records import COMPILING, Outcome, Record, Result
 from hbvm_bench.store.store import decode_series
@@ -36,44 +36,19 @@ class InterruptedRunError(Exception):
     """The run was stopped; what finished is in the store."""
 
 
-class Task(msgspec.Struct, frozen=True, kw_only=True):
-    """What an executor is asked to run.
-
-    Attributes
-    ----------
-    case : Case
-        The case.
-    id : str
-        The id that the runner gave it; elsewhere it must come out the same.
-    versions : dict
-        Behind the id, to name what differs.
-    limits : Limits
-        Wall time and memory of the process.
-    beside : own.Beside
-        What must be known of its problem.
-    """
-
-    case: Case
-    id: str
-    versions: dict[str, str]
-    limits: Limits
-    beside: own.Beside = own.Beside()
-
-
 class UnfinishedRunError(Exception):
     """Some cases could not be run at all; what finished is in the store."""
 
 
 def task_of(resolved: Resolved, limits: Limits) -> bytes:
-    """Return the JSON of a `Task`, which `execute` takes."""
-    task = Task(
-        case=resolved.case,
-        id=resolved.id,
-        versions=versions_of(resolved.method),
+    """Return the JSON of the `Request` for an accuracy run, which `execute` takes."""
+    request = Request(
+        cases={resolved.id: resolved.case},
         limits=limits,
+        versions=versions_of(resolved.method),
         beside=own.beside(resolved.problem),
     )
-    return msgspec.json.encode(task)
+    return msgspec.json.encode(request)
 
 
 def execute(task: bytes) -> tuple[bytes, bytes]:
@@ -85,7 +60,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     Parameters
     ----------
     task : bytes
-        JSON of a `Task`.
+        JSON of a `Request`.
 
     Returns
     -------
@@ -103,19 +78,21 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     problems.errors.InputError
         If the sources changed meanwhile.
     """
-    asked = msgspec.json.decode(task, type=Task)
+    asked = msgspec.json.decode(task, type=Request)
     own.learn(asked.beside)
+    ((key, case),) = asked.cases.items()
     try:
-        resolved = resolve(asked.case)
+        resolved = resolve(case)
     except InputError as error:
         raise UnfinishedRunError(f"{platform.node()} cannot run it: {error}") from None
-    if resolved.id != asked.id:
-        raise UnfinishedRunError(_difference(asked, resolved))
+    if resolved.id != key:
+        raise UnfinishedRunError(_difference(asked.versions, resolved))
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        core = getattr(_thread, "core", None)
-        request = Request(case=resolved.case, id=resolved.id, core=core, beside=asked.beside)
+        request = msgspec.structs.replace(
+            asked, cases={key: resolved.case}, core=getattr(_thread, "core", None)
+        )
         loads = resolved.method.library, parse_spec(resolved.case.problem).name
-        ended = start(Path(scratch), request, asked.limits, loads)
+        ended = start(Path(scratch), request, loads)
         result, series = _result(Path(scratch), ended, asked.limits)
     if result.reason == STALE:
         raise InputError(STALE)
@@ -148,7 +125,7 @@ def stay_on(core: int) -> None:
     _thread.core = core
 
 
-def start(scratch: Path, request: Request, limits: Limits, loads: tuple[str, str] | None = None) -> Ended:
+def start(scratch: Path, request: Request, loads: tuple[str, str] | None = None) -> Ended:
     """Start the worker process of a request and wait for its end.
 
     Parameters
@@ -156,9 +133,7 @@ def start(scratch: Path, request: Request, limits: Limits, loads: tuple[str, str
     scratch : Path
         An empty directory, where it writes.
     request : Request
-        What it is asked to do.
-    limits : Limits
-        Wall time and memory of the process.
+        What it is asked to do, and under which limits.
     loads : (str, str), optional
         Library and problem of a case that may find loaded what others of both have loaded. By
         default the process begins with nothing, as whatever is timed does.
@@ -174,14 +149,14 @@ def start(scratch: Path, request: Request, limits: Limits, loads: tuple[str, str
     if loads is not None:
         with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
             child = nest.start(path, *loads)
-            ended = supervise.watch(child, limits, compiled)
+            ended = supervise.watch(child, request.limits, compiled)
             if child.lost and ended.cause == "exit":
                 ended = None
                 compiled.unlink(missing_ok=True)
                 raise ConnectionError  # the nest is of no more use
     if ended is None:
         command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
-        ended = supervise.watch(supervise.Fresh(command, ENVIRONMENT), limits, compiled)
+        ended = supervise.watch(supervise.Fresh(command, ENVIRONMENT), request.limits, compiled)
     if ended.cause == "stopped":
         raise InterruptedRunError
     return ended
@@ -195,11 +170,11 @@ def decoded(path: Path, type_: type[T]) -> T | None:
         return None
 
 
-def _difference(asked: Task, resolved: Resolved) -> str:
+def _difference(versions: dict[str, str], resolved: Resolved) -> str:
     here = versions_of(resolved.method)
     differing = [
         f"{name} {here.get(name, 'not known')} instead of {version}"
-        for name, version in asked.versions.items()
+        for name, version in versions.items()
         if here.get(name) != version
     ]
     what = ", ".join(differing) or "other sources of hbvm-bench"
@@ -221,7 +196,7 @@ def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]
         return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory")
     if ended.code != 0:
         return failed("crashed", f"the process {ended.words}")
-    result = decoded(scratch / "result.json", Result)
+    result = decoded(scratch / REPLY, Result)
     if result is None:
         return failed("crashed", NO_RESULT)
     if result.outcome not in ("ok", "stalled"):

@@ -4,7 +4,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 
@@ -16,11 +15,10 @@ from hbvm_bench.measure import measured as measure
 from hbvm_bench.measure.metrics import TIMING_KEYS, evaluate
 from hbvm_bench.reference import solutions
 from hbvm_bench.run.task import decoded, start
-from hbvm_bench.run.worker import InterleavedReply, Request, TimingReply
+from hbvm_bench.run.worker import REPLY, Request
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
 
-T = TypeVar("T")
 Tell = Callable[[int, Resolved], None]
 OFF = "on another trajectory, so that its time has no meaning"
 
@@ -146,56 +144,37 @@ def _visit_together(
     timings = dict.fromkeys((one.id for one in group), Timing(why=OFF))
     process = datetime.now(UTC).isoformat()
     if on:
-        request = Request(
-            case=on[0].case,
-            id=on[0].id,
-            others={one.id: one.case for one in on[1:]},
-            beside=own.beside(on[0].problem),
-            mode="interleave",
-            plan=plan,
-            core=core,
-        )
         together = msgspec.structs.replace(
             limits,
             wall_seconds=limits.wall_seconds * len(on),
             compile_seconds=limits.compile_seconds * len(on),
         )
-        reply, why = _asked(request, together, InterleavedReply)
-        made = [Timing(why=why)] * len(on) if reply is None else reply.timings
-        timings |= zip((one.id for one in on), made, strict=True)
+        timings |= zip((one.id for one in on), _asked(on, plan, together, core), strict=True)
     for one in group:
         timing = msgspec.structs.replace(timings[one.id], machine=here, process=process)
         store.save(_with_timing(store, records[one.id], one, timing))
 
 
 def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
-    request = Request(
-        case=resolved.case,
-        id=resolved.id,
-        mode="time",
-        plan=plan,
-        core=core,
-        beside=own.beside(resolved.problem),
-    )
-    reply, why = _asked(request, limits, TimingReply)
-    if reply is None:
-        return msgspec.structs.replace(timing, why=why)
-    if reply.round is None:
-        return msgspec.structs.replace(timing, why=reply.why)
-    return Timing(rounds=[*timing.rounds, reply.round], machine=timing.machine)
+    (made,) = _asked([resolved], plan, limits, core)
+    return Timing(rounds=[*timing.rounds, *made.rounds], why=made.why, machine=timing.machine)
 
 
-def _asked(request: Request, limits: Limits, type_: type[T]) -> tuple[T | None, str]:
-    """Return what a worker process answers, or why it does not."""
+def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None) -> list[Timing]:
+    """Return what a worker process answers; without an answer each timing says why."""
+    asked, beside = {one.id: one.case for one in cases}, own.beside(cases[0].problem)
+    request = Request(cases=asked, limits=limits, plan=plan, beside=beside, core=core)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        ended = start(Path(scratch), request, limits)
-        reply = decoded(Path(scratch) / "timing.json", type_)
+        ended = start(Path(scratch), request)
+        reply = decoded(Path(scratch) / REPLY, list[Timing])
+    if reply is not None and len(reply) == len(cases):
+        return reply
     words = {
         "timeout": "the time limit",
         "compiling": "still compiling",
         "memory": "the memory limit",
     }.get(ended.cause, ended.words)
-    return reply, f"not timed: {words}"
+    return [Timing(why=f"not timed: {words}")] * len(cases)
 
 
 def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:

@@ -1,6 +1,6 @@
 """The process that runs one case: ``python -m hbvm_bench.run.worker REQUEST.json PARENT``, or a warm one.
 
-It writes ``result.json`` (and ``series.npz`` or ``timing.json``) beside the
+It writes ``reply.json``, a `Result` (with ``series.npz``) or a list of `Timing`, beside the
 request and leaves the store alone; whatever happens to it, the runner that
 started it says what.
 """
@@ -14,9 +14,8 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -24,8 +23,8 @@ import msgspec
 import numpy as np
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Case, TimingPlan
-from hbvm_bench.campaign.identity import Resolved, resolve
+from hbvm_bench.campaign.file import Case, Limits, TimingPlan
+from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import ensemble, timing, together
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
@@ -33,13 +32,14 @@ from hbvm_bench.measure.solve import solve, solve_with_bare_end
 from hbvm_bench.measure.timing import Run
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Result, Timing, Value
 from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import Program, Status
 from integrators.solution import Solution
 from problems.errors import InputError
 from problems.systems.base import System
 
+REPLY = "reply.json"
 COMPILED = "compiled"  # the file that says that compiling has ended
 NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
@@ -58,32 +58,30 @@ ENVIRONMENT = {
 
 
 class Request(msgspec.Struct, frozen=True, kw_only=True):
-    """What a worker is asked to do.
+    """What travels to a worker, and before that to whichever machine shall start it.
 
     Attributes
     ----------
-    case : Case
-        The case.
-    id : str
-        The id that the runner gave it.
-    mode : {"measure", "time", "interleave"}
-        The accuracy run, one round of the timing pass, or all of its rounds of several cases.
-    others : dict of Case
-        The other cases of an interleaved timing, by their ids; of the same problem.
+    cases : dict of Case
+        By the ids that the runner gave them, which must come out the same elsewhere; several are
+        timed together.
+    limits : Limits
+        Wall time and memory of the process.
+    plan : TimingPlan or None
+        What to time; ``None`` for the accuracy run.
+    versions : dict
+        Behind the ids, to name what differs elsewhere.
     beside : own.Beside
-        What must be known of the problem.
-    plan : TimingPlan
-        For the timing pass.
+        What must be known of their problem.
     core : int or None
         The core to stay on.
     """
 
-    case: Case
-    id: str
-    mode: Literal["measure", "time", "interleave"] = "measure"
-    others: dict[str, Case] = {}
+    cases: dict[str, Case]
+    limits: Limits
+    plan: TimingPlan | None = None
+    versions: dict[str, str] = {}
     beside: own.Beside = own.Beside()
-    plan: TimingPlan = TimingPlan()
     core: int | None = None
 
 
@@ -92,19 +90,6 @@ class _Fork(NamedTuple):
 
     parent: int
     found: Found
-
-
-class TimingReply(msgspec.Struct, frozen=True, kw_only=True):
-    """One round of samples, or why there are none."""
-
-    round: TimingRound | None = None
-    why: str = ""
-
-
-class InterleavedReply(msgspec.Struct, frozen=True, kw_only=True):
-    """The timings of several cases, in the order of the request; one without rounds says why."""
-
-    timings: list[Timing]
 
 
 def work(path: Path, parent: int, found: Found = "nothing") -> None:
@@ -121,20 +106,21 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     own.learn(request.beside)
-    _limit_and_die_with(parent)
+    limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
-    modes: dict[str, Callable[[Request, Path], msgspec.Struct]] = {
-        "measure": partial(_measure, fork=_Fork(parent, found)),
-        "time": _time,
-        "interleave": _interleave,
-    }
-    name = "result.json" if request.mode == "measure" else "timing.json"
     try:
-        reply = modes[request.mode](request, path.parent)
-        with atomic(path.parent / name) as temporary:
+        if request.plan is None:
+            reply: object = _measure(request, path.parent, _Fork(parent, found))
+        else:
+            time = _interleave if request.plan.interleaved else _time
+            reply = [
+                Timing(why=one) if isinstance(one, str) else one
+                for one in time(_resolved(request), request.plan, path.parent)
+            ]
+        with atomic(path.parent / REPLY) as temporary:
             temporary.write_bytes(msgspec.json.encode(reply))
     except (OSError, InputError) as error:
         if getattr(error.__cause__ or error, "errno", None) in DISK:
@@ -142,7 +128,8 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         raise
 
 
-def _limit_and_die_with(parent: int) -> None:
+def limit_and_die_with(parent: int) -> None:
+    """Leave no core and no huge file behind, end first where memory is short, and with this parent."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
     if sys.platform == "linux":
@@ -156,13 +143,13 @@ def _limit_and_die_with(parent: int) -> None:
 
 def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
     try:
-        resolved = _resolved(request)
+        (resolved,) = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
             return Result(outcome="refused", reason=reason)
         names = resolved.problem.system.invariant_names
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
-        grid = resolved.case.grid.times(resolved.problem, getattr(resolved.method, "h", None))
+        grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))
         program = _compiled(resolved, directory)
         if (asked := resolved.case.ensemble) is not None:
             return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
@@ -238,24 +225,21 @@ def _mapped(pid: int) -> int:
     return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
 
 
-def _time(request: Request, directory: Path) -> TimingReply:
-    resolved = _resolved(request)
+def _time(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[Timing | str]:
+    (resolved,) = cases
     asked = resolved.case.ensemble
     method: Any = _Telling(resolved, directory)
     if asked is None:
-        answer = timing.time_round(resolved.problem, method, request.plan)
+        answer = timing.time_round(resolved.problem, method, plan)
     else:
-        answer = ensemble.time_round(resolved.problem, method, asked, request.plan)
-    return TimingReply(why=answer) if isinstance(answer, str) else TimingReply(round=answer)
+        answer = ensemble.time_round(resolved.problem, method, asked, plan)
+    return [answer if isinstance(answer, str) else Timing(rounds=[answer])]
 
 
-def _interleave(request: Request, directory: Path) -> InterleavedReply:
-    asked = {request.id: request.case, **request.others}
-    found = [_checked(case, key) for key, case in asked.items()]
-    runs = [Run.of(one.problem, one.method) for one in found]  # compiled
+def _interleave(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[Timing | str]:
+    runs = [Run.of(one.problem, one.method) for one in cases]  # compiled
     (directory / COMPILED).touch()
-    made = together.time_together(runs, request.plan)
-    return InterleavedReply(timings=[Timing(why=one) if isinstance(one, str) else one for one in made])
+    return together.time_together(runs, plan)
 
 
 class _Telling:
@@ -282,15 +266,11 @@ def _compiled(resolved: Resolved, directory: Path) -> Program:
     return program
 
 
-def _resolved(request: Request) -> Resolved:
-    return _checked(request.case, request.id)
-
-
-def _checked(case: Case, key: str) -> Resolved:
-    resolved = resolve(case)
-    if resolved.id != key:
+def _resolved(request: Request) -> list[Resolved]:
+    found = [resolve(case) for case in request.cases.values()]
+    if [one.id for one in found] != list(request.cases):
         raise InputError(STALE)
-    return resolved
+    return found
 
 
 def _garbage(solution: Solution, grid: np.ndarray) -> str:

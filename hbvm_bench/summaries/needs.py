@@ -13,7 +13,7 @@ from statistics import median
 
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, number, problems_of, work_of
+from hbvm_bench.summaries.points import by_problem, family_of, number, work_of
 from hbvm_bench.summaries.profiles import Accuracy, reaches
 from hbvm_bench.summaries.rows import group_of
 
@@ -147,11 +147,11 @@ def _answer(records: Sequence[Record], need: Need) -> Answer:
     behind: dict[str, list[float]] = {}
     wins: dict[str, int] = {}
     served = 0
-    for problem in problems_of(records):
+    for here in by_problem(records).values():
         costs: dict[str, float] = {}
-        for record in records:
+        for record in here:
             cost = number(record, need.cost)
-            if record.case.problem != problem or cost is None or not need.serves(record):
+            if cost is None or not need.serves(record):
                 continue
             family = family_of(record)
             costs[family] = min(costs.get(family, math.inf), max(cost, need.floor))

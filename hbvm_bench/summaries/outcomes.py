@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, problems_of
+from hbvm_bench.summaries.points import by_family, by_problem
 from hbvm_bench.summaries.rows import group_of, status_of
 
 State = Literal["ok", "off", "ended", "refused", "absent"]
@@ -45,14 +45,11 @@ class Outcome:
 
 def matrix(records: Sequence[Record]) -> tuple[list[str], dict[str, dict[str, Outcome]]]:
     """Return the families in order, and for each problem the outcome of each family."""
-    singles = [record for record in records if record.case.ensemble is None]
-    families = list(dict.fromkeys(family_of(record) for record in singles))
+    here = {problem: by_family(members) for problem, members in by_problem(records).items()}
+    families = list(by_family([record for record in records if record.case.ensemble is None]))
     rows = {
-        problem: {
-            family: _outcome([r for r in singles if r.case.problem == problem and family_of(r) == family])
-            for family in families
-        }
-        for problem in problems_of(records)
+        problem: {family: _outcome(members.get(family, [])) for family in families}
+        for problem, members in here.items()
     }
     return families, rows
 

@@ -1,39 +1,16 @@
-"""Work against error: every setting a point, the best of every family an envelope."""
+"""What every summary reads off the cases: families, problems, numbers, and which settings nothing beats."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.measure.metrics import find
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import group_of
+
+T = TypeVar("T")
 
 WORKS = ("warm_seconds", "evaluations")
 """What an integration costs: the first that a run has is shown by default."""
-
-ERRORS = ("position_end", "phase_end", "energy_max")
-"""What it is good for; energy only ever beside one of the others."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """One setting of one method on one problem.
-
-    Attributes
-    ----------
-    record : Record
-        As stored.
-    family : str
-        Name of the method.
-    work, error : float
-        Both positive; an error of exactly 0 is not a point of a logarithmic plot and is
-        left out.
-    """
-
-    record: Record
-    family: str
-    work: float
-    error: float
 
 
 def family_of(record: Record) -> str:
@@ -41,9 +18,21 @@ def family_of(record: Record) -> str:
     return parse_spec(record.case.method).name
 
 
-def problems_of(records: Sequence[Record]) -> list[str]:
-    """Return the problems of a run that are no ensembles, in order."""
-    return list(dict.fromkeys(r.case.problem for r in records if r.case.ensemble is None))
+def by_problem(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Return the cases that are no ensembles, problem by problem, in order."""
+    found: dict[str, list[Record]] = {}
+    for record in records:
+        if record.case.ensemble is None:
+            found.setdefault(record.case.problem, []).append(record)
+    return found
+
+
+def by_family(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Return cases family by family, in order."""
+    found: dict[str, list[Record]] = {}
+    for record in records:
+        found.setdefault(family_of(record), []).append(record)
+    return found
 
 
 def number(record: Record, key: str) -> float | None:
@@ -52,49 +41,15 @@ def number(record: Record, key: str) -> float | None:
     return value.value if value is not None and value.counts else None
 
 
-def points(records: Sequence[Record], problem: str, work: str, error: str) -> list[Point]:
-    """Return the points of a problem: cases that reached the end on the trajectory asked for.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Of a run.
-    problem : str
-        As it prints.
-    work, error : str
-        Keys of metrics, such as one of `WORKS` and one of `ERRORS`.
-
-    Raises
-    ------
-    problems.errors.UnknownNameError
-        For an unknown metric.
-    """
-    for key in (work, error):
-        find(key)
-    made: list[Point] = []
-    for record in records:
-        if record.case.problem != problem or record.case.ensemble or group_of(record) != "on":
-            continue
-        cost, wrong = number(record, work), number(record, error)
-        if cost and wrong:
-            made.append(Point(record, family_of(record), cost, wrong))
-    return made
-
-
-def envelope(points: Sequence[Point]) -> list[Point]:
-    """Return the points that no other one beats in both work and error, by ascending work."""
-    best: list[Point] = []
-    for point in sorted(points, key=lambda p: (p.work, p.error)):
-        if not best or point.error < best[-1].error:
-            best.append(point)
+def front(items: Iterable[T], place: Callable[[T], tuple[float, float]]) -> list[T]:
+    """Return what nothing else beats in both work and error, by ascending work; ``place`` gives the two."""
+    best: list[T] = []
+    least = math.inf
+    for item in sorted(items, key=place):
+        if place(item)[1] < least:
+            best.append(item)
+            least = place(item)[1]
     return best
-
-
-def envelopes(records: Sequence[Record], problem: str, work: str, error: str) -> dict[str, list[Point]]:
-    """Return the envelope of each family's best on a problem, families in the order of the run."""
-    found = points(records, problem, work, error)
-    families = dict.fromkeys(point.family for point in found)
-    return {family: envelope([p for p in found if p.family == family]) for family in families}
 
 
 def work_of(records: Sequence[Record]) -> str:

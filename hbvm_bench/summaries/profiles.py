@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, number, problems_of
+from hbvm_bench.summaries.points import by_family, by_problem, family_of, number
 from hbvm_bench.summaries.rows import group_of
 
 
@@ -113,14 +113,12 @@ def profile(records: Sequence[Record], accuracy: Accuracy, work: str) -> Profile
         Key of the metric of cost; a family without it (a Taylor method has no count of
         evaluations) has no ratio there.
     """
-    singles = [record for record in records if record.case.ensemble is None]
-    families = list(dict.fromkeys(family_of(record) for record in singles))
+    families = list(by_family([record for record in records if record.case.ensemble is None]))
     solved: list[str] = []
     unsolved: list[str] = []
     best: dict[str, tuple[str, Record]] = {}
     ratios: dict[str, list[float]] = {family: [] for family in families}
-    for problem in problems_of(records):
-        here = [record for record in singles if record.case.problem == problem]
+    for problem, here in by_problem(records).items():
         if not any(number(record, "position_end") is not None for record in here):
             continue
         cheapest: dict[str, tuple[float, Record]] = {}

@@ -112,10 +112,3 @@ def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:
     """Return the errors that ours may have at most where they are to be so many times a peer's."""
     found = {key: (factor, number(theirs, key)) for key, factor in factors.items()}
     return {key: -1.0 if error is None else factor * error for key, (factor, error) in found.items()}
-
-
-def families(records: Sequence[Record]) -> list[str]:
-    """Return the families of a problem in the order of the campaign: ours together as ``""``."""
-    return list(
-        dict.fromkeys("" if one.role == "ours" else parse_spec(one.case.method).name for one in records)
-    )

@@ -37,7 +37,8 @@ class Event(Called):
 
     Examples
     --------
-    >>> Event(lambda q: q[0], direction=1)  # doctest: +ELLIPSIS
+    >>> from integrators import Event
+    >>> Event(lambda q: q[0], direction=1)
     Event(g=<function ...>, direction=1, terminal=False, name=None)
     """
 

@@ -54,7 +54,7 @@ def section(
     Examples
     --------
     >>> import problems
-    >>> from integrators import HBVM
+    >>> from integrators import HBVM, section
     >>> made = section(problems.load("henon_heiles"), HBVM(k=6, s=4, h=0.5), lambda q: q[0], count=3)
     >>> made.y.shape
     (3, 4)

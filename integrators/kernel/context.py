@@ -36,6 +36,9 @@ FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
 
+# What whole sweeps do after the last one, if anything; see `Context.fused`.
+MEASURE, EVALUATE = 1, 2
+
 # What a line integral does; see `Context.line`.
 VALUES, END, ARRIVE = range(3)
 
@@ -99,7 +102,7 @@ class Context(Memory):
 
     # --- what is integrated, and how ---
     field = Integer()  # address of void(times, stages, par, values) on one block of stages
-    fused = Integer()  # address of whole sweeps, void(context, count, tested); 0: none, see `step.fused`
+    fused = Integer()  # address of whole sweeps, void(context, count, after); 0: none, see `step.fused`
     # address of a line integral, int64(what, context); 0: plain. It makes the VALUES at the stages from the
     # field, the state at a step's END, and learns of every new state at which the trajectory has ARRIVEd.
     line = Integer()
@@ -242,6 +245,7 @@ class Context(Memory):
     rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
     length_limit = Real()  # no step is longer, for what the iteration allows
     longest = Real()  # no step is longer, for what the user allows
+    busy_implicit = Real()  # corrections of a step by the implicit solver to aim at, at most
     stop = Real()  # no step passes this time; infinite: none
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones

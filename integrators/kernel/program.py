@@ -14,7 +14,7 @@ from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
-from integrators.kernel.implicit.workspace import SOLVERS, Linearization, Workspace, linearization
+from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import binary
 from integrators.kernel.native import field as fields
@@ -131,7 +131,7 @@ class HBVMProgram(Compiled):
         self._fresh: dict[bool, Context] = {}
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
         self.from_cache = all(made.from_cache for made in parts if made is not None)
-        self._linearization: Linearization | None = None
+        self._workspace: Workspace | None = None
         self._in_lanes: tuple[Lanes | None] | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
@@ -223,11 +223,12 @@ class HBVMProgram(Compiled):
 
     def implicit(self) -> Workspace:
         """Return memory for the implicit solver; its code is compiled, or loaded, the first time."""
-        if self._linearization is None:
+        if self._workspace is None:
             made = solver_engine.solver.code()
-            self._linearization = linearization(self.system, second=self.second)
             self.from_cache = self.from_cache and made.from_cache
-        return Workspace(self.shape, self.solver.kind, self._linearization)
+            found = linearization(self.system, second=self.second)
+            self._workspace = Workspace(self.shape, self.solver.kind, found)
+        return self._workspace.copy()
 
     def scaled(self, h: float) -> dict[str, Array]:
         """Return the tables for steps of h, which may be negative."""

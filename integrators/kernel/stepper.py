@@ -214,6 +214,7 @@ class HBVMStepper(ABC):
             for context, workspace in zip((self._context, self._side), self._implicit, strict=True):
                 context.solver = solver_engine.solver.code().address
                 context.solver_memory = workspace.address
+                context.busy_implicit = workspace.busy
                 context.point({"increment": workspace.increment})
         return self._implicit
 

@@ -98,6 +98,14 @@ class DOP853(_SciPyMethod):
     -----
     The step loop is SciPy's and runs in Python: 12 evaluations of the compiled
     field a step at about 3 microseconds each, most of it not the field.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import DOP853, integrate
+    >>> solution = integrate(problems.load("pendulum"), DOP853(rtol=1e-12, atol=1e-14), [0.0, 10.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-10)
+    True
     """
 
     solver = "DOP853"
@@ -123,6 +131,13 @@ class Radau(_SciPyMethod):
     The Jacobian is the traced system's own (`problems.System.jacobian`), as our implicit methods have
     it; SciPy's finite differences where there is none. It is L-stable, so it damps oscillations:
     no method for conserving energy.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Radau, integrate
+    >>> integrate(problems.load("pendulum"), Radau(rtol=1e-6, atol=1e-8), [0.0, 10.0]).status
+    <Status.FINISHED: 'finished'>
     """
 
     solver = "Radau"

@@ -37,6 +37,12 @@ class Bodies:
         The gravitational constant, or the parameter that holds it.
     dimension : int
         Coordinates per body; the state holds all positions body by body, then all momenta.
+
+    Examples
+    --------
+    >>> import problems
+    >>> problems.load("outer_solar_system").system.bodies.dimension
+    3
     """
 
     masses: str = "m"
@@ -63,6 +69,13 @@ class System:
         Names and default values; the values are run-time arguments.
     bodies : Bodies or None
         What makes it an N-body system.
+
+    Examples
+    --------
+    >>> import problems
+    >>> system = problems.load("kepler").system
+    >>> system.kind, system.dof, system.invariant_names
+    ('hamiltonian', 2, ('energy', 'angular_momentum', 'lenz'))
     """
 
     kind: ClassVar[str]

@@ -38,6 +38,7 @@ class Hamiltonian(System):
 
     Examples
     --------
+    >>> from problems import Hamiltonian
     >>> def H(q, p, m):
     ...     return p[0]**2/2 - m.cos(q[0])
     >>> Hamiltonian(H, dof=1).separable

@@ -43,7 +43,7 @@ class Lagrangian(Hamiltonian):
     --------
     A pendulum on a cart, which starts from velocities:
 
-    >>> from problems import Problem
+    >>> from problems import Lagrangian, Problem
     >>> def L(q, v, m):
     ...     x, y = v[0] + m.cos(q[1])*v[1], m.sin(q[1])*v[1]
     ...     return v[0]**2 + (x**2 + y**2)/2 + m.cos(q[1])

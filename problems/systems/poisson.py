@@ -42,6 +42,7 @@ class Poisson(System):
     --------
     The rigid body:
 
+    >>> from problems import Poisson
     >>> def H(y):
     ...     return (y[0]**2/2 + y[1]**2 + 3*y[2]**2/2)/2
     >>> def B(y):

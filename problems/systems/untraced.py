@@ -53,6 +53,7 @@ class Foreign(System):
 
     Examples
     --------
+    >>> from problems import Foreign
     >>> def van_der_pol(t, y):
     ...     return [y[1], (1 - y[0]**2)*y[1] - y[0]]
     >>> Foreign(van_der_pol, dim=2)

@@ -23,6 +23,15 @@ class VectorField(System):
         Length of the state.
     parameters, invariants, guards, name
         As for `Hamiltonian`; there is no energy unless it is given as an invariant.
+
+    Examples
+    --------
+    >>> from problems import Problem, VectorField
+    >>> def f(t, y, par, m):
+    ...     return [y[1], par.a * m.cos(t) - m.sin(y[0])]
+    >>> forced = VectorField(f, dim=2, parameters={"a": 0.3})
+    >>> Problem(forced, y0=[0.0, 1.0], t_end=10.0).system.dim
+    2
     """
 
     kind = "vector_field"

@@ -1,8 +1,9 @@
 """General systems against their published end values, beside SciPy's methods; and stiff oscillations.
 
-The end value of van der Pol's equation is that of F. Mazzia, C. Magherini, *Test Set for Initial
-Value Problem Solvers*, release 2.4. Of Robertson's at t = 40, the example of LSODE (A. C. Hindmarsh,
-ODEPACK, 1983) prints 7.158e-01 9.185e-06 2.842e-01; Radau and HBVM agree on the further digits.
+The end values of van der Pol's equation and of HIRES, a chemistry of eight species, are those of
+F. Mazzia, C. Magherini, *Test Set for Initial Value Problem Solvers*, release 2.4. Of Robertson's at
+t = 40, the example of LSODE (A. C. Hindmarsh, ODEPACK, 1983) prints 7.158e-01 9.185e-06 2.842e-01;
+Radau and HBVM agree on the further digits.
 """
 
 import math
@@ -42,7 +43,38 @@ ROBERTSON = Problem(
     y0=[1.0, 0.0, 0.0],
     t_end=40.0,
 )
+HIRES = Problem(
+    VectorField(
+        lambda y: [
+            -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
+            1.71 * y[0] - 8.75 * y[1],
+            -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
+            8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
+            -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6],
+            -280 * y[5] * y[7] + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
+            280 * y[5] * y[7] - 1.81 * y[6],
+            -280 * y[5] * y[7] + 1.81 * y[6],
+        ],
+        dim=8,
+        name="hires",
+    ),
+    y0=[1.0, 0, 0, 0, 0, 0, 0, 0.0057],
+    t_end=321.8122,
+)
 PUBLISHED = {
+    "hires": (
+        HIRES,
+        [
+            0.7371312573325668e-3,
+            0.1442485726316185e-3,
+            0.5888729740967575e-4,
+            0.1175651343283149e-2,
+            0.2386356198831331e-2,
+            0.6238968252742796e-2,
+            0.2849998395185769e-2,
+            0.2850001604814231e-2,
+        ],
+    ),
     "van_der_pol": (VAN_DER_POL, [1.706167732170483, -0.8928097010247975]),
     "robertson": (ROBERTSON, [0.7158270687193941, 0.9185534764557763e-5, 0.2841637457458413]),
 }
@@ -122,6 +154,32 @@ def test_without_the_implicit_solver_a_stiff_system_takes_far_more_steps():
     auto = integrate(ROBERTSON, HBVM(), [40.0])
     assert fixed.stats.solver == "fixed point"
     assert fixed.stats.steps > 50 * auto.stats.steps  # measured 27589 and 141
+
+
+def test_an_iteration_that_is_slow_from_the_start_gives_way_early():
+    made = integrate(HIRES, HBVM(), [HIRES.t_end])
+    assert made.status is Status.FINISHED
+    assert (
+        np.abs(made.y[0] / PUBLISHED["hires"][1] - 1).max() < 1e-12
+    )  # measured 1.9e-13, of the published end
+    assert made.stats.steps < 100  # measured 52; held back until t = 18, and by failed first steps: 526
+    assert (
+        made.stats.extra["implicit"]["rescues"] == 0
+    )  # measured 3, and 10 of 20 ms, without a bound on corrections
+
+
+def test_components_that_are_0_at_first_do_not_keep_steps_short():
+    def diffusion(y):  # problem C4 of DETEST
+        inner = [y[i - 1] - 2 * y[i] + y[i + 1] for i in range(1, 50)]
+        return [y[1] - 2 * y[0], *inner, y[49] - 2 * y[50]]
+
+    problem = Problem(VectorField(diffusion, dim=51, name="diffusion"), y0=np.eye(51)[0], t_end=20.0)
+    i = np.arange(1, 52)
+    modes = np.sqrt(2 / 52) * np.sin(np.pi * np.outer(i, i) / 52)
+    end = (modes * np.exp(-80 * np.sin(np.pi * i / 104) ** 2)) @ modes[0]
+    made = integrate(problem, HBVM(), [20.0])
+    assert np.abs(made.y[0] - end).max() < 1e-15  # measured 1.0e-16
+    assert made.stats.steps < 50  # measured 24; 218 where each block is judged by its own size
 
 
 def test_robertsons_chemistry_to_its_published_end_at_1e11():

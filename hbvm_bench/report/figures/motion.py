@@ -13,7 +13,8 @@ from hbvm_bench.measure.quantities import PLANETOID_Z
 from hbvm_bench.report.figures.canvas import Picture, new, picture
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot
-from hbvm_bench.report.figures.style import GRID, INK, MUTED, TRUTH, method_name, options
+from hbvm_bench.report.figures.style import GRID, INK, MUTED, TRUTH, options
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import status_of
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ def chosen(cases: Sequence[Drawn]) -> list[list[Drawn]]:
     """Return for each family the cases to show: as published or by default first, then the most accurate."""
     panes = []
     for family in FAMILIES:
-        members = [case for case in cases if method_name(case.record) == family and len(case.series["t"]) > 2]
+        members = [case for case in cases if family_of(case.record) == family and len(case.series["t"]) > 2]
         if not members:
             continue
         first = next((c for c in members if c.record.case.settings == "as published"), None)
@@ -129,7 +130,7 @@ def _pane(axes: Axes, case: Drawn) -> None:
         axes.plot(*path.T, color=colour, linewidth=1.4 if body == 2 else 0.8, clip_on=True)
         if len(path) and np.abs(path[-1]).max() < REACH:
             axes.plot(*path[-1], "o", color=colour if body == 2 else MUTED, markersize=5 if body == 2 else 8)
-    name = f"{case.look.number}  {method_name(case.record)}  {options(case.record)}"
+    name = f"{case.look.number}  {family_of(case.record)}  {options(case.record)}"
     axes.set_title(f"{name}\n{_fate(case, float(t[-1]))}", color=INK, fontsize=7.5, loc="center")
 
 

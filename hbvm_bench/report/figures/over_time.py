@@ -1,6 +1,6 @@
 """Errors over time, and what the figures of cases share: their panels and legends."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import INK, MUTED, Look, method_name, options, panels
+from hbvm_bench.report.figures.style import INK, MUTED, Look, options, panels
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import group_of
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ class Drawn:
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
         mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
-        name = f"{method_name(self.record)}  " if named else ""
+        name = f"{family_of(self.record)}  " if named else ""
         return f"{self.look.number}  {name}{options(self.record)}{mark}"
 
 
@@ -50,8 +51,8 @@ class OverTime:
     ----------
     key, title, caption, label : str
         The label is the axis's.
-    get : callable
-        From the series of a case to times and values; ``None`` where it has none.
+    values, t : str
+        Names of the series that are drawn; a name that ends in a dot is the first that begins so.
     low, high : int
         Powers of ten of the axis.
     zero : bool
@@ -64,11 +65,17 @@ class OverTime:
     title: str
     caption: str
     label: str
-    get: Callable[[dict[str, Array]], tuple[Array, Array] | None]
+    values: str
     low: int
     high: int
+    t: str = "t"
     zero: bool = False
     joined: bool = True
+
+    def get(self, series: dict[str, Array]) -> tuple[Array, Array] | None:
+        """Return times and values of a case; ``None`` where it has none."""
+        names = [name for name in series if self.values in (name, f"{name.split('.')[0]}.")]
+        return (series[self.t], series[names[0]]) if names and series[self.t].size else None
 
 
 def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
@@ -168,7 +175,7 @@ def panel_legend(
     notes: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
-    named = len({method_name(case.record) for case in cases}) > 1
+    named = len({family_of(case.record) for case in cases}) > 1
     handles = [
         Line2D(
             [],

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of
 
 # Base colour of each method: light theme, dark theme.
 FAMILIES = {
@@ -131,11 +132,6 @@ def base_colours(name: str) -> tuple[str, str]:
     return OTHERS[hashlib.sha256(name.encode()).digest()[0] % len(OTHERS)]
 
 
-def method_name(record: Record) -> str:
-    """Return the name of a case's method, without its options."""
-    return parse_spec(record.case.method).name
-
-
 def options(record: Record) -> str:
     """Return the options of a case's method as short as a legend needs them."""
     words = []
@@ -156,7 +152,7 @@ def panels(records: Sequence[Record], most: int = 6) -> list[tuple[str, list[Rec
     for library, members in libraries.items():
         names: dict[str, list[Record]] = {}
         for record in members:
-            names.setdefault(method_name(record), []).append(record)
+            names.setdefault(family_of(record), []).append(record)
         if len(members) <= most:
             made.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
         else:

@@ -12,8 +12,8 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.labels import number_points
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import method_name
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.points import family_of, front, number
 from hbvm_bench.summaries.rows import group_of
 
 MOST_NAMED = 30  # cases in the legend
@@ -25,7 +25,8 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     shown = [
         case
         for case in cases
-        if all(_counts(case.record, key) for key in (*keys, "warm_seconds")) and group_of(case.record) == "on"
+        if all(number(case.record, key) is not None for key in (*keys, "warm_seconds"))
+        and group_of(case.record) == "on"
     ]
     if len(shown) < 2:
         return None
@@ -93,12 +94,9 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
 def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, float]]) -> list[Trace]:
     """Join the settings of each method that none of its others beats in both work and error."""
     made = []
-    for name in dict.fromkeys(method_name(case.record) for case in cases):
-        members = [(s, c) for s, c in zip(spots, cases, strict=True) if method_name(c.record) == name]
-        best: list[tuple[float, float]] = []
-        for spot, _ in sorted(members, key=lambda member: member[0]):
-            if not best or spot[1] < best[-1][1]:
-                best.append(spot)
+    for name in dict.fromkeys(family_of(case.record) for case in cases):
+        members = [(s, c) for s, c in zip(spots, cases, strict=True) if family_of(c.record) == name]
+        best = front([spot for spot, _ in members], lambda spot: spot)
         if len(best) < 2:
             continue
         x, y = np.array(best).T
@@ -112,12 +110,7 @@ def _full(case: Drawn) -> str:
     return f"{case.look.number}  {case.record.case.method}"
 
 
-def _counts(record: Record, key: str) -> bool:
-    value = record.result.metrics.get(key)
-    return value is not None and value.counts
-
-
 def _number(record: Record, key: str) -> float:
-    value = record.result.metrics[key].value
+    value = number(record, key)
     assert value is not None
     return value

@@ -76,7 +76,7 @@ def goals(result: Endurance) -> list[Verdict]:
 def mean_in_words(law: Law) -> str:
     """Return the mean over the starts with its standard error and the count of signs."""
     spread = "" if law.mean_error is None else f" ± {law.mean_error:.1e}"
-    return f"{law.mean:+.1e}{spread}; {law.positive} of {law.starts} positive"
+    return f"{law.mean:+.1e}{spread} ({law.positive} of {law.starts} positive)"
 
 
 def rate_in_words(law: Law) -> str:

@@ -12,6 +12,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, st
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
+from hbvm_bench.store.records import Law
 from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
 from hbvm_bench.studies.endure.runs import Endurance
 from hbvm_bench.summaries.goals import table as goals_table
@@ -67,7 +68,7 @@ def tables(result: Endurance) -> list[Table]:
                 line.method,
                 f"{line.starts}" + (f", {line.failed} failed" if line.failed else ""),
                 *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
-                NONE if law is None else drift.LAWS[law.law] if law.law else law.why,
+                NONE if law is None else _named(law),
                 NONE if law is None or not law.law else power_of(law),
                 NONE if law is None or law.mean is None else mean_in_words(law),
                 NONE if law is None or law.rate is None else rate_in_words(law),
@@ -75,24 +76,29 @@ def tables(result: Endurance) -> list[Table]:
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
         )
-    heads = tuple(f"rms at {year:g} yr" for year in years)
-    after = ("law", "power of t", "mean at the end", "drift per year", "time", "× ours")
+    heads = tuple(f"{year:g}" for year in years)
+    after = ("law", "power of t", "mean", "a year", "time", "× ours")
     made = [
         Table(
             f"Relative energy error over {result.years:g} years",
             ("method", "starts", *heads, *after),
             rows,
-            "rms over the starts. Mean at the end: over the starts, with its standard error, after the "
-            "offset of each has been taken off. "
+            "rms over the starts, at so many years. Mean: over the starts at the end, with its standard "
+            "error, after the offset of each has been taken off. "
             + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
-            + "Power of t and drift per year with 95 % "
+            + "Power of t and the drift a year with 95 % "
             "intervals over the starts. Time: median of one trajectory.",
             words=(0, 2 + len(heads)),
+            groups=(("", 2), ("rms", len(heads)), ("", 2), ("drift", 2), ("", 2)),
         )
     ]
     if asked := goals(result):
         made.append(goals_table(asked))
     return made
+
+
+def _named(law: Law) -> str:
+    return drift.LAWS[law.law].removeprefix("grows like ") if law.law else law.why
 
 
 @styled

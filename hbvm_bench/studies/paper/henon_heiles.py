@@ -12,6 +12,7 @@ from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
+from problems import Problem
 from problems.catalogue.henon_heiles import henon_heiles, inside_triangle
 
 H, T_END = 1.0, 5e4
@@ -79,9 +80,14 @@ class StepRow:
     agrees: float
 
 
+def start(t_end: float = T_END) -> Problem:
+    """Return the problem from our start."""
+    return henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+
+
 def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END, every: int = 1) -> Orbit:
     """Integrate from the start, ``offset`` last bits away; keep every ``every``-th step."""
-    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    problem = start(t_end)
     y0 = neighbour(problem.y0, offset)
     stepper = method.compile(problem.system).start(y0, problem.par, 0.0)
     samples = stepper.advance(np.array([t_end]), sample="steps")
@@ -111,7 +117,7 @@ def escapes(
     method: MethodBase, offsets: Sequence[int] = range(NEIGHBOURS), t_end: float = T_END
 ) -> list[float | None]:
     """Return when the orbits from neighbouring starts have left."""
-    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2])
+    problem = start()
     program = method.compile(problem.system)
     return [
         departure(program.start(neighbour(problem.y0, i), problem.par, 0.0), t_end, _gone, stretch=256 * H)
@@ -130,7 +136,7 @@ def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STAR
 
 def agreement(method: MethodBase, t_end: float = 100.0) -> float:
     """Return the time of the first own step at which the orbit is `AGREES` away from the true one."""
-    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    problem = start(t_end)
     found = integrate(problem, method, times=[t_end], sample="steps")
     truth = integrate(problem, TRUTH, times=found.t)
     parted = np.flatnonzero(~(np.hypot(*(found.y[:, :2] - truth.y[:, :2]).T) < AGREES))
@@ -163,7 +169,7 @@ def escape_map(
 
 def true_orbit(t_end: float = 300.0) -> Array:
     """Return positions of the true orbit, shape (n, 2), for a trace in the level curves."""
-    problem = henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+    problem = start(t_end)
     times = np.arange(0.0, t_end + 0.05, 0.1)
     return integrate(problem, HBVM(k=12, s=8, h=0.2), times=times).y[:, :2]
 

@@ -11,7 +11,7 @@ from hbvm_bench.studies.paper import henon_heiles_figures as figures
 from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
-from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.studies.paper.results import Results, Task, joined, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
@@ -25,26 +25,21 @@ Steps = Mapping[str, Sequence[StepRow]]
 
 def tasks() -> list[Task]:
     """Return the computations of this part."""
-    starts = np.array_split(np.arange(experiment.NEIGHBOURS), CHUNKS)
-    gaps = np.array_split(np.asarray(experiment.GAPS), CHUNKS)
+    starts, gaps = range(experiment.NEIGHBOURS), experiment.GAPS
+    both = [
+        task
+        for family, method in FAMILIES.items()
+        for task in (
+            Task(f"henon-heiles/steps {family}", partial(experiment.by_step, family), 9),
+            *split(f"henon-heiles/escapes {family}", partial(experiment.escapes, method), starts, CHUNKS, 6),
+            *split(f"henon-heiles/map {family}", partial(experiment.escape_map, method), gaps, CHUNKS, 15),
+        )
+    ]
     return [
         Task("henon-heiles/gauss", gauss_orbit, 20),
         Task("henon-heiles/hbvm", partial(experiment.orbit, HBVM_4), 3),
         Task("henon-heiles/truth", experiment.true_orbit, 1),
-        *(
-            Task(f"henon-heiles/steps {family}", partial(experiment.by_step, family), 9)
-            for family in FAMILIES
-        ),
-        *(
-            Task(f"henon-heiles/escapes {family} {i}", partial(experiment.escapes, method, chunk.tolist()), 6)
-            for family, method in FAMILIES.items()
-            for i, chunk in enumerate(starts)
-        ),
-        *(
-            Task(f"henon-heiles/map {family} {i}", partial(experiment.escape_map, method, chunk.tolist()), 15)
-            for family, method in FAMILIES.items()
-            for i, chunk in enumerate(gaps)
-        ),
+        *both,
         *others.tasks(KEY, others.on_henon_heiles, others.HENON_HEILES, 8),
     ]
 
@@ -108,17 +103,11 @@ def _hbvm(results: Results) -> Orbit:
 
 
 def _times(results: Results) -> dict[str, list[float | None]]:
-    return {
-        family: [time for i in range(CHUNKS) for time in results[f"henon-heiles/escapes {family} {i}"]]
-        for family in FAMILIES
-    }
+    return {family: joined(results, f"henon-heiles/escapes {family}", CHUNKS) for family in FAMILIES}
 
 
 def _maps(results: Results) -> dict[str, Array]:
-    return {
-        family: np.vstack([results[f"henon-heiles/map {family} {i}"] for i in range(CHUNKS)])
-        for family in FAMILIES
-    }
+    return {family: np.stack(joined(results, f"henon-heiles/map {family}", CHUNKS)) for family in FAMILIES}
 
 
 def _steps(results: Results) -> Steps:

@@ -129,11 +129,7 @@ def on_sitnikov(text: str) -> Row:
 
 def on_henon_heiles(text: str) -> Row:
     """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
-    start = henon_heiles.START
-    problem = henon_heiles.henon_heiles(
-        energy=1 / 6 - henon_heiles.GAP, q1=start[0], q2=start[1], direction=start[2], t_end=HENON_SPAN
-    )
-    method = make_method(text)
+    problem, method = henon_heiles.start(HENON_SPAN), make_method(text)
     refused = _refused(method, problem)
     if refused:
         return Row(text, {}, refused)

@@ -49,6 +49,17 @@ class Task:
     cost: float = 1.0
 
 
+def split(key: str, run: Callable[..., Any], values: Sequence[float], parts: int, cost: float) -> list[Task]:
+    """Return the tasks, ``key 0`` to ``key parts-1``, that each call a function with a part of the values."""
+    pieces = np.array_split(np.asarray(values), parts)
+    return [Task(f"{key} {i}", functools.partial(run, one.tolist()), cost) for i, one in enumerate(pieces)]
+
+
+def joined(results: Results, key: str, parts: int) -> list[Any]:
+    """Return the rows of what `split` divided."""
+    return [row for i in range(parts) for row in results[f"{key} {i}"]]
+
+
 class Kept(msgspec.Struct, frozen=True):
     """What came out, by task: the packed result, or why there is none; and how it was made."""
 

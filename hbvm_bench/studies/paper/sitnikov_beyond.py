@@ -8,12 +8,11 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, number, picture, sheet
+from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, number, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
-FAMILY_COLOURS = {"gauss": GAUSS, "hbvm": HBVM}
 FRACTIONS = {1 / 32: "1/32", 1 / 16: "1/16", 1 / 12: "1/12", 1 / 8: "1/8", 1 / 4: "1/4", 1 / 2: "1/2"}
 
 
@@ -77,12 +76,12 @@ def by_step(rows: Sequence[StepRow]) -> Picture:
             if not chosen:
                 continue
             name = f"Gauss, s = {s}" if family == "gauss" else f"HBVM(18,{s})"
-            face = FAMILY_COLOURS[family] if family == "hbvm" else "none"
+            face = FAMILIES[family] if family == "hbvm" else "none"
             left.plot(
                 [r.h for r in chosen],
                 [abs(r.turn) for r in chosen],
                 linestyle=dash,
-                color=FAMILY_COLOURS[family],
+                color=FAMILIES[family],
                 marker=marker,
                 mfc=face,
                 markersize=5 if family == "hbvm" else 7,
@@ -132,7 +131,7 @@ def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
         axes.plot(
             t[1:],
             np.maximum(error[1:], 1e-16),
-            color=FAMILY_COLOURS[family],
+            color=FAMILIES[family],
             linestyle=dashes[index],
             label=label,
             linewidth=1.2,
@@ -200,7 +199,7 @@ def _losses(axes: Axes, rows: Sequence[StepRow]) -> None:
             continue
         x = steps.index(row.h) + (-0.19 if row.family == "gauss" else 0.19)
         end = row.lost if row.lost is not None else T_END if not row.reason else None
-        colour = FAMILY_COLOURS[row.family]
+        colour = FAMILIES[row.family]
         if end is None:
             axes.plot(x, 40, "x", color=colour, markersize=5)
         else:

@@ -9,13 +9,12 @@ from matplotlib.axes import Axes
 from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, picture, sheet
 from hbvm_bench.studies.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 
 TILT = 0.55  # of the oblique drawing of the configuration
 SHOWN = 350.0  # the span of time that the paper shows z(t) on
-FAMILY_COLOURS = {"gauss": GAUSS, "hbvm": HBVM, "truth": TRUTH}
 
 
 @styled
@@ -55,7 +54,7 @@ def trajectories(
 
     ``ellipses``: paths (2, n) of one primary in the `REVOLUTIONS`, drawn as lines.
     """
-    colour = FAMILY_COLOURS[family]
+    colour = FAMILIES[family]
     figure = sheet(WIDTH, 4.1)
     left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
     reach = 3.2
@@ -106,7 +105,7 @@ def distances(runs: Mapping[str, Orbit]) -> Picture:
     panels = figure.subplots(1, 2, sharey=True)
     for axes, family in zip(panels, ("gauss", "hbvm"), strict=True):
         run = runs[family]
-        axes.plot(run.t, run.distance, color=FAMILY_COLOURS[family], linewidth=0.6)
+        axes.plot(run.t, run.distance, color=FAMILIES[family], linewidth=0.6)
         axes.axhline(D, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
         axes.set(xlim=(0, T_END), xlabel="time", title=run.method)
         low, high = apocentres(run)

@@ -11,7 +11,7 @@ from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_claims as said
 from hbvm_bench.studies.paper import sitnikov_figures as figures
 from hbvm_bench.studies.paper.drawn import number
-from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.studies.paper.results import Results, Task, joined, split
 from hbvm_bench.studies.paper.sitnikov import Orbit, StepRow
 from hbvm_bench.summaries.table import Table
 
@@ -30,8 +30,6 @@ BLOWN = 1e3  # relative error of H of a run that has no meaning
 
 def tasks() -> list[Task]:
     """Return the computations of this part."""
-    scan = np.array_split(np.asarray(axis_motion.ECCENTRICITIES), SCANS)
-    chunks = np.array_split(np.asarray(axis_motion.MAP_ECCENTRICITIES), CHUNKS)
     return [
         Task("sitnikov/orbits", sitnikov.orbits, 2),
         Task("sitnikov/ellipses", sitnikov.ellipses, 1),
@@ -40,15 +38,9 @@ def tasks() -> list[Task]:
         Task("sitnikov/steps 2", partial(sitnikov.by_step, 2), 4),
         Task("sitnikov/steps 3", partial(sitnikov.by_step, 3, sitnikov.STEPS_SHORT), 4),
         Task("sitnikov/truth", sitnikov.against_truth, 2),
-        *(
-            Task(f"sitnikov/growth {i}", partial(axis_motion.growth_by_eccentricity, es.tolist()), 15)
-            for i, es in enumerate(scan)
-        ),
+        *split("sitnikov/growth", axis_motion.growth_by_eccentricity, axis_motion.ECCENTRICITIES, SCANS, 15),
         Task("sitnikov/section", partial(axis_motion.section, sitnikov.E), 4),
-        *(
-            Task(f"sitnikov/stays {i}", partial(axis_motion.stays, es.tolist()), 8)
-            for i, es in enumerate(chunks)
-        ),
+        *split("sitnikov/stays", axis_motion.stays, axis_motion.MAP_ECCENTRICITIES, CHUNKS, 8),
         *others.tasks(KEY, others.on_sitnikov, others.SITNIKOV, 6),
     ]
 
@@ -99,7 +91,7 @@ def blocks(results: Results) -> list[Maker]:
         )
 
     def territory() -> Picture:
-        found = np.vstack([results[f"sitnikov/stays {i}"] for i in range(CHUNKS)])
+        found = np.stack(joined(results, "sitnikov/stays", CHUNKS))
         return axis_figures.territory(
             axis_motion.MAP_ECCENTRICITIES, axis_motion.MAP_SPEEDS, found, axis_motion.MAP_TURNS, sitnikov.E
         )
@@ -137,7 +129,7 @@ def _steps(results: Results) -> list[StepRow]:
 
 
 def _growth(results: Results) -> list[axis_motion.Growth]:
-    return [row for i in range(SCANS) for row in results[f"sitnikov/growth {i}"]]
+    return joined(results, "sitnikov/growth", SCANS)
 
 
 def _both(runs: dict[str, Orbit]) -> str | None:

@@ -1,10 +1,14 @@
 """What the bench costs a peer: each is run through the harness, as campaigns time it, and alone.
 
-``python -m hbvm_bench.studies.peers.check REQUEST.json`` runs it: the harness and the library in turn, round
-by round, in one process on one core, with compiling and setting up outside both clocks. The result is a
-`hbvm_bench.summaries.peers.PeerCheck`; ``hbvm-bench doctor --peers --out`` keeps it.
+This is no campaign: a campaign compares methods through the harness, and here the harness itself is compared
+with a library that is called without it. The two take turns, round by round, in one process on one core, with
+compiling and setting up outside both clocks. The result is a `hbvm_bench.summaries.peers.PeerCheck`;
+``hbvm-bench doctor --peers --out`` keeps it.
 """
 
+import os
+import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -14,7 +18,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 import problems
@@ -22,7 +25,7 @@ from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import ensemble, machine
 from hbvm_bench.measure.starts import cloud
 from hbvm_bench.measure.timing import WARM_UP, Run, interleaved, no_collection
-from hbvm_bench.run import processes
+from hbvm_bench.run.worker import ENVIRONMENT, limit_and_die_with
 from hbvm_bench.store.files import write_json
 from hbvm_bench.studies.peers import alone as peers_alone
 from hbvm_bench.studies.peers.alone import Script
@@ -33,6 +36,7 @@ from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
 
 ROUNDS = 15
+STDERR = 2  # the file descriptor: what a library prints
 CLOCK = time.process_time
 """The processor's time, in which other work on the machine does not count."""
 
@@ -126,13 +130,6 @@ PROBLEMS: dict[str, Callable[[float], Problem]] = {
 }
 
 
-class Request(msgspec.Struct, frozen=True, kw_only=True):
-    """Where the process that measures leaves its result, and how many rounds it takes."""
-
-    out: str
-    rounds: int = ROUNDS
-
-
 def check(
     pairs: Sequence[Pair] = PAIRS,
     rounds: int = ROUNDS,
@@ -219,13 +216,30 @@ def _alone(script: Script) -> tuple[float, int, Array]:
     return spent, *script.end(run, made)
 
 
-def main(path: Path) -> None:
-    """Do what a request asks."""
-    processes.settle()
-    request = msgspec.json.decode(path.read_bytes(), type=Request)
-    result = check(rounds=request.rounds, tell=lambda what: print(what, file=sys.stderr, flush=True))
-    write_json(Path(request.out), result)
+def in_a_process(out: Path, rounds: int) -> int:
+    """Run every pair in a process of its own, with one thread for every library; return its exit code.
+
+    Parameters
+    ----------
+    out : Path
+        Where the result is written.
+    rounds : int
+        As of `check`.
+    """
+    command = [sys.executable, "-m", __spec__.name, str(out), str(rounds)]
+    environment = {**os.environ, **ENVIRONMENT}
+    return subprocess.run(
+        command, stdin=subprocess.DEVNULL, stdout=STDERR, env=environment, check=False
+    ).returncode
+
+
+def main(out: Path, rounds: int) -> None:
+    """Write the result: deaf to Ctrl-C, gone with the parent, on one core."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    limit_and_die_with(os.getppid())
+    os.sched_setaffinity(0, {machine.cores()[-1]})
+    write_json(out, check(rounds=rounds, tell=lambda what: print(what, file=sys.stderr, flush=True)))
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), int(sys.argv[2]))

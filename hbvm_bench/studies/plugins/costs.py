@@ -1,6 +1,7 @@
 """What our methods cost inside other libraries: a plugin, the native kernel and the host's own, in turn.
 
-Every row is compiled and run once before it is timed; then all rows run one after
+This is no campaign: a row is a call of another library's solver, with our method in it, and not a method
+that the bench runs. Every row is compiled and run once before it is timed; then all rows run one after
 the other, several rounds of it, so that what else the machine does meets them all.
 """
 

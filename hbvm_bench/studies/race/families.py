@@ -1,8 +1,14 @@
-"""What runs under one name in the race, in the words of its pages."""
+"""Who takes part in the race, in the words of its pages: families, with a row for either kind of step."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from hbvm_bench.studies.race.results import OURS
+from hbvm_bench.campaign.file import Case
+from hbvm_bench.campaign.identity import fixed_step, is_ours, make_method
+from hbvm_bench.campaign.spec import parse_spec
+
+OURS = ""
+FIXED, OWN = "fixed step", "own steps"
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Family:
 
 FAMILIES: dict[str, Family] = {
     OURS: Family(
-        "HBVM and Gauss, fixed step",
+        "HBVM and Gauss",
         "HBVM, Gauss",
         "HBVM",
         "compiled here by numba for this processor, vector instructions as it has them",
@@ -64,3 +70,22 @@ FAMILIES: dict[str, Family] = {
         "a step loop in Python around a vector field compiled here by numba",
     ),
 }
+
+
+class Row(NamedTuple):
+    """The settings of a family with one kind of step; every row has the same number of settings."""
+
+    family: str
+    steps: str
+
+    @property
+    def title(self) -> str:
+        """Its name, for readers."""
+        return f"{FAMILIES[self.family].title}, {self.steps}"
+
+
+def row_of(case: Case) -> Row:
+    """Return the row that a setting belongs to."""
+    method = make_method(case.method)
+    family = OURS if is_ours(method) else parse_spec(case.method).name
+    return Row(family, FIXED if fixed_step(method) else OWN)

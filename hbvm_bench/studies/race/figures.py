@@ -9,16 +9,17 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import MUTED, Look
+from hbvm_bench.report.figures.style import MUTED, PAPER, Look
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES
-from hbvm_bench.studies.race.results import ENERGY, OURS, POSITION, Race, counts
+from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, Row
+from hbvm_bench.studies.race.results import ENERGY, POSITION, Race, counts
 from hbvm_bench.studies.race.tables import power
-from hbvm_bench.summaries.points import family_of, number
-from hbvm_bench.summaries.standings import TIME, among
+from hbvm_bench.summaries.points import family_of, front, number
+from hbvm_bench.summaries.standings import TIME
 
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
+DOTTED = (0, (1, 1.2))
 
 
 @styled
@@ -35,6 +36,8 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     shown = [record for record in race.records if counts(record)]
     if not shown:
         return None
+    rows = {row: [one for one in records if counts(one)] for row, records in race.rows.items()}
+    rows = {row: records for row, records in rows.items() if records}
     figure = new(10.4, 4.6)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
     times = [_seconds(record) for record in shown]
@@ -50,18 +53,19 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
         worst = max(_height(record, key) for record in shown)
         log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
         axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-        for family in race.families:
-            _draw(axes, among(shown, family), key, look)
+        for row, records in rows.items():
+            _draw(axes, row, records, key, look)
         axes.set(xlabel="seconds for the whole span (median)", title=f"{title}, relative")
-        panels.append(_panel(race, shown, f"{title}, relative", level, key, look))
-    _legend(side, [f for f in race.families if among(shown, f)], look)
+        panels.append(_panel(rows, f"{title}, relative", level, key, look))
+    _legend(side, list(dict.fromkeys(row.family for row in rows)), look)
     energy, position = (power(level) for level in levels)
     return picture(
         figure,
         f"work-precision-{race.key}",
         f"Work and precision: {race.title}",
-        "Every setting is a mark, lower left is better. Lines join the settings of a family that none of its "
-        f"others beats in both time and this error. Dashed: what is asked for, {energy} and {position}. Only "
+        "Every setting is a mark, lower left is better: a full one has a fixed step, an empty one chooses "
+        "its steps. Lines join the settings of a row that no other of it beats in both time and this error, "
+        f"dotted where steps are chosen. Dashed: what is asked for, {energy} and {position}. Only "
         "settings on the trajectory that was asked for are drawn.",
         _summary(race),
         Plot(panels, "points"),
@@ -69,20 +73,21 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
 
 
 def _panel(
-    race: Race, shown: Sequence[Record], title: str, level: float, key: str, look: Mapping[str, Look]
+    rows: Mapping[Row, Sequence[Record]], title: str, level: float, key: str, look: Mapping[str, Look]
 ) -> Panel:
     traces = []
+    shown = [record for records in rows.values() for record in records]
     for record in shown:
         text = record.case.method
         spot = np.array([_seconds(record)]), np.array([_error(record, key)])
         traces.append(Trace(look[family_of(record)].number, text, *spot))
-    for family in race.families:
-        line = front(among(shown, family), key)
+    for row, records in rows.items():
+        line = front(records, lambda o: (_seconds(o), _error(o, key)))
         if len(line) > 1:
             x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
             number = look[family_of(line[0])].number
-            note = "none of the family's settings is better in both"
-            traces.append(Trace(number, f"best of {FAMILIES[family].title}", x, y, "law", note))
+            note = "none of the row's settings is better in both"
+            traces.append(Trace(number, f"best of {row.title}", x, y, "law", note))
     times = [_seconds(record) for record in shown]
     asked_for = np.array([min(times), max(times)]), np.array([level, level])
     traces.append(Trace(0, "what is asked for", *asked_for, "law"))
@@ -94,30 +99,25 @@ def _panel(
     )
 
 
-def front(records: Sequence[Record], key: str) -> list[Record]:
-    """Return the settings that none other beats in both time and error, by ascending time."""
-    best: list[Record] = []
-    least = math.inf
-    for record in sorted(records, key=lambda o: (_seconds(o), _error(o, key))):
-        if _error(record, key) < least:
-            best.append(record)
-            least = _error(record, key)
-    return best
-
-
-def _draw(axes: Axes, records: Sequence[Record], key: str, look: Mapping[str, Look]) -> None:
-    if not records:
-        return
-    line = front(records, key)
+def _draw(axes: Axes, row: Row, records: Sequence[Record], key: str, look: Mapping[str, Look]) -> None:
+    line = front(records, lambda o: (_seconds(o), _error(o, key)))
     lead = look[family_of(records[0])].light
-    axes.plot([_seconds(o) for o in line], [_height(o, key) for o in line], color=lead, linewidth=1.1)
+    own = row.steps == OWN
+    axes.plot(
+        [_seconds(o) for o in line],
+        [_height(o, key) for o in line],
+        color=lead,
+        linewidth=1.1,
+        linestyle=DOTTED if own else "solid",
+    )
     for record in records:
-        own = look[family_of(record)]
+        mark = look[family_of(record)]
         axes.plot(
             [_seconds(record)],
             [_height(record, key)],
-            own.marker,
-            color=own.light,
+            mark.marker,
+            color=mark.light,
+            markerfacecolor=PAPER if own else mark.light,
             markersize=5.0 if record in line else 3.6,
             clip_on=False,
         )
@@ -145,17 +145,21 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
                 label = name if family == OURS else FAMILIES[family].title
                 own = look[name]
                 handles.append(Line2D([], [], color=own.light, marker=own.marker, markersize=5, label=label))
+    for steps, face, style in ((FIXED, MUTED, "solid"), (OWN, PAPER, DOTTED)):
+        handles.append(
+            Line2D([], [], color=MUTED, marker="o", mfc=face, markersize=5, linestyle=style, label=steps)
+        )
     axes.legend(handles=handles, loc="center left", borderaxespad=0.0, fontsize=8.5)
 
 
 def _summary(race: Race) -> str:
     energy, position = race.asked
     said = []
-    for family in race.families:
-        found = race.best(family, energy, position)
+    for row in race.rows:
+        found = race.best(row, energy, position)
         said.append(
-            f"{FAMILIES[family].title} does not reach it"
+            f"{row.title}, does not reach it"
             if found is None
-            else f"{FAMILIES[family].title} takes {_seconds(found):.3g} s"
+            else f"{row.title}, takes {_seconds(found):.3g} s"
         )
     return f"With an energy error of {energy:.0e} and a position error of {position:.0e}: {'; '.join(said)}."

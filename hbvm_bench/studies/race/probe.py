@@ -16,10 +16,10 @@ import msgspec
 
 from hbvm_bench.run.worker import ENVIRONMENT
 from hbvm_bench.store.records import decoded
+from hbvm_bench.studies.race.families import OURS
 from problems.errors import InputError
 
 PROBES = "compile_times.json"
-OURS = ""
 TIMES = 3
 SLOW = 5.0  # seconds; what takes longer is measured once
 LIMIT = 180.0  # seconds

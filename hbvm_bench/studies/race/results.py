@@ -5,13 +5,11 @@
     DIR/race.json                the records, with all timing samples
     DIR/compile_times.json       what fresh processes pay
     DIR/campaign.json, cases/    the store of the run, as every campaign has it
-
-Directories of races that were run before this layout have ``<problem>.json`` instead; see
-`hbvm_bench.studies.race.earlier`.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from statistics import median
 
@@ -22,7 +20,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Load, Record
-from hbvm_bench.studies.race import earlier
+from hbvm_bench.studies.race.families import OURS, Row, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
@@ -32,7 +30,6 @@ from problems.errors import InputError
 
 NAME = "race"
 FILE = "race.json"
-OURS = ""
 ERRORS = ENERGY, POSITION = ("energy_max", "position_end")
 
 
@@ -50,15 +47,12 @@ class Race:
         One per setting, in the order of declaration.
     probes : list of Probe
         Compile times; empty where they were not measured.
-    file : str
-        Where it stands in its directory.
     """
 
     entry: ProblemEntry
     run: Kept
     records: list[Record]
     probes: list[Probe] = field(default_factory=list)
-    file: str = FILE
 
     @property
     def key(self) -> str:
@@ -112,10 +106,18 @@ class Race:
         """When the first of its cases had ended."""
         return min(one.finished for one in self.records)
 
+    @cached_property
+    def rows(self) -> dict[Row, list[Record]]:
+        """The settings by row, in the order of declaration."""
+        found: dict[Row, list[Record]] = {}
+        for record in self.records:
+            found.setdefault(row_of(record.case), []).append(record)
+        return found
+
     @property
     def families(self) -> list[str]:
-        """The families in the order of declaration, `OURS` together."""
-        return standings.families(self.records)
+        """The families in the order of declaration."""
+        return list(dict.fromkeys(row.family for row in self.rows))
 
     @property
     def goals(self) -> list[Verdict]:
@@ -123,13 +125,13 @@ class Race:
         found = verdicts(self.run.index.campaign, self.run.records)
         return [one for one in found if name_of(one.entry) == self.key]
 
-    def of(self, family: str) -> list[Record]:
-        """Return the settings of a family."""
-        return standings.among(self.records, family)
+    def of(self, who: str | Row) -> list[Record]:
+        """Return the settings of a family, with fixed and with own steps, or of one of its rows."""
+        return self.rows.get(who, []) if isinstance(who, Row) else standings.among(self.records, who)
 
-    def best(self, family: str, energy: float, position: float) -> Record | None:
-        """Return the fastest setting of a family with errors at most these; ``None`` if there is none."""
-        return standings.best(self.of(family), {ENERGY: energy, POSITION: position})
+    def best(self, who: str | Row, energy: float, position: float) -> Record | None:
+        """Return the fastest setting of a family or a row with errors at most these, if there is one."""
+        return standings.best(self.of(who), {ENERGY: energy, POSITION: position})
 
     def at(self, family: str, energy: float, position: float) -> Comparison:
         """Compare the best settings of a peer and of ours at one accuracy."""
@@ -192,9 +194,7 @@ def by_kind(directory: Path) -> dict[str, list[Race]]:
 def _in(directory: Path) -> list[Race]:
     runs = kept.load(directory / FILE, NAME) if (directory / FILE).is_file() else []
     probes = load_probes(directory / PROBES) if (directory / PROBES).is_file() else []
-    found = {race.key: race for run, old in earlier.load(directory) for race in _races(run, old)}
-    found = {key: replace(race, file=f"{key}.json") for key, race in found.items()}
-    found |= {race.key: race for run in runs for race in _races(run, probes)}
+    found = {race.key: race for run in runs for race in _races(run, probes)}
     order = [name_of(entry) for entry in declared().entries()]
     return sorted(found.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))
 

@@ -6,9 +6,9 @@ from statistics import median
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
-from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.families import FAMILIES, OURS, Row
 from hbvm_bench.studies.race.probe import Probe
-from hbvm_bench.studies.race.results import ERRORS, OURS, Race, counts
+from hbvm_bench.studies.race.results import ERRORS, Race, counts
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.goals import table as goals_table
@@ -31,25 +31,32 @@ CACHES = {
 
 def headline(races: Sequence[Race]) -> Table:
     """Return every contest at the accuracy it asks for: the peers' best times over ours."""
+    ours = [row for row in dict.fromkeys(row for race in races for row in race.rows) if row.family == OURS]
     peers = [f for f in FAMILIES if f != OURS and any(f in race.families for race in races)]
     rows = []
     for race in races:
         energy, position = race.asked
-        ours = race.best(OURS, energy, position)
+        best = (race.best(row, energy, position) for row in ours)
         rows.append(
             (
                 race.title,
                 f"{power(energy)}, {power(position)}",
-                time_of(ours) if ours else "not reached",
+                *("not reached" if one is None else time_of(one) for one in best),
                 *(_headline_cell(race, peer, race.at(peer, energy, position)) for peer in peers),
             )
         )
     return Table(
         "How many times as long as our fastest setting each peer's fastest takes, at the same accuracy",
-        ("problem", "energy, position", "ours", *(FAMILIES[peer].short for peer in peers)),
+        (
+            "problem",
+            "energy, position",
+            *(f"ours, {row.steps}" for row in ours),
+            *(FAMILIES[peer].short for peer in peers),
+        ),
         rows,
-        "The median of the ratio within each interleaved round, in brackets its quartiles. A ratio below 1 "
-        "means that the peer is faster.",
+        "Ours is the faster of the two; so is a peer that has both kinds of step. The median of the ratio "
+        "within each interleaved round, in brackets its quartiles. A ratio below 1 means that the peer is "
+        "faster.",
     )
 
 
@@ -106,16 +113,15 @@ def fastest(race: Race) -> Table:
     energy, position = race.asked
     ours = race.best(OURS, energy, position)
     rows = []
-    for family in race.families:
-        found = race.best(family, energy, position)
-        name = FAMILIES[family].title
+    for row in race.rows:
+        found = race.best(row, energy, position)
         if found is None:
-            rows.append((name, _why_none(race, family), *[NONE] * 6))
+            rows.append((row.title, _why_none(race, row), *[NONE] * 6))
             continue
-        ratio = "1" if family == OURS else ratio_text(standings.compare(ours, found).ratio)
+        ratio = "1" if found is ours else ratio_text(standings.compare(ours, found).ratio)
         rows.append(
             (
-                name,
+                row.title,
                 found.case.method,
                 time_of(found),
                 *(format_metric(found, key) for key in SHOWN),
@@ -126,6 +132,7 @@ def fastest(race: Race) -> Table:
         f"The fastest settings with energy error ≤ {power(energy)} and position error ≤ {power(position)}",
         ("family", "setting", "time", "energy", "position", "steps", "evaluations", "× ours"),
         rows,
+        "Times ours: the faster of our two rows.",
         words=(0, 1),
     )
 
@@ -177,7 +184,7 @@ def defaults(race: Race) -> Table | None:
         "At the libraries' defaults, against the fastest of ours that is no worse in energy nor in position",
         ("default", "time", "energy", "position", "ours", "time", "× ours"),
         rows,
-        "A fixed step has no default: ours is chosen, theirs is not.",
+        "Ours is chosen from all its settings, theirs is not.",
         words=(0, 4),
     )
 
@@ -253,8 +260,8 @@ def _level_cell(found: Comparison) -> str:
     return ratio_text(found.ratio) if found.ours is not None else f"{time_of(found.theirs)} alone"
 
 
-def _why_none(race: Race, family: str) -> str:
-    records = race.of(family)
+def _why_none(race: Race, who: str | Row) -> str:
+    records = race.of(who)
     if records and all(one.result.outcome == "refused" for one in records):
         return "does not apply"
     if records and not any(counts(one) for one in records):

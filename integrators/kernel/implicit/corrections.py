@@ -22,11 +22,13 @@ implicit methods for ODEs*, Applied Numerical Mathematics 42 (2002) 29-45.
 from integrators.kernel.context import DIVERGED, DONE, NOT_FINITE
 from integrators.kernel.implicit.constants import BLENDED
 from integrators.kernel.implicit.jacobian import factorize, linearize, resolve
-from integrators.kernel.implicit.linear import factor, solve
-from integrators.kernel.implicit.stages import project, set_velocities
+from integrators.kernel.implicit.linear import eliminate
+from integrators.kernel.implicit.stages import at, project, set_velocities
+from integrators.kernel.native.attributes import address
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import get, put, splat8
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import evaluate
+from integrators.kernel.step.sweep import evaluate, multiply
 
 # Which Jacobian a correction takes: the one at hand, one at the mean of the stages, one at each stage.
 KEPT, MEAN, EACH = range(3)
@@ -34,51 +36,44 @@ KEPT, MEAN, EACH = range(3)
 
 @compiled
 def newton(ctx, m):
-    """Set the correction from the residual: one complex system per pair of eigenvalues."""
-    s, components = m.residual.shape
-    for j in range(s):
-        for d in range(components):
-            m.correction[j, d] = 0.0
-    for i in range(m.eigen_re.size):
-        for d in range(components):
-            a, b = 0.0, 0.0
-            for j in range(s):
-                a += m.left_re[i, j] * m.residual[j, d]
-                b += m.left_im[i, j] * m.residual[j, d]
-            m.v_re[d], m.v_im[d] = a, b
-        resolve(ctx, m, i)
-        for j in range(s):
-            a, b = m.right_re[j, i], m.right_im[j, i]
-            for d in range(components):
-                m.correction[j, d] += a * m.v_re[d] - b * m.v_im[d]
+    """Set the correction from the residual: one complex system per pair of eigenvalues, eight at a time."""
+    rows, padded, groups, pairs = ctx.rows, ctx.padded, m.groups, 2 * m.pair_groups
+    for part in range(m.parts):
+        source, target = m.residual + m.block * part, m.v + m.wide * part
+        multiply(m.left, pairs, groups, source, 8, target, 8, rows, padded)
+    for group in range(m.pair_groups):
+        resolve(ctx, m, group)
+    for part in range(m.parts):
+        source, target = m.v + m.wide * part, m.correction + m.block * part
+        multiply(m.right, groups, pairs, source, 8, target, 8, rows, padded)
 
 
 @compiled
 def blended(ctx, m):
-    """Set the correction from the residual: theta twice, on two rows at a time as real and imaginary part."""
-    s, components = m.residual.shape
-    rho = m.eigen_re[0]
-    for d in range(components):
-        for i in range(s):
-            total = 0.0
-            for j in range(s):
-                total += m.inverse[i, j] * m.residual[j, d]
-            m.correction[i, d] = rho * total
-    for i in range(0, s, 2):
-        j = min(i + 1, s - 1)
-        for d in range(components):
-            m.v_re[d] = m.residual[i, d] - m.correction[i, d]
-            m.v_im[d] = m.residual[j, d] - m.correction[j, d]
-        for twice in range(2):
-            resolve(ctx, m, 0)
-            if twice == 0:
-                for d in range(components):
-                    m.v_re[d] += m.correction[i, d]
-                    m.v_im[d] += m.correction[j, d]
-        for d in range(components):
-            m.correction[j, d] = m.v_im[d]
-        for d in range(components):
-            m.correction[i, d] = m.v_re[d]
+    """Set the correction from the residual: theta twice, on two groups as real and imaginary part."""
+    padded, groups, parts = ctx.padded, m.groups, m.parts
+    step = 8 * padded
+    for part in range(parts):
+        source, target = m.residual + m.block * part, m.correction + m.block * part
+        multiply(m.inverse, groups, groups, source, 8, target, 8, ctx.rows, padded)
+    for group in range(0, groups, 2):
+        two = min(2, groups - group)
+        for part in range(parts):
+            shift, v = m.block * part + step * group, m.v + m.wide * part
+            for i in range(0, 2 * step, 8):
+                put(v, i, splat8(0.0))
+            for i in range(0, two * step, 8):
+                put(v, i, get(m.residual, shift + i) - get(m.correction, shift + i))
+        resolve(ctx, m, 0)
+        for part in range(parts):
+            shift, v = m.block * part + step * group, m.v + m.wide * part
+            for i in range(0, two * step, 8):
+                put(v, i, get(v, i) + get(m.correction, shift + i))
+        resolve(ctx, m, 0)
+        for part in range(parts):
+            shift, v = m.block * part + step * group, m.v + m.wide * part
+            for i in range(0, two * step, 8):
+                put(m.correction, shift + i, get(v, i))
 
 
 @compiled
@@ -109,16 +104,19 @@ def full(ctx, m):
 
     One real matrix of s R rows; in the second-order form q' is eliminated.
     """
-    s, rows = m.gamma.shape[0], m.factor.size
+    s, rows = m.s, ctx.rows
     second = ctx.second
-    first = rows if second else 0
-    h = ctx.h
     n = s * rows
-    for r in range(n):
-        for c in range(n):
-            m.whole_re[r, c], m.whole_im[r, c] = 0.0, 0.0
-        m.whole_re[r, r] = 1.0
-        m.whole_x[r], m.whole_y[r] = m.residual[r // rows, first + r % rows], 0.0
+    width = 8 * ((n + 7) // 8)
+    whole, x = m.whole_matrix, m.whole_x
+    last = (m.parts - 1) * m.block
+    for i in range(0, n * width, 8):
+        put(whole, i, splat8(0.0))
+    for j in range(s):
+        for d in range(rows):
+            r = j * rows + d
+            whole[(width + 1) * r] = 1.0
+            x[r] = m.residual[last + at(m, j, d)]
     for stage in range(ctx.k):
         take_stage(ctx, m, stage)
         linearize(ctx, m, ctx.times[stage])
@@ -128,64 +126,54 @@ def full(ctx, m):
             known = 0.0
             if second:
                 for i in range(s):
-                    known += m.integrals[stage, i] * m.residual[i, c]
+                    known += m.integrals[stage, i] * m.residual[at(m, i, c)]
             for j in range(s):
-                part = m.moments[j, stage] * slope
+                part, row = m.moments[j, stage] * slope, width * (j * rows + r) + c
                 for i in range(s):
-                    m.whole_re[j * rows + r, i * rows + c] -= part * m.reach[stage, i]
-                m.whole_x[j * rows + r] += m.moments[j, stage] * (h * m.entries[e] * known)
+                    whole[row + i * rows] -= part * m.reach[stage, i]
+                x[j * rows + r] += m.moments[j, stage] * (ctx.h * m.entries[e] * known)
     m.factorizations += 1
-    if not factor(m.whole_re, m.whole_im, m.whole_pivots, 0, n):
+    if not eliminate(whole, n, width, x):
         return False
-    solve(m.whole_re, m.whole_im, m.whole_pivots, 0, m.whole_x, m.whole_y)
     for j in range(s):
         for d in range(rows):
-            m.correction[j, first + d] = m.whole_x[j * rows + d]
+            m.correction[last + at(m, j, d)] = x[j * rows + d]
     if second:
         for i in range(s):
             for d in range(rows):
-                total = 0.0
+                found = 0.0
                 for j in range(s):
-                    total += m.x[i, j] * m.correction[j, rows + d]
-                m.correction[i, d] = m.residual[i, d] + ctx.row_factor[d] * total
+                    found += m.x[i, j] * x[j * rows + d]
+                m.correction[at(m, i, d)] = m.residual[at(m, i, d)] + ctx.row_factor[d] * found
     return True
 
 
 @compiled
 def set_residual(ctx, m):
     """Evaluate the field; set the residual -F."""
-    s, components = m.gamma.shape
     evaluate(ctx)
-    project(ctx, m, m.residual, components - m.factor.size)
+    project(ctx, m, m.residual)
     if ctx.second:
-        for j in range(s):
-            for d in range(m.factor.size, components):
-                m.correction[j, d] = m.gamma[j, d]
-        set_velocities(ctx, m, m.correction)
-        for j in range(s):
-            for d in range(m.factor.size):
-                m.residual[j, d] = m.correction[j, d]
-    for j in range(s):
-        for d in range(components):
-            m.residual[j, d] -= m.gamma[j, d]
+        set_velocities(ctx, m, m.gamma, m.residual)
+    for i in range(0, m.parts * m.block, 8):
+        put(m.residual, i, get(m.residual, i) - get(m.gamma, i))
 
 
 @compiled
-def is_finite(values):
-    """Whether all values are finite numbers."""
-    total = 0.0
-    for value in values.flat:
-        total += value * 0.0
-    return total == 0.0
+def is_finite(values, count):
+    """Whether all of ``count`` values are finite numbers."""
+    found = 0.0
+    for i in range(count):
+        found += values[i] * 0.0
+    return found == 0.0
 
 
 @compiled
 def correct(ctx, m, which):
     """Correct gamma once; return DONE, DIVERGED or NOT_FINITE."""
-    s, components = m.gamma.shape
     m.tried += 1
     set_residual(ctx, m)
-    if not is_finite(m.residual):
+    if not is_finite(m.residual, m.parts * m.block):
         return NOT_FINITE
     possible = True
     if which == EACH and m.whole > 0:
@@ -203,9 +191,8 @@ def correct(ctx, m, which):
             else:
                 newton(ctx, m)
     if not possible:
-        return DIVERGED if is_finite(m.entries) else NOT_FINITE
-    for j in range(s):
-        for d in range(components):
-            m.gamma[j, d] += m.correction[j, d]
+        return DIVERGED if is_finite(address(m.entries), m.entries.size) else NOT_FINITE
+    for i in range(0, m.parts * m.block, 8):
+        put(m.gamma, i, get(m.gamma, i) + get(m.correction, i))
     ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
     return DONE

@@ -21,10 +21,7 @@ class Matrices(Protocol):
     entry_columns: Any
     entries: Any
     factor: Any
-    eigen_re: Any
-    eigen_im: Any
-    b_re: Any
-    b_im: Any
+    b: Any
 
 
 class Factors:
@@ -34,20 +31,20 @@ class Factors:
     ----------
     arrays : Matrices
         The solver's memory.
-    second : bool
-        Second-order form: the matrices are I - z_i^2 h^2 J diag(q'/p).
+    values : ndarray of complex
+        The eigenvalues; in the second-order form, where the matrices are I - z_i^2 h^2 J diag(q'/p), their
+        squares. A single one is real.
 
     Attributes
     ----------
     address : int
-        Of the C function ``int64(what, pair)`` that works on it.
+        Of the C function ``int64(what, group)`` that works on it.
     error : BaseException or None
         What went wrong last in a call, which compiled code takes for a failure.
     """
 
-    def __init__(self, arrays: Matrices, *, second: bool):
-        self._arrays = arrays
-        self._power = 2 if second else 1
+    def __init__(self, arrays: Matrices, values: Complex):
+        self._arrays, self._values = arrays, values
         rows, columns = arrays.entry_rows, arrays.entry_columns
         n = arrays.factor.size
         self._size = n
@@ -59,12 +56,12 @@ class Factors:
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
         self.address: int = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 
-    def _called(self, what: int, pair: int) -> int:
+    def _called(self, what: int, group: int) -> int:
         try:
             if what == FACTORIZE:
                 self._factorize()
             else:
-                self._solve(pair)
+                self._solve(group)
         except BaseException as error:  # nothing may be raised through compiled code
             self.error = error
             return 0
@@ -75,9 +72,8 @@ class Factors:
         slopes = a.entries * a.factor[a.entry_columns]
         if not np.isfinite(slopes).all():
             raise FloatingPointError("the Jacobian is not finite")
-        values = (a.eigen_re + 1j * a.eigen_im) ** self._power
         self._solvers = []
-        for value in values:
+        for value in self._values:
             real = value.imag == 0.0
             factor = -value.real if real else -value
             self._solvers.append(self._factors(factor * slopes))
@@ -94,15 +90,21 @@ class Factors:
 
         return splu(self._pattern.matrix(entries)).solve
 
-    def _solve(self, pair: int) -> None:
-        x_re, x_im = self._arrays.b_re, self._arrays.b_im
-        solve = self._solvers[pair]
-        if self._arrays.eigen_im[pair] == 0.0:
-            x = solve(np.stack([x_re, x_im], axis=1))
-            x_re[:], x_im[:] = x[:, 0], x[:, 1]
-        else:
-            x = solve(x_re + 1j * x_im)
-            x_re[:], x_im[:] = x.real, x.imag
+    def _solve(self, group: int) -> None:
+        """Replace eight vectors, real parts and then imaginary parts, by what their matrices make of them."""
+        x, y = self._arrays.b.reshape(2, -1, 8)[:, : self._size]
+        if len(self._solvers) == 1 and self._values[0].imag == 0.0:  # all belong to the one matrix
+            found = self._solvers[0](np.concatenate([x, y], axis=1))
+            x[:], y[:] = found[:, :8], found[:, 8:]
+            return
+        for lane, pair in enumerate(range(8 * group, min(8 * group + 8, len(self._solvers)))):
+            solve, real = self._solvers[pair], self._values[pair].imag == 0.0
+            if real:
+                found = solve(np.stack([x[:, lane], y[:, lane]], axis=1))
+                x[:, lane], y[:, lane] = found[:, 0], found[:, 1]
+            else:
+                found = solve(x[:, lane] + 1j * y[:, lane])
+                x[:, lane], y[:, lane] = found.real, found.imag
 
 
 class _Pattern:

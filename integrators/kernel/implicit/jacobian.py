@@ -4,7 +4,8 @@ from integrators.kernel.implicit.factors import FACTORIZE, SOLVE
 from integrators.kernel.implicit.linear import factor, solve
 from integrators.kernel.native.attributes import address
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_factors, call_field
+from integrators.kernel.simd.lanes import fma
+from integrators.kernel.simd.memory import call_factors, call_field, get, put, splat8, spread
 
 STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
 SMALL = 1e-5  # of the largest component: no difference is taken over less
@@ -30,14 +31,14 @@ def differences(ctx, m, t):
             stages[lanes * d + l] = m.state[d]
     call_field(ctx.field, times, stages, par, values)
     for d in range(rows):
-        m.b_re[d] = values[lanes * d]
+        m.slopes[d] = values[lanes * d]
     for first in range(0, rows, lanes):
         count = min(lanes, rows - first)
         for l in range(count):
             d = first + l
             size = max(abs(m.state[d]), SMALL * largest)
             if ctx.second == 0:
-                size = max(size, min(h * abs(m.b_re[d]), largest))
+                size = max(size, min(h * abs(m.slopes[d]), largest))
             moved = m.state[d] + STEP * (size if size > 0.0 else 1.0)
             stages[lanes * d + l] = moved
         call_field(ctx.field, times, stages, par, values)
@@ -45,7 +46,7 @@ def differences(ctx, m, t):
             d = first + l
             width = stages[lanes * d + l] - m.state[d]
             for r in range(rows):
-                m.entries[rows * r + d] = (values[lanes * r + l] - m.b_re[r]) / width
+                m.entries[rows * r + d] = (values[lanes * r + l] - m.slopes[r]) / width
             stages[lanes * d + l] = m.state[d]
 
 
@@ -68,21 +69,21 @@ def contraction(m):
     """Estimate the factor of one fixed-point iteration, but for X_s, from powers of the Jacobian."""
     rows = m.factor.size
     for d in range(rows):
-        m.b_re[d] = 1.0 + 0.0625 * ((7 * d) % 13)
+        m.slopes[d] = 1.0 + 0.0625 * ((7 * d) % 13)
     growth = 1.0
     for power in range(2 * POWERS):
         norm = 0.0
         for d in range(rows):
-            m.b_im[d] = 0.0
+            m.next_slopes[d] = 0.0
         for i in range(m.entries.size):
             c = m.entry_columns[i]
-            m.b_im[m.entry_rows[i]] += m.entries[i] * (m.factor[c] * m.b_re[c])
+            m.next_slopes[m.entry_rows[i]] += m.entries[i] * (m.factor[c] * m.slopes[c])
         for d in range(rows):
-            norm = max(norm, abs(m.b_im[d]))
+            norm = max(norm, abs(m.next_slopes[d]))
         if not 0.0 < norm < float("inf"):
             return norm
         for r in range(rows):
-            m.b_re[r] = m.b_im[r] / norm
+            m.slopes[r] = m.next_slopes[r] / norm
         if power >= POWERS:
             growth *= norm
     return growth ** (1.0 / POWERS)
@@ -95,28 +96,30 @@ def factorize(ctx, m):
     In the second-order form, I - z_i^2 h^2 J diag(q'/p). Where a function keeps
     the factors, it is done there.
     """
-    rows = m.factor.size
+    rows = ctx.rows
     m.factored = 0
     m.factorizations += 1
     if m.factors:
         if not call_factors(m.factors, FACTORIZE, 0):
             return False
     else:
-        for i in range(m.eigen_re.size):
-            start = i * rows
-            z, w = m.eigen_re[i], m.eigen_im[i]
-            if ctx.second:
-                z, w = z * z - w * w, 2.0 * z * w
-            for r in range(start, start + rows):
-                for c in range(rows):
-                    m.lu_re[r, c], m.lu_im[r, c] = 0.0, 0.0
-                m.lu_re[r, r - start] = 1.0
+        size = 16 * rows * rows
+        for group in range(m.pair_groups):
+            lu = m.lu + size * group
+            begins, ends = m.begins + rows * group, m.ends + rows * group
+            z, w = get(m.powers, 16 * group), get(m.powers, 16 * group + 8)
+            for i in range(0, size, 8):
+                put(lu, i, splat8(0.0))
+            for r in range(rows):
+                put(lu, 16 * (rows + 1) * r, splat8(1.0))
+                begins[r] = ends[r] = r
             for j in range(m.entries.size):
-                c = m.entry_columns[j]
-                slope = m.entries[j] * m.factor[c]
-                m.lu_re[start + m.entry_rows[j], c] -= z * slope
-                m.lu_im[start + m.entry_rows[j], c] -= w * slope
-            if not factor(m.lu_re, m.lu_im, m.pivots, start, rows):
+                r, c = m.entry_rows[j], m.entry_columns[j]
+                i, slope = 16 * (rows * r + c), splat8(m.entries[j] * m.factor[c])
+                put(lu, i, fma(-z, slope, get(lu, i)))
+                put(lu, i + 8, fma(-w, slope, get(lu, i + 8)))
+                begins[r], ends[r] = min(begins[r], c), max(ends[r], c)
+            if not factor(lu, m.pivots + rows * group, begins, ends, rows):
                 return False
     m.factored = 1
     m.factored_h = ctx.h
@@ -124,33 +127,37 @@ def factorize(ctx, m):
 
 
 @compiled
-def resolve(ctx, m, i):
-    """Replace v by (I - h z_i J)^{-1} v, J the Jacobian of the first-order form, z_i an eigenvalue.
+def resolve(ctx, m, group):
+    """Replace eight vectors v by (I - h z_i J)^{-1} v, J the Jacobian of the first-order form.
 
-    In the second-order form, where J couples q' to p and p' to q only, elimination of
-    the first leaves one system of R rows.
+    z_i are the eigenvalues of a group. In the second-order form, where J couples q' to p and p' to
+    q only, elimination of the first leaves systems of R rows.
     """
-    rows = m.factor.size
-    second = ctx.second
-    h = ctx.h
-    z, w = m.eigen_re[i], m.eigen_im[i]
-    first = rows if second else 0
-    for d in range(rows):
-        m.b_re[d], m.b_im[d] = m.v_re[first + d], m.v_im[first + d]
-    if second:
+    rows, h = ctx.rows, ctx.h
+    step = 8 * m.padded
+    v = m.v + 2 * step * group
+    last = v + (m.parts - 1) * m.wide
+    x, y = m.b, m.b + step
+    for i in range(0, 2 * step, 8):
+        put(x, i, get(last, i))
+    if ctx.second:
+        z, w = get(m.eigen, 16 * group), get(m.eigen, 16 * group + 8)
         for j in range(m.entries.size):
-            r, c, slope = m.entry_rows[j], m.entry_columns[j], h * m.entries[j]
-            m.b_re[r] += slope * (z * m.v_re[c] - w * m.v_im[c])
-            m.b_im[r] += slope * (z * m.v_im[c] + w * m.v_re[c])
+            r, c, slope = 8 * m.entry_rows[j], 8 * m.entry_columns[j], splat8(h * m.entries[j])
+            a, b = get(v, c), get(v, step + c)
+            put(x, r, fma(slope, fma(z, a, -w * b), get(x, r)))
+            put(y, r, fma(slope, fma(z, b, w * a), get(y, r)))
     if m.factors:
-        call_factors(m.factors, SOLVE, i)
+        call_factors(m.factors, SOLVE, group)
     else:
-        solve(m.lu_re, m.lu_im, m.pivots, i * rows, m.b_re, m.b_im)
-    for d in range(rows):
-        m.v_re[first + d], m.v_im[first + d] = m.b_re[d], m.b_im[d]
-    if second:
+        first = rows * group
+        solve(m.lu + 16 * rows * first, m.pivots + first, m.begins + first, m.ends + first, rows, x, y)
+    for i in range(0, 2 * step, 8):
+        put(last, i, get(x, i))
+    if ctx.second:
+        z, w = get(m.eigen, 16 * group), get(m.eigen, 16 * group + 8)
         slopes = ctx.row_factor
         for d in range(rows):
-            kh = slopes[d]
-            m.v_re[d] += kh * (z * m.b_re[d] - w * m.b_im[d])
-            m.v_im[d] += kh * (z * m.b_im[d] + w * m.b_re[d])
+            kh, a, b = spread(slopes, d), get(x, 8 * d), get(y, 8 * d)
+            put(v, 8 * d, fma(kh, fma(z, a, -w * b), get(v, 8 * d)))
+            put(v, step + 8 * d, fma(kh, fma(z, b, w * a), get(v, step + 8 * d)))

@@ -7,6 +7,7 @@ from integrators.kernel.implicit.jacobian import contraction, linearize
 from integrators.kernel.implicit.stages import (
     FLOORED,
     STRICT,
+    at,
     changes,
     measure,
     project,
@@ -16,6 +17,7 @@ from integrators.kernel.implicit.stages import (
     set_velocities,
 )  # fmt: skip
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import get, largest, put, splat8, spread
 from integrators.kernel.step.begin import FARTHEST, INFINITY, prepare, start_elsewhere
 from integrators.kernel.step.size import STAGNATION, is_rounding
 
@@ -28,9 +30,7 @@ FORGET = 0.7  # of the rate of contraction, from one step to the next
 SLOW = 0.2  # a Jacobian whose corrections contract no better is replaced at the next step
 HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
-# Contraction of the fixed-point iteration at which that is to be tried again: with steps of one length, and
-# with varying ones, which it may shorten a little.
-GENTLE, GENTLE_VARYING = 0.25, 0.5
+GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
 CALM = 1e-3  # sizes are measured until changes are this small
 OFF = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
 
@@ -88,15 +88,15 @@ def iterate(ctx, m, which):
 @compiled
 def nearer(ctx, m):
     """Whether the extrapolated coefficients were nearer to the solution than constant stages."""
-    far, still = 0.0, 0.0
+    far, still = splat8(0.0), splat8(0.0)
     scale = ctx.floored
-    for d in range(m.factor.size):
-        a, b = 0.0, 0.0
-        for j in range(m.gamma.shape[0]):
-            a = max(a, abs(m.gamma[j, d] - m.predicted[j, d]))
-            b = max(b, abs(m.gamma[j, d]))
-        far, still = max(far, a * scale[d]), max(still, b * scale[d])
-    return far < still
+    for d in range(ctx.rows):
+        for group in range(m.groups):
+            i = 8 * (m.padded * group + d)
+            found = get(m.gamma, i)
+            far = max(far, abs(found - get(m.predicted, i)) * spread(scale, d))
+            still = max(still, abs(found) * spread(scale, d))
+    return largest(far) < largest(still)
 
 
 @compiled
@@ -118,11 +118,12 @@ def is_scattered(m):
     The stage equations have other roots than the one that tends to the solution with h, some
     of them beyond a pole; a correction that follows the Jacobian of every stage may find them.
     """
-    s, components = m.gamma.shape
     first, last = 0.0, 0.0
-    for d in range(components):
-        first += abs(m.gamma[0, d])
-        last += abs(m.gamma[s - 1, d])
+    for part in range(m.parts):
+        gamma = m.gamma + m.block * part
+        for d in range(m.rows):
+            first += abs(gamma[8 * d])
+            last += abs(gamma[at(m, m.s - 1, d)])
     return last > OFF * first
 
 
@@ -154,9 +155,9 @@ def solve_step(ctx, m, started):
     set_factor(ctx, m)
     extrapolated = ctx.predicted
     if extrapolated:
-        project(ctx, m, m.predicted, m.gamma.shape[1] - m.factor.size)
+        project(ctx, m, m.predicted)
         if ctx.second:
-            set_velocities(ctx, m, m.predicted)
+            set_velocities(ctx, m, m.predicted, m.predicted)
     fresh = m.linearized == 0 or m.stale == 1 or m.since >= OLDEST
     use = extrapolated and (started or m.predict)
     which, trying = KEPT, 1
@@ -166,9 +167,8 @@ def solve_step(ctx, m, started):
             renew(ctx, m)
         if m.factored_h != h:
             m.factored = 0
-        for j in range(m.gamma.shape[0]):
-            for d in range(m.gamma.shape[1]):
-                m.gamma[j, d] = m.predicted[j, d] if use else 0.0
+        for i in range(0, m.parts * m.block, 8):
+            put(m.gamma, i, get(m.predicted, i) if use else splat8(0.0))
         outcome = iterate(ctx, m, which)
         trying = 0
         if outcome != DONE:
@@ -196,8 +196,7 @@ def solve_step(ctx, m, started):
         longer = abs(h / m.contraction_h)
         if ctx.second:
             longer *= longer
-        gentle = GENTLE_VARYING if ctx.varying else GENTLE
-        if ctx.left < 0 and longer * m.contraction < gentle:
+        if ctx.left < 0 and longer * m.contraction < GENTLE:
             ctx.implicit = 0
     ctx.last = m.change
     m.corrections += m.tried

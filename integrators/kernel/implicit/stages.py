@@ -1,39 +1,28 @@
 """Between coefficients and stages, in the memory of a trajectory's context.
 
-A solver's unknowns are the coefficients gamma (s x R) of the field, not the
-field's values: where h J is large, values carry rounding errors of size
-h |J| eps, which the corrections take out of gamma.
+A solver's unknowns are the coefficients gamma of the field, not the field's values: where h J is
+large, values carry rounding errors of size h |J| eps, which the corrections take out of gamma.
+
+Coefficients lie as stages do: in groups of eight, a row for each component (`Workspace.groups`,
+`Workspace.block`). The second-order form has two blocks, the coefficients of q' and then those of
+p'; what is said of the field's coefficients is about the last block, what moves stages is the first.
 """
 
 from integrators.kernel.native.attributes import address
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
-from integrators.kernel.simd.memory import get, put, splat8, spread
+from integrators.kernel.simd.memory import get, larger, largest, put, splat8, spread
 from integrators.kernel.step.size import change, enter_size, forget_sizes, invert_sizes, stage_size
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import multiply
 
-LOW = 3  # columns of a stage table that hold the low parts of the first ones
 STRICT, FLOORED = range(2)  # relative to a block, and relative to a block that is raised if it is small
 
 
 @compiled
-def groups(count):
-    """Vectors of 8 that hold ``count`` numbers."""
-    return (count + 7) // 8
-
-
-@compiled
-def pack(ctx, m, low, first):
-    """Write gamma's components from ``first`` on as stage memory has them, the first ``low`` rows twice."""
-    padded = ctx.padded
-    s, rows = m.gamma.shape[0], m.factor.size
-    for j in range(8 * groups(low + s)):
-        i = j if j < low else j - low
-        start = padded * 8 * (j // 8) + j % 8
-        for d in range(rows):
-            # What stands in unused places is multiplied by zero, which a NaN survives.
-            m.packed[start + 8 * d] = m.gamma[i, first + d] if i < s else 0.0
+def at(m, j, d):
+    """Return where the coefficient of degree j of component d is in a block."""
+    return 8 * (m.padded * (j // 8) + d) + j % 8
 
 
 @compiled
@@ -45,11 +34,12 @@ def set_stages(ctx, m):
     """
     rows, padded = ctx.rows, ctx.padded
     lanes, chunks = ctx.lanes, ctx.chunks
-    s = m.gamma.shape[0]
-    low = min(LOW, s)
-    pack(ctx, m, low, 0)
+    for i in range(0, m.block, 8):
+        put(m.moving, 8 * padded + i, get(m.gamma, i))
+    for i in range(0, 8 * padded, 8):  # for the low parts of the table's first columns
+        put(m.moving, i, get(m.gamma, i))
     moves = ctx.sums
-    multiply(m.stage_table, chunks, groups(low + s), m.packed, 8, moves, lanes, rows, padded)
+    multiply(m.stage_table, chunks, m.groups + 1, m.moving, 8, moves, lanes, rows, padded)
     state, error = ctx.row_state, ctx.row_error
     h = splat8(ctx.h)
     for chunk in range(chunks):
@@ -61,45 +51,35 @@ def set_stages(ctx, m):
 
 
 @compiled
-def project(ctx, m, target, first):
-    """Set the components of ``target`` from ``first`` on to the coefficients of the field's values."""
-    rows, padded = ctx.rows, ctx.padded
-    s = target.shape[0]
-    multiply(m.projection, groups(s), ctx.chunks, ctx.values, ctx.lanes, m.packed, 8, rows, padded)
-    for j in range(s):
-        start = padded * 8 * (j // 8) + j % 8
-        for d in range(rows):
-            target[j, first + d] = m.packed[start + 8 * d]
+def project(ctx, m, target):
+    """Set the field's coefficients from its values."""
+    last = target + (m.parts - 1) * m.block
+    multiply(m.projection, m.groups, ctx.chunks, ctx.values, ctx.lanes, last, 8, ctx.rows, ctx.padded)
 
 
 @compiled
-def set_velocities(ctx, m, target):
-    """Set the first half of ``target``, in the second-order form, to what its second half makes of q'."""
-    rows, s = m.factor.size, m.gamma.shape[0]
+def set_velocities(ctx, m, source, target):
+    """Set the coefficients of q' in ``target``, in the second-order form, from those of p' in ``source``."""
+    rows, padded = ctx.rows, ctx.padded
     h = ctx.h
     drift, low, slope = ctx.row_drift, ctx.row_drift_low, ctx.row_factor
+    multiply(m.derivatives, m.groups, m.groups, source + m.block, 8, target, 8, rows, padded)
     for d in range(rows):
-        kh = slope[d]
-        for i in range(s):
-            total = 0.0
-            for j in range(s):
-                total += m.x[i, j] * target[j, rows + d]
-            target[i, d] = kh * total
-        target[0, d] += (drift[d] + low[d]) / h
+        for group in range(m.groups):
+            i = 8 * (padded * group + d)
+            put(target, i, spread(slope, d) * get(target, i))
+        target[8 * d] += (drift[d] + low[d]) / h
 
 
 @compiled
 def set_values(ctx, m):
     """Values = the polynomial with the coefficients gamma at the nodes; and the step's increments."""
-    s, components = m.gamma.shape
-    h = ctx.h
-    for d in range(components):
-        m.increment[d] = h * m.gamma[0, d]
-    pack(ctx, m, 0, components - m.factor.size)
-    multiply(
-        m.basis, ctx.chunks, groups(s), m.packed, 8,
-        ctx.values, ctx.lanes, ctx.rows, ctx.padded,
-    )  # fmt: skip
+    rows, padded = ctx.rows, ctx.padded
+    for part in range(m.parts):
+        for d in range(rows):
+            m.increment[rows * part + d] = ctx.h * m.gamma[m.block * part + 8 * d]
+    last = m.gamma + (m.parts - 1) * m.block
+    multiply(m.basis, ctx.chunks, m.groups, last, 8, ctx.values, ctx.lanes, rows, padded)
 
 
 @compiled
@@ -108,7 +88,7 @@ def set_factor(ctx, m):
     h = ctx.h
     second = ctx.second
     row_factor = ctx.row_factor
-    for d in range(m.factor.size):
+    for d in range(ctx.rows):
         m.factor[d] = h * row_factor[d] if second else h
 
 
@@ -128,20 +108,20 @@ def measure(ctx, m):
         forget_sizes(ctx)
         for d in range(ctx.rows):
             drift = abs(ctx.row_drift[d])
-            enter_size(ctx, d, max(drift, abs(m.factor[d] * m.gamma[0, ctx.rows + d])))
+            enter_size(ctx, d, max(drift, abs(m.factor[d] * m.gamma[m.block + 8 * d])))
         invert_sizes(ctx, address(m.slope_strict), address(m.slope_floored))
 
 
 @compiled
 def changes(ctx, m, kind):
     """Return the largest change by the last correction, relative to blocks, small ones raised or not."""
-    top = change(ctx, ctx.strict if kind == STRICT else ctx.floored)
-    rows = m.factor.size
+    found = change(ctx, ctx.strict if kind == STRICT else ctx.floored)
     if ctx.second:
-        for d in range(rows):
+        top = splat8(found)
+        for d in range(ctx.rows):
             scale = abs(m.factor[d]) * (m.slope_strict[d] if kind == STRICT else m.slope_floored[d])
-            for j in range(m.correction.shape[0]):
-                moved = abs(m.correction[j, rows + d]) * scale
-                if not moved <= top:
-                    top = moved
-    return top
+            for group in range(m.groups):
+                i = m.block + 8 * (m.padded * group + d)
+                top = larger(top, abs(get(m.correction, i)) * scale)
+        found = largest(top)
+    return found

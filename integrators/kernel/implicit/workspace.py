@@ -1,7 +1,7 @@
 """The implicit solver's code for a system, and its memory for a trajectory."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from integrators.kernel.implicit.constants import BLENDED, NEWTON, method, solve
 from integrators.kernel.implicit.factors import Factors
 from integrators.kernel.native import binary, store
 from integrators.kernel.native import field as fields
-from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table
+from integrators.kernel.native.memory import Array, Integer, Memory, Real, Table, aligned
 from integrators.kernel.tables import packed
 from problems import emit
 from problems.calculus.jacobian import Jacobian
@@ -21,6 +21,7 @@ from problems.systems.base import System
 Integers = NDArray[np.int64]
 
 LARGEST_DENSE = 64  # rows up to which the factors are dense and in the solver's memory
+BUSY = 20.0  # Newton corrections of a step to aim at, at most, where steps vary
 LARGEST_WHOLE = 128  # rows up to which there is a matrix with a Jacobian for each stage
 
 
@@ -96,9 +97,9 @@ SOLVERS = {
 class Workspace(Memory):
     """The memory of a solver for the steps of one context: degree s, R rows, p pairs of eigenvalues of X_s.
 
-    There are D = `dim` unknowns of each degree: R, and 2 R in the second-order form, the
-    coefficients of q' and then those of p'. A stage table takes coefficients to stages, in the
-    packing of `integrators.kernel.tables`; its first columns are the low parts of the next.
+    There are R unknowns of each degree, and in the second-order form 2 R, in two blocks: the
+    coefficients of q' and then those of p'; see `integrators.kernel.implicit.stages`. Tables are packed as
+    in `integrators.kernel.tables`.
 
     Parameters
     ----------
@@ -118,37 +119,43 @@ class Workspace(Memory):
     k = Integer()
     s = Integer()
     dim = Integer()
-    pairs = Integer()
+    parts = Integer()  # blocks of coefficients: 2 in the second-order form
+    groups = Integer()  # of eight coefficients
+    block = Integer()  # doubles in a block
+    pair_groups = Integer()  # of eight pairs of eigenvalues
+    wide = Integer()  # doubles that such a group's vectors take, in all groups
     entry_count = Integer()
-    factored_rows = Integer()  # p R, or 0
+    factored = Integer()  # 1: the factors are those of the entries and of `factored_h`
+    lu_size = Integer()
+    lu_rows = Integer()
     whole = Integer()  # s R, rows of a matrix with a Jacobian for each stage; 0 if that is too large
-    packed_groups = Integer()
+    whole_size = Integer()
     trial_size = Integer()
 
     # --- of the method ---
-    stage_table = Array()
-    projection = Array()  # values -> coefficients, packed
-    basis = Array()  # coefficients -> the polynomial at the nodes, packed
+    stage_table = Array()  # coefficients to stages, the low parts of its first columns before it
+    projection = Array()  # values -> coefficients
+    basis = Array()  # coefficients -> the polynomial at the nodes
     weights = Array()  # of the stages in a mean, one per lane of stage memory
     integrals = Table("k", "s")  # the stage table
     reach = Table("k", "s")  # the same; in the second-order form times X_s
     moments = Table("s", "k")  # the projection
-    left_re = Table("pairs", "s")  # rows of the inverse of the eigenvectors' matrix
-    left_im = Table("pairs", "s")
-    right_re = Table("s", "pairs")  # eigenvectors, twice where a conjugate belongs to them
-    right_im = Table("s", "pairs")
-    eigen_re = Table("pairs")
-    eigen_im = Table("pairs")
+    left = Array()  # rows of the inverse of the eigenvectors' matrix, eight real parts, eight imaginary ones
+    right = Array()  # eigenvectors, in the same way, twice where a conjugate belongs to them
+    eigen = Array()  # eigenvalues: eight real parts, eight imaginary ones
+    powers = Array()  # the same; in the second-order form their squares
     x = Table("s", "s")  # X_s
-    inverse = Table("s", "s")  # X_s^{-1}
+    derivatives = Array()  # X_s, packed
+    inverse = Array()  # rho X_s^{-1}, of blended iteration
     radius = Real()  # part of X_s in a fixed-point iteration's contraction: its spectral radius, or squared
 
     # --- the unknowns ---
-    gamma = Table("s", "dim")
+    gamma = Array("parts", "block")
     increment = Table("dim")  # h gamma_0, what the step adds to the state
-    predicted = Table("s", "dim")
-    residual = Table("s", "dim")
-    correction = Table("s", "dim")
+    predicted = Array("parts", "block")
+    residual = Array("parts", "block")
+    correction = Array("parts", "block")
+    moving = Array("parts", "block", 2)  # coefficients in front of the stage table
     factor = Table("rows")  # h, or h^2 q'/p in the second-order form
     slope_strict = Table("rows")  # 1 / size of a row's block in h q', second-order form
     slope_floored = Table("rows")  # small blocks raised
@@ -163,26 +170,22 @@ class Workspace(Memory):
     entry_columns = Table("entry_count", of=int)
     entries = Table("entry_count")
     state = Table("rows")  # where the Jacobian is taken
-    lu_re = Table("factored_rows", "rows")
-    lu_im = Table("factored_rows", "rows")
-    pivots = Table("factored_rows", of=int)
-    whole_re = Table("whole", "whole")
-    whole_im = Table("whole", "whole")
-    whole_pivots = Table("whole", of=int)
-    whole_x = Table("whole")
-    whole_y = Table("whole")
+    lu = Array("lu_size")  # factors of eight matrices at a time; see `integrators.kernel.implicit.linear`
+    pivots = Array("lu_rows", of=int)
+    begins = Array("lu_rows", of=int)
+    ends = Array("lu_rows", of=int)
+    whole_matrix = Array("whole_size")
+    whole_x = Array("whole")
     linearized = Integer()  # 1: the entries are those at `state`
     stale = Integer()  # 1: take a new Jacobian at the next step
     since = Integer()  # steps since the Jacobian was taken
-    factored = Integer()  # 1: the factors are those of the entries and of the step ...
-    factored_h = Real()  # ... of this length
+    factored_h = Real()  # length of the step that the factors are for
 
     # --- room ---
-    b_re = Table("rows")  # right-hand side and solution of a system
-    b_im = Table("rows")
-    v_re = Table("dim")  # a vector of the first-order form
-    v_im = Table("dim")
-    packed = Array(8, "padded", "packed_groups")  # coefficients in the packing of stage memory
+    slopes = Table("rows")
+    next_slopes = Table("rows")
+    v = Array("parts", "wide")  # vectors of the first-order form, one for each pair
+    b = Array(16, "padded")  # right-hand sides and solutions of eight systems
     trial = Array("trial_size")  # one block of stages, its times, and the field there
 
     # --- counters ---
@@ -197,35 +200,58 @@ class Workspace(Memory):
         m = method(c.k, c.s, shape.second, c.lanes, solver_of(c.s, kind))
         rows, columns = linearization.places(shape.rows)
         pairs, whole, padded = m.eigenvalues.size, c.s * shape.rows, -(-shape.rows // 8) * 8
-        elsewhere = shape.rows > LARGEST_DENSE
+        parts, groups, pair_groups = 2 if shape.second else 1, -(-c.s // 8), -(-pairs // 8)
+        kept = 0 if shape.rows > LARGEST_DENSE else pair_groups * shape.rows
+        whole = whole if whole <= LARGEST_WHOLE else 0
         weights = np.zeros(-(-c.k // c.lanes) * c.lanes)
         weights[: c.k] = c.arrays["weights"].reshape(-1)
-        low = m.integrals_low.shape[1]
+        low = np.zeros((c.k, 8))
+        low[:, : m.integrals_low.shape[1]] = m.integrals_low
+        values = np.full(8 * pair_groups, m.eigenvalues[0])  # no lane's matrix is singular
+        values[:pairs] = m.eigenvalues
+        powers = values**2 if shape.second else values
         numbers = {
             "method": solver_of(c.s, kind), "source": linearization.address, "rows": shape.rows,
-            "padded": padded, "k": c.k, "s": c.s, "dim": shape.dim, "pairs": pairs, "entry_count": rows.size,
-            "factored_rows": 0 if elsewhere else pairs * shape.rows,
-            "whole": whole if whole <= LARGEST_WHOLE else 0, "packed_groups": -(-(c.s + low) // 8),
+            "padded": padded, "k": c.k, "s": c.s, "dim": shape.dim, "entry_count": rows.size,
+            "parts": parts, "groups": groups, "block": 8 * groups * padded,
+            "pair_groups": pair_groups, "wide": 16 * pair_groups * padded,
+            "lu_rows": kept, "lu_size": 16 * kept * shape.rows,
+            "whole": whole, "whole_size": whole * -(-whole // 8) * 8,
             "trial_size": c.lanes * (1 + 2 * padded), "radius": m.radius,
         }  # fmt: skip
         tables: dict[str, Any] = {
-            "stage_table": packed(np.hstack([m.integrals_low, m.integrals]), repeat=True),
+            "stage_table": packed(np.hstack([low, m.integrals]), repeat=True),
             "projection": packed(c.arrays["projection"]),
             "basis": packed(m.basis, repeat=True),
             "weights": weights,
             "integrals": m.integrals, "reach": m.integrals @ m.x if shape.second else m.integrals,
             "moments": c.arrays["projection"],
-            "left_re": m.left.real, "left_im": m.left.imag,
-            "right_re": m.right.real, "right_im": m.right.imag,
-            "eigen_re": m.eigenvalues.real, "eigen_im": m.eigenvalues.imag,
-            "x": m.x, "inverse": m.inverse, "entry_rows": rows, "entry_columns": columns,
+            "left": packed(_in_eights(m.left)), "right": packed(_in_eights(m.right.T.conj()).T),
+            "eigen": _in_eights(values), "powers": _in_eights(powers),
+            "x": m.x, "derivatives": packed(m.x), "inverse": packed(m.eigenvalues[0].real * m.inverse),
+            "entry_rows": rows, "entry_columns": columns,
         }  # fmt: skip
         super().__init__(numbers, {name: np.ascontiguousarray(array) for name, array in tables.items()})
         self.traced = linearization.jacobian is not None
         """Whether the Jacobian is traced, or taken by differences."""
-        self.elsewhere = Factors(self, second=shape.second) if elsewhere else None
+        self._values = m.eigenvalues ** (2 if shape.second else 1)
+        self._find_factors()
+
+    def _find_factors(self) -> None:
+        self.elsewhere = None if self.lu_rows else Factors(self, self._values)
         """What keeps the factors, where they are not dense and small."""
         self.factors = 0 if self.elsewhere is None else self.elsewhere.address
+
+    def copy(self) -> Self:
+        """Return memory of its own, with factors of its own."""
+        other = super().copy()
+        other._find_factors()
+        return other
+
+    @property
+    def busy(self) -> float:
+        """Corrections of a step to aim at, at most."""
+        return np.inf if self.method == BLENDED else BUSY
 
     @property
     def name(self) -> str:
@@ -247,6 +273,17 @@ class Workspace(Memory):
             error, self.elsewhere.error = self.elsewhere.error, None
             if not isinstance(error, (ArithmeticError, RuntimeError, ValueError)):
                 raise error
+
+
+def _in_eights(rows: Any) -> Any:
+    """Return eight real parts, eight imaginary ones and so on, of numbers or of the rows of a matrix."""
+    shape = (-(-len(rows) // 8), 8, *rows.shape[1:])
+    padded: Any = np.zeros((shape[0] * 8, *rows.shape[1:]), dtype=complex)
+    padded[: len(rows)] = rows
+    parts = np.stack([padded.real.reshape(shape), padded.imag.reshape(shape)], axis=1)
+    flat = aligned(parts.size)
+    flat[:] = parts.reshape(-1)
+    return flat.reshape(-1, *rows.shape[1:])
 
 
 # What goes from step to step, but for the factors, which follow from the Jacobian's entries.

@@ -17,6 +17,7 @@ makes them attributes of its address:
 """
 
 from collections.abc import Mapping
+from math import prod
 from typing import Any, ClassVar, Self, overload
 
 import numpy as np
@@ -131,7 +132,7 @@ class Memory:
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
         def length(slot: Array) -> int:
-            return int(np.prod([numbers[n] if isinstance(n, str) else n for n in slot.shape], dtype=int))
+            return prod(int(numbers[n]) if isinstance(n, str) else n for n in slot.shape)
 
         end = -(-len(self.slots) // LINE) * LINE
         self._own: dict[str, tuple[int, int]] = {}  # where an array begins and ends

@@ -8,13 +8,13 @@ at the stages and makes new ones of its values; a test of how much they still ch
 at the end, with what rounding took from it.
 """
 
-from integrators.kernel.context import DONE, RUNNING
+from integrators.kernel.context import DONE
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import reconsider, solve_implicitly
-from integrators.kernel.step.iterate import close, test
-from integrators.kernel.step.sweep import sweep, sweep_measured
+from integrators.kernel.step.iterate import settle, test
+from integrators.kernel.step.sweep import sweep_measured
 
 
 @compiled
@@ -25,10 +25,8 @@ def solve(ctx):
     if ctx.implicit:
         return solve_implicitly(ctx, ctx, 0)
     begin(ctx)
-    sweep(ctx, ctx.free if ctx.predicted else 0)
-    while ctx.outcome == RUNNING:
-        test(ctx, sweep_measured(ctx))
-    return reconsider(ctx, close(ctx))
+    test(ctx, sweep_measured(ctx, ctx.free if ctx.predicted else 0))
+    return reconsider(ctx, settle(ctx))
 
 
 @compiled

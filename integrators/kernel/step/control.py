@@ -17,7 +17,6 @@ LOG_2 = log(2.0)
 # stay this much shorter at first, and then approach that length again by this factor a step.
 RETREAT, APPROACH = 0.5, 1.02
 SHORTEST = 2.0**-48  # of the time: a shorter step cannot be told from none
-NOTHING = 1e-6  # of the largest size in its group: a smaller block may have any error up to this
 CLOSE = 2.0**-50  # times whose relative difference is at most this are the same
 INFINITY = float("inf")
 TINY = 1e-300  # an estimated error of 0 counts as this

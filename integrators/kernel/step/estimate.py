@@ -6,7 +6,8 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.step.begin import prepare, set_step, start_plain
-from integrators.kernel.step.control import INFINITY, NOTHING, TINY
+from integrators.kernel.step.control import INFINITY, TINY
+from integrators.kernel.step.size import NOTHING
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel.context import Context
+from integrators.kernel.context import EVALUATE, Context
 from integrators.kernel.native import binary, field, store
 from integrators.kernel.native.memory import Slot
 from integrators.kernel.simd.emit import (
@@ -39,10 +39,11 @@ ROWS = 4
 
 
 def compile_sweeps(system: System, what: str, lanes: int, rows: int) -> binary.Native:
-    """Compile ``void(context, count, tested)``, or load it: for a field on lanes, and factors in the matrix.
+    """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
 
-    It does ``count`` sweeps. If ``tested`` is not 0, `Context.old_stages` then holds the stages before
-    the last one, and `Context.change` the largest change relative to the size of its block.
+    It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Context.old_stages` then
+    holds the stages before the last one, and `Context.change` the largest change relative to the size of
+    its block; with `EVALUATE`, the field's values are then those at the newest stages.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     )
     field = ir.Function(module, status, inner)
     sweep = ir.Function(module, SWEEP, binary.ENTRY)
-    context, count, tested = sweep.args
+    context, count, after = sweep.args
     b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
@@ -114,7 +115,12 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
     states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
     first = [get(q, lanes * d, whole) for d in range(rows)]
-    entry, loop, end = b.block, sweep.append_basic_block("loop"), sweep.append_basic_block("end")
+    zero, one = ir.Constant(INTEGER, 0), ir.Constant(INTEGER, 1)
+    evaluates = b.icmp_signed("==", after, ir.Constant(INTEGER, EVALUATE))
+    entry, loop, product, end, evaluated = (
+        b.block,
+        *(sweep.append_basic_block(name) for name in ("loop", "product", "end", "evaluated")),
+    )
     b.branch(loop)
 
     b.position_at_end(loop)
@@ -125,6 +131,9 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
         put(old[d], at_stages, lanes * d)
     b.call(field, [result, exception, times, at_stages, par, at_values])
     found = [get(at_values, lanes * d, whole) for d in range(rows)]
+    b.cbranch(b.icmp_signed(">", left, zero), product, evaluated)
+
+    b.position_at_end(product)
     # Column by column, for few of them to be in registers at a time; loaded anew by every sweep.
     matrix = b.inttoptr(b.load_atomic(word(Context.matrix), "monotonic", 8), pointer)
     sums = {(d, part): Chains(b, lanes, starts[d][part]) for d in range(rows) for part in parts}
@@ -135,19 +144,25 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
             for part in parts:
                 sums[d, part].add(columns[part], factor)
     new = [joined([b.fadd(states[d], sums[d, part].total()) for part in parts]) for d in range(rows)]
-    fewer = b.sub(left, ir.Constant(INTEGER, 1))
+    fewer = b.sub(left, one)
     left.add_incoming(count, entry)
     left.add_incoming(fewer, b.block)
     for d in range(rows):
         old[d].add_incoming(first[d], entry)
         old[d].add_incoming(new[d], b.block)
-    b.cbranch(b.icmp_signed(">", fewer, ir.Constant(INTEGER, 0)), loop, end)
+    b.cbranch(b.or_(b.icmp_signed(">", fewer, zero), evaluates), loop, end)
+
+    b.position_at_end(evaluated)
+    for d in range(rows):
+        put(old[d], q, lanes * d)
+        put(found[d], f, lanes * d)
+    b.ret_void()
 
     b.position_at_end(end)
     for d in range(rows):
         put(new[d], q, lanes * d)
         put(found[d], f, lanes * d)
-    with b.if_then(b.icmp_signed("!=", tested, ir.Constant(INTEGER, 0))):
+    with b.if_then(b.icmp_signed("!=", after, zero)):
         top = ir.Constant(eight, [0.0] * WIDTH)
         for d in range(rows):
             put(old[d], other, lanes * d)

@@ -7,7 +7,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
 from integrators.kernel.step.size import ROUNDING, STAGNATION, change, is_rounding, take_sizes
-from integrators.kernel.step.sweep import evaluate, sweep, sweep_measured
+from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
 MAX_ITERATIONS = 200
 # Changes that do not decrease, to end it between ROUNDING and STAGNATION. Where the iteration's matrix is
@@ -77,11 +77,7 @@ def polish(ctx, change):
     stages that they were taken at. What is left there acts on the energy in the same direction in every step.
     """
     more = int((LOG_REST - binary_log(change)) / ctx.rate)
-    last = ctx.last
-    sweep(ctx, min(max(more, 0), MOST_EXTRA))
-    evaluate(ctx)
-    ctx.tried += 1
-    ctx.last = last
+    sweep_to_the_end(ctx, min(max(more, 0), MOST_EXTRA))
     ctx.outcome = DONE
 
 
@@ -89,7 +85,7 @@ def polish(ctx, change):
 def settle(ctx):
     """Iterate with tests until the step is solved or has failed; return the outcome."""
     while ctx.outcome == RUNNING:
-        test(ctx, sweep_measured(ctx))
+        test(ctx, sweep_measured(ctx, 0))
     return close(ctx)
 
 

@@ -10,6 +10,9 @@ from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
 from integrators.kernel.step.stages import offset
 
 FLOOR = 1e-3  # of the largest size in its group: where rounding of the field may hide a small component
+# Of the same, where steps vary: a smaller block is judged as if it had this size, as its errors are. A block
+# that is 0 at first grows by one power of t in each iteration, far from the others by many.
+NOTHING = 1e-6
 SMALLEST, LARGE = 1e-200, 1e200  # a block smaller than that has no size to divide by
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good
 
@@ -68,11 +71,13 @@ def enter_size(ctx, d, value):
 def invert_sizes(ctx, strict, floored):
     """Write the inverse sizes of all rows, by both measures; return whether all blocks have a size."""
     known = True
+    nothing = NOTHING if ctx.varying else 0.0
     for d in range(ctx.rows):
         b = ctx.block[d]
-        own = ctx.size[b]
-        floor = max(own, FLOOR * ctx.largest[ctx.group[b]])
-        known = known and own > SMALLEST
+        largest = ctx.largest[ctx.group[b]]
+        own = max(ctx.size[b], nothing * largest)
+        floor = max(own, FLOOR * largest)
+        known = known and ctx.size[b] > SMALLEST
         # Whatever moves a block of no size is a large change; and then it has a size: look again.
         strict[d] = 1.0 / own if own > SMALLEST else LARGE
         floored[d] = 1.0 / floor if floor > SMALLEST else LARGE

@@ -6,7 +6,7 @@ its size. Rows are independent and go through the same operations; the columns
 of A stay in registers while the rows pass by.
 """
 
-from integrators.kernel.context import VALUES
+from integrators.kernel.context import EVALUATE, MEASURE, VALUES
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import (
@@ -159,25 +159,36 @@ def product(ctx, table):
 @compiled
 def sweep(ctx, count):
     """Iterate ``count`` times, without a test."""
-    if count > 0:
-        if ctx.fused:
-            call_sweeps(ctx.fused, ctx, count, 0)
-        else:
-            for _ in range(count):
-                evaluate(ctx)
-                product(ctx, ctx.matrix)
-        ctx.tried += count
-        ctx.last = INFINITY  # the next change does not follow the last one that was measured
+    for _ in range(count):
+        evaluate(ctx)
+        product(ctx, ctx.matrix)
 
 
 @compiled
-def sweep_measured(ctx):
-    """Iterate once; return the largest change relative to the size of its block, NaN if any stage is."""
-    ctx.tried += 1
+def sweep_measured(ctx, before):
+    """Iterate, ``before`` times and once; return the largest change that the last one made.
+
+    It is relative to the size of its block; NaN if any stage is.
+    """
+    ctx.tried += before + 1
+    if before > 0:
+        ctx.last = INFINITY  # the next change does not follow the last one that was measured
     if ctx.fused:
-        call_sweeps(ctx.fused, ctx, 1, 1)
+        call_sweeps(ctx.fused, ctx, before + 1, MEASURE)
         return ctx.change
+    sweep(ctx, before)
     evaluate(ctx)
     ctx.stages, ctx.old_stages = ctx.old_stages, ctx.stages
     product(ctx, ctx.matrix)
     return change(ctx, ctx.strict)
+
+
+@compiled
+def sweep_to_the_end(ctx, count):
+    """Iterate ``count`` times, and evaluate the field at the newest stages."""
+    ctx.tried += count + 1
+    if ctx.fused and count > 0:
+        call_sweeps(ctx.fused, ctx, count, EVALUATE)
+    else:
+        sweep(ctx, count)
+        evaluate(ctx)

@@ -38,12 +38,12 @@ from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.size import ROUNDING
-from integrators.kernel.step.sweep import sweep, sweep_measured
+from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
 # Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
 # and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16.
-BUSY, BUSY_FIRST = 18.0, 36.0
+BUSY, BUSY_FIRST = 18.0, 24.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
 MOST_UNTESTED = 12
@@ -55,7 +55,7 @@ HOPE = log2(0.7)  # where the last change was nothing, the contraction may be th
 # MOST_ROWS they are too dear to be tried where only low coefficients tell how much longer.
 HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
-GAIN, GAIN_PER_ROW, MOST_ROWS = 8.0, 1.5, 64
+GAIN, GAIN_PER_ROW, MOST_ROWS = 3.0, 0.1, 64
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
 # A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
 # find it.
@@ -84,7 +84,7 @@ def iterate(ctx):
     The first change and the rate of contraction, as it was at the last step, tell how many
     iterations need no test; how many remain then, the rate of this step.
     """
-    test(ctx, sweep_measured(ctx))
+    test(ctx, sweep_measured(ctx, 0))
     tried = ctx.tried
     if ctx.outcome != RUNNING or tried != 1:
         return settle(ctx)
@@ -92,8 +92,8 @@ def iterate(ctx):
     rate = known
     change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
     while ctx.outcome == RUNNING:
-        sweep(ctx, min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED))
-        strict = sweep_measured(ctx)
+        untested = min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED)
+        strict = sweep_measured(ctx, max(untested, 0))
         tries = ctx.tried - tried
         if strict > ROUNDING:
             change = binary_log(strict)
@@ -207,7 +207,6 @@ def ready(ctx):
         take_over(ctx)
     t = ctx.t0
     allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
-    busy = BUSY if ctx.second else BUSY_FIRST
     ctx.rejected = 0
     grow, failure, doubts = GROW, UNDERFLOW, 0
     while True:
@@ -238,13 +237,13 @@ def ready(ctx):
                 ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
             limit = ctx.length_limit * APPROACH
             ctx.length_limit = limit
-            if implicit:
-                factor = min(1.0 if 1.0 < factor < STEADY else factor, limit / abs(h))
-            else:
-                factor = min(factor, max(busy / (ctx.iterations - before), 0.5))
-                factor = min(factor, limit / abs(h))
-                if ctx.strategy != FIXED_POINT:
-                    watch(ctx, factor)
+            busy = ctx.busy_implicit if implicit else BUSY if ctx.second else BUSY_FIRST
+            factor = min(factor, max(busy / (ctx.iterations - before), 0.5))
+            factor = min(factor, limit / abs(h))
+            if implicit and 1.0 < factor < STEADY:
+                factor = 1.0
+            elif implicit == 0 and ctx.strategy != FIXED_POINT:
+                watch(ctx, factor)
             ctx.length_after = h * factor
             ctx.solved = BY_VALUES
             return DONE

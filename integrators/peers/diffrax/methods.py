@@ -77,6 +77,13 @@ class SemiImplicitEuler(_FixedMethod):
     ----------
     h : float
         Length of a step, > 0.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import SemiImplicitEuler, integrate
+    >>> integrate(problems.load("pendulum"), SemiImplicitEuler(h=0.01), [0.0, 10.0]).stats.steps
+    1000
     """
 
     order = 1
@@ -101,6 +108,13 @@ class LeapfrogMidpoint(_FixedMethod):
     ----------
     h : float
         Length of a step, > 0.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import LeapfrogMidpoint, integrate
+    >>> integrate(problems.load("pendulum"), LeapfrogMidpoint(h=0.01), [0.0, 10.0]).stats.steps
+    1000
     """
 
     order = 2
@@ -129,6 +143,13 @@ class ReversibleHeun(_FixedMethod):
     ----------
     h : float
         Length of a step, > 0.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import ReversibleHeun, integrate
+    >>> integrate(problems.load("pendulum"), ReversibleHeun(h=0.01), [0.0, 10.0]).stats.steps
+    1000
     """
 
     order = 2
@@ -164,6 +185,14 @@ class Dopri8(DiffraxMethod):
     Adaptive: the last step before each sample is shortened onto it and the next is of
     the length the controller wanted before (``"land"``); ``"steps"`` gives the
     steps that are taken without samples.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Dopri8, integrate
+    >>> solution = integrate(problems.load("pendulum"), Dopri8(rtol=1e-10, atol=1e-12), [0.0, 10.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-8)
+    True
     """
 
     h: Step | None = None

@@ -70,6 +70,14 @@ class Taylor(MethodBase):
     is taken twice, for heyoka's compiled loop shortens its last one; these are counted apart,
     in ``stats.extra["side_steps"]``. ``"land"`` shortens steps onto the samples, as
     heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Taylor, integrate
+    >>> solution = integrate(problems.load("kepler", e=0.6), Taylor(tol=1e-15), [0.0, 100.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-13)
+    True
     """
 
     tol: Share = EPS

@@ -116,6 +116,14 @@ class WHFast(FixedMethod):
     REBOUND's safe mode is off, as its authors advise: half steps are joined, and a
     sample is a synchronised copy from which the integration does not go on
     (``keep_unsynchronized``), so that samples do not change the trajectory.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import WHFast, integrate
+    >>> planets = problems.load("outer_solar_system", t_end=100.0)
+    >>> bool(integrate(planets, WHFast(h=0.3, corrector=17), [0.0, 100.0]).errors()["energy"].max() < 1e-8)
+    True
     """
 
     coordinates: Coordinates = "jacobi"
@@ -197,6 +205,14 @@ class Leapfrog(FixedMethod):
         Length of a step, > 0.
     order : {2, 4, 6, 8}
         Order of convergence; a step takes 1, 3, 9 or 17 force evaluations.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Leapfrog, integrate
+    >>> solution = integrate(problems.load("henon_heiles"), Leapfrog(h=0.05, order=8), [0.0, 50.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-12)
+    True
     """
 
     order: Literal[2, 4, 6, 8] = 2

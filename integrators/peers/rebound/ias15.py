@@ -66,6 +66,14 @@ class IAS15(ReboundMethod):
 
     On a problem without bodies, three coordinates at a time are one particle; with
     more than three the criteria that go by particle depend on this grouping.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import IAS15, integrate
+    >>> solution = integrate(problems.load("kepler", e=0.6), IAS15(mode="global"), [0.0, 100.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-14)
+    True
     """
 
     epsilon: NotNegative = 1e-9

@@ -38,6 +38,13 @@ class WHFast512(FixedMethod):
     velocities that this takes. Steps between two samples are taken in one go, as its
     authors advise (``concatenate_steps``); at a sample it is synchronised. The relativistic
     correction is off. `WHFast.caveat` says where a problem is outside its domain.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import WHFast512
+    >>> WHFast512(h=0.3).accepts(problems.load("henon_heiles")) is None  # a reason where it does not apply
+    False
     """
 
     corrector: Literal[0, 17] = 0

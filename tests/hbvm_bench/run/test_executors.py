@@ -190,7 +190,8 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
 
 def test_a_machine_that_would_run_another_case_says_what_differs(toys):
     asked = msgspec.json.decode(task_of(cases(1)[0], LIMITS))
-    asked["id"] = "0" * 64
+    (case,) = asked["cases"].values()
+    asked["cases"] = {"0" * 64: case}
     with pytest.raises(UnfinishedRunError, match="other sources"):
         execute(msgspec.json.encode(asked))
     asked["versions"]["toys"] = "0.9"

@@ -1,14 +1,12 @@
 """Every peer through the harness beside its library alone: the same steps to the same end."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import pytest
 
 import integrators.registry
 from hbvm_bench import cli
-from hbvm_bench.run import processes
 from hbvm_bench.store.files import write_json
 from hbvm_bench.studies.peers import check
 from hbvm_bench.studies.peers.check import PAIRS
@@ -70,12 +68,11 @@ def test_the_harness_takes_the_library_s_own_steps_to_its_own_end(pair):
 def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(
     monkeypatch, tmp_path, result, beyond
 ):
-    def wait(command, environment):
-        request = msgspec.json.decode(Path(command[-1]).read_bytes())
-        write_json(Path(request["out"]), result)
+    def in_a_process(out, rounds):
+        write_json(out, result)
         return 0
 
-    monkeypatch.setattr(processes, "wait", wait)
+    monkeypatch.setattr(check, "in_a_process", in_a_process)
     assert result.rows[0].beyond is beyond
     out = tmp_path / "peers.json"
     assert cli.main(["doctor", "--peers", "--out", str(out)]) == int(beyond)
@@ -94,7 +91,7 @@ def test_the_reports_print_what_was_kept_with_its_day_machine_and_command():
 
 
 def test_a_process_that_dies_leaves_nothing(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(processes, "wait", lambda command, environment: -9)
+    monkeypatch.setattr(check, "in_a_process", lambda out, rounds: -9)
     out = tmp_path / "peers.json"
     assert cli.main(["doctor", "--peers", "--out", str(out)]) == 1
     assert "exit code -9" in capsys.readouterr().err

@@ -2,9 +2,8 @@ import math
 
 import pytest
 
-from hbvm_bench.campaign.file import Campaign, Case, Ensemble, MethodEntry
+from hbvm_bench.campaign.file import Case, Ensemble
 from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.store.store import Index
 from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
 from hbvm_bench.summaries.profiles import Accuracy
 
@@ -52,19 +51,21 @@ RUN = [
 ]
 
 
-def test_an_envelope_is_what_nothing_beats_in_both():
-    found = points.envelopes(RUN, "kepler()", "warm_seconds", "position_end")
-    assert [(p.work, p.error) for p in found["Gauss"]] == [(1.0, 1e-3), (2.0, 1e-9)]
-    assert list(found) == ["Gauss", "Taylor"]
-    assert points.points(RUN, "toda()", "warm_seconds", "position_end")[0].family == "Gauss"
-    assert len(points.points(RUN, "toda()", "warm_seconds", "position_end")) == 1  # the other is void
+def test_the_front_is_what_nothing_beats_in_both():
+    families = points.by_family(points.by_problem(RUN)["kepler()"])
+    places = [
+        tuple(points.number(one, key) for key in ("warm_seconds", "position_end"))
+        for one in families["Gauss"]
+    ]
+    assert points.front(places, lambda place: place) == [(1.0, 1e-3), (2.0, 1e-9)]
+    assert list(families) == ["Gauss", "Taylor"]
     assert points.work_of(RUN) == "warm_seconds"
     assert points.work_of([]) == "evaluations"
 
 
 def test_an_ensemble_is_in_no_summary_of_single_trajectories():
     many = record("Taylor()", many=True)
-    assert points.points([many], "kepler()", "warm_seconds", "position_end") == []
+    assert points.by_problem([many]) == {}
     assert profiles.profile([many], Accuracy(1e-4), "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})
 
@@ -135,27 +136,11 @@ def test_laws_are_counted_by_family_on_the_trajectory_only():
     assert [row.invariant for row in laws.rows(run)] == ["energy", "angular_momentum"]
 
 
-def index_of(run):
-    made = Campaign(name="x", problems=["kepler()"], methods=[MethodEntry(use="Taylor()")])
-    return Index(
-        campaign=made, ids=[r.id for r in run], version="0", command="x", cases=[r.case for r in run]
-    )
-
-
-def test_fairness_counts_settings_and_names_what_was_left_out():
+def test_fairness_counts_settings():
     run = [record("Gauss(s=2, h=0.1)"), record("Taylor()", settings="default")]
-    fair = fairness.fairness(index_of([*run, record("IAS15()")]), run)
-    assert fair.equal == 1
-    assert [(f.family, f.kinds) for f in fair.families] == [
-        ("Gauss", {"recommended": 1}),
-        ("Taylor", {"default": 1}),
-    ]
-    assert fair.families[1].version == "7.13"
-    assert [(e.method, e.kind) for e in fair.excluded] == [("IAS15()", "missing")]
     assert "every method has 1 setting" in fairness.sentences(run)[0]
     unequal = [*run, record("Gauss(s=4, h=0.1)")]
     assert "Gauss 2, Taylor 1" in fairness.sentences(unequal)[0]
-    assert fairness.fairness(index_of(unequal), unequal).equal is None
 
 
 def test_times_of_a_busy_machine_are_doubtful():

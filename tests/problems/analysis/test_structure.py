@@ -6,8 +6,7 @@ import pytest
 
 import problems
 from hbvm_bench import cli
-from hbvm_bench.commands import findings
-from hbvm_bench.summaries import engines
+from hbvm_bench.summaries import engines, findings
 from problems import Hamiltonian
 from problems.analysis import structure
 from problems.analysis.latex import latex

@@ -1,6 +1,5 @@
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -10,12 +9,9 @@ from hbvm_bench.commands.race import as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
 from hbvm_bench.studies.race import report, results, tables
-from hbvm_bench.studies.race.figures import front, work_precision
-from hbvm_bench.studies.race.results import ENERGY, POSITION
+from hbvm_bench.studies.race.figures import work_precision
 from problems.errors import InputError
-from tests.hbvm_bench.studies.race.conftest import save
-
-REPORTS = Path(__file__).parents[4] / "reports" / "race"
+from tests.hbvm_bench.studies.race.conftest import record, save
 
 
 def test_a_stored_race_is_read_back_equal(race, tmp_path):
@@ -30,7 +26,7 @@ def test_an_empty_directory_says_how_to_fill_it(tmp_path):
         results.load(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["race.json", "kepler.json", "compile_times.json"])
+@pytest.mark.parametrize("name", ["race.json", "compile_times.json"])
 @pytest.mark.parametrize("content", [b"", b"{", b'{"contest": 1}'])
 def test_a_file_that_is_no_race_is_refused_by_name(content, name, race, tmp_path):
     save(race, tmp_path)
@@ -44,19 +40,6 @@ def test_a_race_of_another_version_is_refused(race, tmp_path):
     (tmp_path / "race.json").write_bytes(msgspec.json.encode([other]))
     with pytest.raises(InputError, match="another version"):
         results.load(tmp_path)
-
-
-def test_a_race_from_before_it_was_a_campaign_is_read_as_records():
-    """What it says is what the committed page said when it was drawn."""
-    found = {race.key: race for race in results.load(REPORTS)}
-    assert list(found)[:3] == ["outer_solar_system", "sitnikov", "kepler"]
-    planets = found["outer_solar_system"]
-    assert (len(planets.records), planets.rounds, len(planets.calibration)) == (112, 5, 5)
-    ratio = planets.at("Taylor", *planets.asked).ratio
-    assert (round(ratio.median, 1), round(ratio.low, 2), round(ratio.high, 1)) == (10.5, 9.84, 10.6)
-    verdicts = [verdict.verdict for race in found.values() for verdict in race.goals]
-    assert verdicts == ["reached", "reached", "missed", "missed", "reached", *4 * ["missed"]]
-    assert planets.probes[0].family == ""
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
@@ -118,10 +101,21 @@ def test_a_race_without_any_valid_run_has_no_figure(race):
     assert work_precision(void, looks([])) is None
 
 
-def test_the_front_of_a_family_is_beaten_by_none_of_it(race):
-    ours = race.of(results.OURS)
-    assert [o.case.method for o in front(ours, POSITION)] == ["Gauss(s=8, h=2.0)", "Gauss(s=8, h=1.5)"]
-    assert [o.case.method for o in front(ours, ENERGY)] == ["Gauss(s=8, h=2.0)", "HBVM(k=16, s=8, h=2.0)"]
+def test_fixed_and_own_steps_are_rows_of_their_own_and_the_faster_counts(race):
+    chosen = record("HBVM(tol=1e-14)", 0.0005, 5e-14, 5e-11, "ours")
+    both = replace(race, records=[*race.records, chosen])
+    rows = {row[0]: row[1] for row in tables.fastest(both).rows}
+    assert rows["HBVM and Gauss, fixed step"] == "Gauss(s=8, h=1.5)"
+    assert rows["HBVM and Gauss, own steps"] == "HBVM(tol=1e-14)"
+    assert (rows["heyoka, Taylor, own steps"], rows["REBOUND, WHFast, fixed step"]) == (
+        "Taylor()",
+        "not reached",
+    )
+    table = tables.headline([both])
+    cells = dict(zip(table.head, table.rows[0], strict=True))
+    assert cells["ours, fixed step"].startswith("2 ms")
+    assert cells["ours, own steps"].startswith("500 µs")
+    assert cells["heyoka"].startswith("60.0×")
 
 
 def test_the_report_names_one_command_where_the_problems_together_are_one_run(race):

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import name_of
-from hbvm_bench.campaign.identity import make_method, make_problem, resolve
+from hbvm_bench.campaign.identity import fixed_step, make_method, make_problem, resolve
 from hbvm_bench.campaign.shorter import QUICK_SHARE, chosen, quick_run
-from hbvm_bench.commands.race import _family
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.race.families import FAMILIES
+from hbvm_bench.studies.race.families import FAMILIES, FIXED, OURS, OWN, row_of
 from hbvm_bench.studies.race.probe import METHODS
-from hbvm_bench.studies.race.results import OURS, declared
+from hbvm_bench.studies.race.results import declared
 from problems.errors import UnknownNameError
 
 KEYS = [name_of(entry) for entry in declared().entries()]
@@ -23,17 +22,22 @@ def cases(key, *, quick=False):
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_every_family_has_the_same_number_of_settings_and_none_twice(key):
+def test_every_row_has_the_same_number_of_settings_and_none_twice(key):
     here = cases(key)
-    assert set(Counter(map(_family, here)).values()) == {SETTINGS}
-    assert len({case.method for case in here}) == len(here)
-    assert {*map(_family, here)} <= set(FAMILIES)
+    rows = Counter(map(row_of, here))
+    assert set(rows.values()) == {SETTINGS}
+    assert len({resolve(case).id for case in here}) == len(here)
+    assert {row.family for row in rows} <= set(FAMILIES)
+    both = {row.family for row in rows if row.steps == FIXED} & {
+        row.family for row in rows if row.steps == OWN
+    }
+    assert both == {OURS, "IAS15"}
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_the_quick_settings_are_some_of_the_declared_ones(key):
     quick = cases(key, quick=True)
-    assert set(Counter(map(_family, quick)).values()) == {QUICK_SETTINGS}
+    assert set(Counter(map(row_of, quick)).values()) == {QUICK_SETTINGS}
     assert {case.method for case in quick} <= {case.method for case in cases(key)}
 
 
@@ -62,7 +66,7 @@ def test_the_true_solution_starts_where_the_problem_starts(key):
 @pytest.mark.parametrize("key", ["outer_solar_system", "sitnikov", "kepler", "henon_heiles", "fput32"])
 def test_a_fixed_step_divides_the_span(key):
     for case in cases(key):
-        h = getattr(make_method(case.method), "h", None)
+        h = fixed_step(make_method(case.method))
         if h:
             steps = make_problem(case.problem).t_end / h
             assert abs(steps - round(steps)) < 1e-6
@@ -82,7 +86,7 @@ def test_samples_of_a_fixed_step_are_own_steps_and_end_at_the_end():
 def test_goals_are_about_families_that_run():
     for goal in declared().goals:
         (key,) = goal.only
-        assert goal.against in {_family(case) for case in cases(key)}
+        assert goal.against in {row_of(case).family for case in cases(key)}
 
 
 def test_an_unknown_problem_is_named_with_the_nearest():

@@ -1,0 +1,66 @@
+"""How Sphinx builds the site: `make docs`."""
+
+import os
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
+os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # the notebooks' kernel says nothing about its debugger
+
+project = "hbvm-bench"
+author = "hbvm-bench contributors"
+project_copyright = author
+version = release = installed("hbvm-bench")
+language = "en"
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "formulas",
+    "made",
+]
+exclude_patterns = ["_build", "_ext", "reference/made"]
+templates_path = ["_templates"]
+
+# --- pages in MyST, executed where they have code cells ---
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE / "_build" / "executed")
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+
+# --- reference, from the docstrings ---
+autosummary_generate = True
+autodoc_typehints = "none"  # numpydoc's sections have the types in words
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+# --- looks: everything the pages need lies beside them ---
+html_theme = "pydata_sphinx_theme"
+html_title = "hbvm-bench"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "header_links_before_dropdown": 7,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+    "search_bar_text": "Search",
+}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True

@@ -1,0 +1,102 @@
+"""``hbvm-bench inspect | engines | advise``: what can be said of a problem."""
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.table import Table as Grid
+from rich.text import Text
+
+import problems
+from hbvm_bench.campaign.identity import typed_problem
+from hbvm_bench.report import terminal
+from hbvm_bench.summaries import engines as engines_
+from hbvm_bench.summaries import findings
+from hbvm_bench.summaries.table import Table
+from problems.errors import unknown
+
+
+def inspect(
+    system: Annotated[
+        str, typer.Argument(help='A formula, as in "p^2/2 - cos(q)", or a problem, as in "kepler(e=0.9)".')
+    ],
+    parameters: Annotated[str, typer.Option("--par", help='Values in a formula, as in "k=2, m=0.5".')] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+) -> None:
+    """Say what can be read off a Hamiltonian: degree, exact k, separability, cyclic coordinates, engines."""
+    found = findings.inspect(system, parameters)
+    if as_json:
+        terminal.print_json(asdict(found))
+        return
+    table = Grid.grid(padding=(0, 2))
+    for heading, sentence in findings.lines(found):
+        table.add_row(Text(heading, style="bold"), Text(sentence))
+    terminal.console().print(table)
+
+
+def engines(
+    names: Annotated[list[str] | None, typer.Argument(help="Problems by name; all by default.")] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="As a Markdown table.")] = False,
+) -> None:
+    """Say which engine and which method accepts which problem, and why not."""
+    for name in names or []:
+        if name not in problems.names():
+            raise unknown("problem", name, problems.names())
+    if markdown:
+        print(engines_.markdown(names or []), end="")
+        return
+    columns, rows = engines_.matrix(names or [])
+    listed = engines_.notes(rows)
+    cells = [
+        (name, *("yes" if row[c] is None else str(listed.index(row[c] or "") + 1) for c in columns))
+        for name, row in rows.items()
+    ]
+    terminal.print_table(Table("", ("problem", *columns), cells, words=range(len(columns) + 1)))
+    for i, reason in enumerate(listed, start=1):
+        terminal.console().print(f"{i}. {reason}", highlight=False)
+
+
+def advise(
+    problem: Annotated[str, typer.Argument(help='A problem, as in "kepler(e=0.6)".')],
+    accuracy: Annotated[
+        float, typer.Option(help="Largest error of the positions wanted at the end, relative.")
+    ] = 1e-10,
+    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+) -> None:
+    """Say which of our methods and which step reach an accuracy, at what cost: a few short runs."""
+    from integrators.advice import advise as advise_
+
+    advice = advise_(typed_problem(problem), accuracy)
+    if as_json:
+        terminal.print_json(
+            {
+                "problem": repr(advice.problem),
+                "accuracy": accuracy,
+                "reached": advice.reached,
+                "why": advice.why,
+                "proposals": [
+                    {
+                        "method": repr(one.method),
+                        "position": one.position,
+                        "energy": one.energy,
+                        "seconds": one.seconds,
+                        "steps": one.steps,
+                    }
+                    for one in advice.proposals
+                ],
+            }
+        )
+        return
+    rows = [
+        (
+            repr(one.method),
+            f"{one.position:.1e}",
+            "" if one.energy is None else f"{one.energy:.1e}",
+            f"{one.seconds:.2g}",
+            f"{one.steps:,}",
+        )
+        for one in advice.proposals
+    ]
+    head = ("method", "position", "energy", "seconds", "steps")
+    terminal.print_table(Table(f"{advice.problem!r}, accuracy {accuracy:g}", head, rows))
+    terminal.console().print(str(advice), highlight=False, markup=False, soft_wrap=True)

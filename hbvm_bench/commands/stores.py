@@ -1,0 +1,96 @@
+"""``hbvm-bench compare | merge | export``: what is done with runs."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from hbvm_bench.report import terminal
+from hbvm_bench.store import merge as merging
+from hbvm_bench.store.files import ensure_writable
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import compare as comparing
+from hbvm_bench.summaries import export as exporting
+from hbvm_bench.summaries.table import Table
+
+CHANGED = 1
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
+    second: Annotated[Path, typer.Argument(help="Another run of the same campaign.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+) -> None:
+    """Say what changed from one run to another beyond noise.
+
+    Exit code 0 when nothing did, 1 when something did or a case is missing in one of them.
+    """
+    found = comparing.compare(Store(first), Store(second))
+    if as_json:
+        terminal.print_json(asdict(found))
+    else:
+        _print(found, terminal.console(), str(first), str(second))
+    if not found.unchanged:
+        raise typer.Exit(CHANGED)
+
+
+def _print(found: comparing.Comparison, console: Console, first: str, second: str) -> None:
+    for where, names in ((first, found.only_first), (second, found.only_second)):
+        for name in names:
+            console.print(Text(f"only in {where}: {name}"))
+    if found.behind:
+        console.print(Text(f"behind it: {'; '.join(found.behind)}"))
+    numbers = found.equal + found.rounded
+    changed = sum(change.what != "outcome" for change in found.changed)
+    endings = len(found.changed) - changed
+    console.print(
+        f"numerical metrics of {found.cases} cases: {numbers + changed} compared, {found.equal} equal, "
+        f"{found.rounded} within rounding, {changed} changed; {endings} outcomes changed"
+    )
+    _table(found.changed, first, second)
+    if found.noise is not None:
+        within = found.timed - len(found.slower) - len(found.faster)
+        console.print(
+            f"times, each divided by the calibration beside it: {found.timed} compared, {within} within "
+            f"noise (a factor of {found.noise:.2f} in a typical case), {len(found.slower)} slower, "
+            f"{len(found.faster)} faster"
+        )
+    _table([*found.slower, *found.faster], first, second)
+    for sentence in found.untimed:
+        console.print(Text(f"time not compared: {sentence}"))
+    if found.unchanged:
+        console.print("nothing changed beyond noise.")
+
+
+def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None:
+    rows = [(one.problem, one.method, one.what, one.before, one.after) for one in changes]
+    if rows:
+        head = ("problem", "method", "what", first, second)
+        terminal.print_table(Table("", head, rows, words=range(len(head))))
+
+
+def merge(
+    runs: Annotated[list[Path], typer.Argument(help="Two runs or more.")],
+    out: Annotated[Path, typer.Option("--out", help="A new directory.")],
+) -> None:
+    """Put several runs together in a new one; of a case in several, the one that got further."""
+    cases, records, left_out = merging.merge(merging.stores(runs), Store(out))
+    print(f"{records} of {cases} cases in {out}")
+    if left_out:
+        print(f"{left_out} left out: damaged, or measured by another version of hbvm-bench; run them again")
+
+
+def export(
+    directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="A file that ends in .csv or .parquet.")],
+    table: Annotated[
+        str, typer.Option(help="cases; timings, one row per sample; or series, one row per number.")
+    ] = "cases",
+) -> None:
+    """Write a run as a flat table, for a spreadsheet or a data frame."""
+    ensure_writable(out.parent)
+    print(f"{exporting.export(Store(directory), out, table)} rows in {out}")
