@@ -17,11 +17,11 @@ from integrators.watch import Progress
 if TYPE_CHECKING:
     from integrators.advice import advise as advise
     from integrators.events import Event as Event
-    from integrators.events import section as section
     from integrators.gauss import Gauss as Gauss
     from integrators.hbvm import HBVM as HBVM
     from integrators.order import order_of as order_of
     from integrators.order import stability as stability
+    from integrators.poincare import section as section
 
 __all__ = [
     "MethodBase",
@@ -41,7 +41,7 @@ _LATER = {  # imported when first used
     "Event": "integrators.events",
     "advise": "integrators.advice",
     "order_of": "integrators.order",
-    "section": "integrators.events",
+    "section": "integrators.poincare",
     "stability": "integrators.order",
 }
 

@@ -4,12 +4,14 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
+from integrators.events.event import Event, named
+from integrators.events.finder import Ending, Finder, started_with_events
 from integrators.protocol import (
     SAMPLINGS,
     Array,
@@ -17,7 +19,6 @@ from integrators.protocol import (
     Samples,
     Stats,
     Status,
-    Stepper,
     UserError,
     as_numbers,
     check_problem,
@@ -32,10 +33,6 @@ from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.systems.untraced import Foreign
 
-if TYPE_CHECKING:
-    from integrators.events import Event
-    from integrators.events.search import Found
-
 DEFAULT_SAMPLES = 1001
 NotNegative = Annotated[float, Must("a number of seconds, 0 or more", lambda x: x >= 0)]
 
@@ -46,7 +43,7 @@ def integrate(
     method: MethodBase | None = None,
     times: ArrayLike | None = None,
     sample: str | None = None,
-    events: "Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]]" = (),
+    events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     *,
     progress: bool | Report = False,
     checkpoint: str | os.PathLike[str] | None = None,
@@ -72,8 +69,8 @@ def integrate(
     events : Event or callable, or a sequence of them, optional
         Functions of time and state, and what happens where they vanish: see
         `integrators.events.Event`. They change nothing of the steps and samples, but a
-        terminal event ends them. Finding them takes every step once more (twice where
-        the steps vary); ``stats.extra["event_search"]`` counts that work.
+        terminal event ends them. They are looked for in the steps themselves;
+        ``stats.extra["event_search"]`` counts the partial steps that they take.
     progress : bool or callable, optional
         True: a bar on the terminal, if there is one. A function: it is called about ten times a second
         with an `integrators.watch.Progress`.
@@ -124,10 +121,8 @@ def integrate(
             )  # fmt: skip
     program = method.compile(problem.system)
     grid = _grid(problem, times)
-    found, looked_for = None, {}
+    looked_for: dict[str, Event] = {}
     if not isinstance(events, Sequence) or events:
-        from integrators.events.event import named
-
         if sample == "land":
             raise InputError(
                 "events are those of the method's own steps, which sample='land' changes; use 'side'."
@@ -141,24 +136,18 @@ def integrate(
     if resume is not None and (Path(resume) != path or Path(resume).exists()):
         kept = read(resume, belongs)
     report = progress or None
-    watch = Watch(problem.t0, end, 1 + bool(looked_for), report, path, seconds, belongs)
-    if looked_for:
-        from integrators.events.search import search
-
-        found = kept.get("found")
-        if found is None:
-            found = search(problem, method, program, looked_for, end, watch.look, kept.get("search"))
-        watch.phase = 1
-        if found.status is Status.EVENT:
-            grid = grid[(grid - found.t_stop) * np.sign(found.t_stop - problem.t0) <= 0.0]
-        if found.status is Status.INTERRUPTED:
-            grid = grid[:0]
+    watch = Watch(problem.t0, end, report, path, seconds, belongs)
     try:
-        stepper = program.start(problem.y0, problem.par, problem.t0)
+        if looked_for:
+            stepper: Any = started_with_events(program, problem, looked_for)(
+                problem.y0, problem.par, problem.t0, end
+            )
+        else:
+            stepper = program.start(problem.y0, problem.par, problem.t0)
     except UserError as raised:
         raise raised.error from None
     way = _Way(stepper, grid, sample, kept.get("way"))
-    way.go(watch, {} if found is None else {"found": found})
+    way.go(watch)
     watch.write()
     samples, stats = way.samples, way.stats
     error: Exception | None = getattr(stepper, "error", None)
@@ -180,7 +169,7 @@ def integrate(
         method=method,
         error=error,
     )
-    return solution if found is None else _with_events(solution, found)
+    return _with_events(solution, stepper.search) if looked_for else solution
 
 
 class _Way:
@@ -198,19 +187,21 @@ class _Way:
         What `save` returned, of the same integration: it goes on from there.
     """
 
-    def __init__(self, stepper: Stepper, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
+    def __init__(self, stepper: Any, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
         self._stepper, self._grid, self._sample = stepper, grid, sample
         self._t, self._y = [grid[:0]], [np.empty((0, stepper.y.size))]
         self._made, self._before = 0, Stats()
         self._status, self._reason = Status.FINISHED, ""
         self.t = stepper.t
+        self._search: Finder | None = getattr(stepper, "search", None)
         if grid.size:
-            watched: Any = stepper
-            watched.destination = float(grid[-1])  # collapsed steps are judged by the whole way
+            stepper.destination = float(grid[-1])  # collapsed steps are judged by the whole way
         if kept is not None:
             stepper.restore(kept["stepper"])
             self._t, self._y, self._made, self._before = [kept["t"]], [kept["y"]], kept["made"], kept["stats"]
             self._status, self._reason, self.t = kept["status"], kept["reason"], kept["here"]
+            if "search" in kept:
+                stepper.search.load(kept["search"])
 
     @property
     def samples(self) -> Samples:
@@ -233,10 +224,11 @@ class _Way:
         return {
             "stepper": self._stepper.checkpoint(), "t": samples.t, "y": samples.y, "made": self._made,
             "stats": self.stats, "status": self._status, "reason": self._reason, "here": self.t,
+            **({} if self._search is None else {"search": self._search.save()}),
         }  # fmt: skip
 
-    def go(self, watch: Watch, also: Mapping[str, Any]) -> None:
-        """Go to the end, a failure or Ctrl-C; ``watch`` looks after each piece, and keeps ``also`` too."""
+    def go(self, watch: Watch) -> None:
+        """Go to the end, a failure or Ctrl-C; ``watch`` looks after each piece."""
         grid, ways = self._grid, getattr(self._stepper, "samplings", SAMPLINGS)
         walks = watch.looks and "steps" in ways and self._sample != "land"
         walks = walks and (self._sample is not None or ways[0] != "land")
@@ -245,7 +237,9 @@ class _Way:
             while pieces is not None and self._made < grid.size and self._status is Status.FINISHED:
                 with pieces:
                     self._piece(pieces.length, walks)
-                watch.look(self.t, lambda: self.stats.steps, lambda: {"way": self.save(), **also})
+                watch.look(self.t, lambda: self.stats.steps, lambda: {"way": self.save()})
+            if self._search is not None and grid.size and self._status is Status.FINISHED:
+                self._stepper.look_to(float(grid[-1]))
         except KeyboardInterrupt:
             self._status = Status.INTERRUPTED
             self._reason = "Ctrl-C was pressed."
@@ -274,19 +268,18 @@ class _Way:
             self._y.append(reached.y)
             self._made += n if self._sample == "steps" else reached.t.size
         self._status, self._reason = reached.status, reached.reason
-        failed = reached.status.failed
-        self.t = stepper.t if failed else float(part[-1])
+        self.t = float(part[-1]) if reached.status is Status.FINISHED else stepper.t
 
 
-def _with_events(solution: Solution, found: "Found") -> Solution:
-    """Return the solution with what a search for events has found."""
-    work = {name: getattr(found.stats, name) for name in ("steps", "evaluations", "iterations")}
-    stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": work})
-    solution = replace(solution, stats=stats, events=found.events)
-    if found.status is Status.FINISHED or solution.status.failed:
-        return solution
-    stop = found.t_stop if found.status is Status.EVENT else solution.t_stop
-    return replace(solution, status=found.status, reason=found.reason, t_stop=stop, error=found.error)
+def _with_events(solution: Solution, search: Finder) -> Solution:
+    """Return the solution with what a search for events has found, up to where it ended."""
+    end = Ending.of(search, solution.status, solution.reason, solution.problem.t0, solution.t_stop)
+    n = end.count(solution.t, search)
+    stats = replace(solution.stats, extra={**solution.stats.extra, "event_search": search.work()})
+    return replace(
+        solution, t=solution.t[:n], y=solution.y[:n], status=end.status, reason=end.reason, t_stop=end.stop,
+        stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
+    )  # fmt: skip
 
 
 def _grid(problem: Problem, times: ArrayLike | None) -> Array:

@@ -1,7 +1,9 @@
 """Integrate one problem from many starts, or with many values of its parameters."""
 
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -9,6 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
+from integrators.events.event import Event, named
+from integrators.events.finder import started_with_events
+from integrators.events.members import follow
 from integrators.options import Count
 from integrators.protocol import (
     Array,
@@ -22,6 +27,7 @@ from integrators.protocol import (
     check_problem,
     check_times,
 )
+from integrators.solution import Occurrences
 from integrators.watch import SOON, Bar, Progress, Report
 from problems.calls import readable
 from problems.checks import NOTHING, Named, checked
@@ -48,6 +54,8 @@ class Solutions(Trajectories):
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
         What was integrated, and how.
+    events : list of dict of str to Occurrences
+        What happened in each trajectory, by the events' names; empty where none were looked for.
 
     Examples
     --------
@@ -65,6 +73,7 @@ class Solutions(Trajectories):
     from_cache: bool | None
     problem: Problem
     method: MethodBase
+    events: list[dict[str, Occurrences]] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.status)
@@ -85,6 +94,7 @@ def integrate_many(
     times: ArrayLike | None = None,
     threads: int = 1,
     progress: bool | Report = False,
+    events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
@@ -111,6 +121,9 @@ def integrate_many(
     progress : bool or callable
         Whether to show a bar on a terminal; or what is called now and then, in this thread, with an
         `integrators.watch.Progress`: the part of the trajectories that are at their end, and their steps.
+    events : Event or callable, or a sequence of them, optional
+        What to look for, as in `integrate`. Trajectories then go one by one, or one in each thread, and a
+        terminal event ends its own: what of ``times`` comes later is NaN.
 
     Returns
     -------
@@ -156,6 +169,8 @@ def integrate_many(
         par[:, np.asarray(places[name], dtype=int)] = value
     check_batch(rows, par, grid, system)
     program = method.compile(system)
+    looked_for = named(events) if not isinstance(events, Sequence) or events else {}
+    start = started_with_events(program, problem, looked_for) if looked_for else None
     made = Solutions(
         t=grid,
         y=np.full((n, grid.size, system.dim), np.nan),
@@ -171,17 +186,22 @@ def integrate_many(
         method=method,
     )
     with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
-        _integrate(program, made, threads, report)
+        _integrate(program, made, threads, report, start)
     return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
 
 
-def _integrate(program: Program, made: Solutions, threads: int, report: Report | None) -> None:
-    """Integrate piece by piece, each of which takes about `SOON`."""
+def _integrate(
+    program: Program, made: Solutions, threads: int, report: Report | None, start: Callable[..., Any] | None
+) -> None:
+    """Integrate piece by piece, each of which takes about `SOON`; ``start`` where events are looked for."""
     batch: Any = getattr(program, "batch", None)
+    if start is not None:
+        batch = partial(_with_events, start, made)
     options = {"times": made.t, "t0": made.problem.t0}
     if getattr(program, "threaded", False):
         options["threads"] = threads
-    first, size, began, n = 0, 1 if batch is None else FIRST * threads, perf_counter(), len(made)
+    few = 1 if batch is None else threads if start is not None else FIRST * threads
+    first, size, began, n = 0, few, perf_counter(), len(made)
     while first < n:
         before = perf_counter()
         here = slice(first, first + size)
@@ -198,6 +218,23 @@ def _integrate(program: Program, made: Solutions, threads: int, report: Report |
         if report is not None:
             steps, seconds = int(made.steps.sum()), now - began
             report(Progress(float(made.t[-1]), first / n, steps, seconds, seconds * (n - first) / first))
+
+
+def _with_events(
+    start: Callable[..., Any], made: Solutions, starts: Array, par: Array, **options: Any
+) -> Trajectories:
+    """Integrate some trajectories, and add what has happened in them to ``made``."""
+    members = follow(start, starts, par, **options)
+    made.events.extend(happened for _, happened in members)
+    pieces = [piece for piece, _ in members]
+    return Trajectories(
+        t=made.t,
+        y=np.concatenate([piece.y for piece in pieces]),
+        status=[piece.status[0] for piece in pieces],
+        reason=[piece.reason[0] for piece in pieces],
+        t_stop=np.concatenate([piece.t_stop for piece in pieces]),
+        steps=np.concatenate([piece.steps for piece in pieces]),
+    )
 
 
 def _values(system: System, parameters: Any) -> dict[str, Array]:

@@ -130,7 +130,7 @@ class StepperBase:
     @one_thread
     def step(self) -> Status:
         """Take one step of the method's own length; after a failure, do nothing."""
-        if not self._status.failed:
+        if self._status is Status.RUNNING:
             reached = self._one()
             if reached is not None and self._finite(*reached):
                 self._arrive(*reached)
@@ -146,7 +146,7 @@ class StepperBase:
             return self._land_on(times)
         grid = check_times(times, self._t)
         dim = self._y.size
-        if self._status.failed:
+        if self._status is not Status.RUNNING:
             return Samples(grid[:0], np.empty((0, dim)), self._status, self._reason)
         here = int(grid[0] == self._t)
         t, y = grid[:here], np.tile(self._y, (here, 1))
@@ -158,7 +158,7 @@ class StepperBase:
                 t, y = t[:-1], y[:-1]
             if t.size and not self._status.failed:
                 self._arrive(float(t[-1]), y[-1])
-        status = self._status if self._status.failed else Status.FINISHED
+        status = Status.FINISHED if self._status is Status.RUNNING else self._status
         return Samples(t, y, status, self._reason)
 
     def _is_ahead(self, times: ArrayLike) -> TypeGuard[Array]:

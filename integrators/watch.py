@@ -36,7 +36,7 @@ class Progress:
     t : float
         Where it is.
     fraction : float
-        Of the way, from 0 to 1; a search for events is the first half of it.
+        Of the way, from 0 to 1.
     steps : int
         Own steps until now.
     seconds, left : float
@@ -69,8 +69,6 @@ class Watch:
     ----------
     t0, end : float
         The way.
-    phases : int
-        How often it is gone: once, or twice with events.
     report : callable or None
         Called with a `Progress`.
     path : Path or None
@@ -82,15 +80,14 @@ class Watch:
     """
 
     def __init__(
-        self, t0: float, end: float, phases: int, report: Report | None, path: Path | None, every: float,
+        self, t0: float, end: float, report: Report | None, path: Path | None, every: float,
         identity: Mapping[str, str],
     ):  # fmt: skip
-        self._t0, self._end, self._phases = t0, end, phases
+        self._t0, self._end = t0, end
         self._report, self._path, self._every, self._identity = report, path, every, identity
         self._began = self._written = perf_counter()
         self._first: float | None = None
         self._kept: dict[str, Any] | None = None
-        self.phase = 0
         self.looks = report is not None or path is not None
         """Whether anybody wants to know of the way between two samples."""
 
@@ -103,7 +100,7 @@ class Watch:
                 self.write()
         if self._report is not None:
             way = (t - self._t0) / (self._end - self._t0) if self._end != self._t0 else 1.0
-            fraction = (self.phase + min(max(way, 0.0), 1.0)) / self._phases
+            fraction = min(max(way, 0.0), 1.0)
             self._first = fraction if self._first is None else self._first
             seconds, made = now - self._began, fraction - self._first
             left = seconds * (1.0 - fraction) / made if made > 0.0 else float("inf")

@@ -4,11 +4,18 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
 from integrators.kernel.ensemble.engine import run
+from integrators.kernel.events.engine import look
 from integrators.kernel.implicit.engine import solver
 from integrators.kernel.line.engine import line
 from integrators.kernel.step.engine import steps
 
-ENGINES = {"steps": steps, "implicit solvers": solver, "line integrals": line, "ensembles": run}
+ENGINES = {
+    "steps": steps,
+    "implicit solvers": solver,
+    "line integrals": line,
+    "ensembles": run,
+    "events": look,
+}
 
 
 def compile_ahead(processes: int = 1) -> dict[str, float | None]:

@@ -24,8 +24,8 @@ Integers = NDArray[np.int64]
 
 # How a step, or an advance, ended.
 # SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
-# integral is to keep is no invariant.
-RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT = range(8)
+# integral is to keep is no invariant. HALTED: a search for events has to be attended to before the next step.
+RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -205,6 +205,8 @@ class Context(Memory):
     slow = Integer()  # steps in a row at which the fixed-point iteration was slow
     held = Integer()  # steps for which the implicit solver stays at work when it takes over
     left = Integer()  # steps of these that are left
+    look = Integer()  # address of int64(context, memory), which looks for events in each step; 0: none
+    look_memory = Integer()
 
     # --- counters ---
     steps = Integer()

@@ -1,17 +1,20 @@
 """HBVM(k, s) compiled for one system, with steps of one length or of varying length: a `Program`."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.caveats import sees_kinks
+from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
+from integrators.kernel.events.engine import look
+from integrators.kernel.events.functions import EventFunction
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
@@ -27,7 +30,7 @@ from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
 from problems.errors import InputError
-from problems.problem import System
+from problems.problem import Problem, System
 
 TOLERANCE = 1e-16
 
@@ -165,6 +168,30 @@ class HBVMProgram(Compiled):
         """
         values = check_parameters(par, self.system)
         return self._stepper(self, check_state(y0, self.system.dim), values, check_start(t0))
+
+    def with_events(
+        self, problem: Problem, events: Mapping[str, Event]
+    ) -> Callable[[ArrayLike, ArrayLike | None, float, float], HBVMStepper]:
+        """Compile the functions of events; return what starts a trajectory that looks for them.
+
+        Its arguments are those of `start`, and the time up to which is looked.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If a function can neither be traced nor called with numbers.
+        """
+        started = binary.clock()
+        functions = [EventFunction(name, event.g, problem) for name, event in events.items()]
+        look.code()
+        self.compile_seconds += binary.clock() - started
+
+        def start(y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> HBVMStepper:
+            stepper = self.start(y0, par, t0)
+            stepper.look_for(events, functions, end)
+            return stepper
+
+        return start
 
     def batch(
         self,

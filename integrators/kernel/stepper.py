@@ -2,6 +2,7 @@
 
 import threading
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -9,21 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from integrators.checkpoints import Identity
+from integrators.events.event import Event
 from integrators.kernel.context import (
     ALWAYS_IMPLICIT,
     AUTO,
     BUDGET,
     DONE,
+    HALTED,
     NOT_FINITE,
     NOT_KEPT,
     SCATTERED,
     Context,
 )
+from integrators.kernel.events.functions import EventFunction
+from integrators.kernel.events.search import KernelSearch
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import engine
-from integrators.kernel.pace import Pace
+from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.one_thread import one_thread
@@ -33,6 +38,8 @@ from problems.errors import unknown
 from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
+CHUNK_WITH_EVENTS = 1 << 10  # the same where a step may take as long as many
+CLOSE = 64  # units in the last place: nothing happens in a time as short
 FIRST_HELD = 16  # steps for which the implicit solver stays at work when it is made; `solve` has more
 
 Ended = tuple[Status, str]  # how a run is over before its end, and the reason as a sentence
@@ -109,6 +116,8 @@ class HBVMStepper(ABC):
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
+    search: KernelSearch | None = None
+    """What looks for events in the steps, see `look_for`."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: Program, y: Array, par: Array, t0: float):
@@ -123,6 +132,24 @@ class HBVMStepper(ABC):
         if program.solver.strategy == ALWAYS_IMPLICIT:
             self._take_implicit()
         self._begin(y, t0)
+
+    def look_for(self, events: Mapping[str, Event], functions: Sequence[EventFunction], end: float) -> None:
+        """Look for events in all steps from here on, up to a time."""
+        contexts, code = (self._context, self._side), steps.code().address
+        self.search = KernelSearch(events, functions, contexts, code, end)
+        self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
+        self._pace.steps = FEWEST
+
+    def look_to(self, end: float) -> Status:
+        """Look for events from the last own step to a time that lies in the step ahead."""
+        if self.search is not None and self._status is Status.RUNNING:
+            if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
+                return self._status
+            if not self._context.solved:  # as after samples that are own steps
+                self.advance([end], sample="side")
+            if self._status is Status.RUNNING:
+                self.search.finish(end)
+        return self._status
 
     def _begin(self, y: Array, t0: float) -> None:
         """Put the trajectory at its start."""
@@ -355,6 +382,8 @@ class HBVMStepper(ABC):
             raise KeyboardInterrupt
         for workspace in self._implicit or ():
             workspace.raise_what_is_no_failure()
+        if outcome == HALTED and self.search is not None and self.search.attend():
+            return BUDGET
         return outcome
 
     @property
@@ -373,6 +402,8 @@ class HBVMStepper(ABC):
         """Return the status that an outcome stands for, and the reason as a sentence."""
         if self.error is not None:
             return Status.USER_ERROR, f"{UserError(self.error)} in the step from t = {self.t!r}."
+        if outcome == HALTED and self.search is not None:
+            return Status.EVENT, self.search.hits.reason
         return failure(outcome, self._program, (self._context, self._side), self.t, self._solver)
 
 

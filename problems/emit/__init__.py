@@ -1,6 +1,7 @@
 """One traced system to source for numpy, numba, JAX and heyoka: the same operations in the same order."""
 
 import hashlib
+import math
 import re
 import warnings
 from collections.abc import Callable
@@ -30,8 +31,11 @@ BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
 SLOW = 10  # operations that take as long to compile as one of:
 _SLOW = {*FUNCTIONS, "atan2", "table"} - {"sqrt", "abs", "sign"}
-_NUMBA_HEAD = """from math import copysign, cos, exp, fabs, log, sin, sqrt, tan
-from math import acos, asin, atan, atan2, cosh, erf, sinh, tanh
+_MATHEMATICS = (
+    "acos", "asin", "atan", "atan2", "copysign", "cos", "cosh", "erf", "exp", "fabs", "log", "sin", "sinh",
+    "sqrt", "tan", "tanh",
+)  # fmt: skip
+_NUMBA_HEAD = f"""from math import {", ".join(_MATHEMATICS)}
 
 import numba
 import numpy as np
@@ -158,6 +162,13 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
     return _on_arrays(_written(function, name, "numpy", limit), len(function.outputs))
 
 
+def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
+    """Return the source of such a function for numba, and it as a Python function that numba can compile."""
+    made = _written(function, name, "numba", SMALL)
+    namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in _MATHEMATICS}}
+    return made.text, _executed(made, namespace)
+
+
 def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
     states = np.asarray(y, dtype=np.float64)
     columns = np.ascontiguousarray(np.atleast_2d(states.T))
@@ -278,11 +289,21 @@ def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
     problems.errors.MissingLibraryError
         If heyoka is not installed.
     """
+    variables, expressions = _for_heyoka(system, source(system, what, "heyoka"))
+    return list(zip(variables, expressions, strict=True)) if what == "field" else expressions
+
+
+def heyoka_of(system: System, function: Function) -> Any:
+    """Return a function of a system's state that is none of its own, such as one of `System.trace`."""
+    return _for_heyoka(system, _written(function, "function", "heyoka", None))[1][0]
+
+
+def _for_heyoka(system: System, made: Source) -> tuple[list[Any], list[Any]]:
+    """Return a system's variables, and a function of them as expressions."""
     try:
         import heyoka as hy
     except ImportError as error:
         raise _missing("heyoka") from error
-    made = source(system, what, "heyoka")
     width = len(str(system.dim))
     if system.dof is None:
         names = [f"y{i:0{width}d}" for i in range(system.dim)]
@@ -290,8 +311,7 @@ def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
         names = [f"{x}{i:0{width}d}" for x in "qp" for i in range(system.dof)]
     variables = list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
     expressions = _executed(made, {})(hy.time, variables, hy.par, hy)
-    expressions = [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
-    return list(zip(variables, expressions, strict=True)) if what == "field" else expressions
+    return variables, [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
 
 
 def _missing(library: str) -> MissingLibraryError:
@@ -307,8 +327,10 @@ __all__ = [
     "compilable",
     "fingerprint",
     "heyoka",
+    "heyoka_of",
     "jax",
     "numba",
+    "numba_of",
     "numpy",
     "numpy_of",
     "source",

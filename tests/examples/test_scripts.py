@@ -17,6 +17,7 @@ SAYS = {
     "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
     "measured_forcing.py": ["steps that end at a knot: 40 of 40"],
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
+    "section.py": ["3600 passages", "each on the surface: True", "each at the energy: True"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }
 

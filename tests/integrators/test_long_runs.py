@@ -145,11 +145,8 @@ class TestResume:
         whole = integrate(problem, method, **options)
         assert whole.status is Status.EVENT
         assert_same(broken_and_resumed(path, problem, method, breaks=breaks, **options), whole)
-        work = whole.stats.extra["event_search"]
-        assert (
-            integrate(problem, method, **options, resume=path).stats.extra["event_search"]["steps"]
-            >= work["steps"]
-        )
+        again = integrate(problem, method, **options, resume=path)
+        assert again.stats.extra["event_search"] == whole.stats.extra["event_search"]
 
     def test_backwards(self, path):
         problem = problems.load("kepler")
@@ -280,8 +277,11 @@ class TestSignals:
         assert seconds < 2.0
 
     def test_ctrl_c_while_events_are_looked_for(self, path):
-        out, _ = self.child(path, signal.SIGINT, events="events=lambda q: q[0],")
-        assert out.startswith("interrupted 0 Ctrl-C was pressed while events were looked for")
+        out, seconds = self.child(path, signal.SIGINT, events="events=lambda q: q[0],")
+        words = out.split()
+        assert words[0] == "interrupted"
+        assert int(words[1]) > 100
+        assert seconds < 2.0  # as above
 
     def test_kill_leaves_a_whole_file(self, path):
         self.child(path, signal.SIGKILL)

@@ -10,7 +10,7 @@ from integrators.kernel.native import binary, store
 from integrators.kernel.native.foreign import raise_error
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
-RESET, ADVANCE, WALK = range(3)
+RESET, ADVANCE, WALK, PART = range(4)
 ENTRY = "what ctx side between count times targets parts first out budget"
 
 WAIT = "integrators: compiling the kernel for this processor, once: 5 to 10 s (ahead: `hbvm-bench warm`)"

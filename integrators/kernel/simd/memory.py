@@ -234,6 +234,8 @@ call_solver = _caller(3, types.int64)
 """``call_solver(solver, ctx, memory, started)``: the implicit solver."""
 call_line = _caller(2, types.int64)
 """``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
+call_look = _caller(2, types.int64)
+"""``call_look(look, ctx, memory)``: the search for events, see `integrators.kernel.events`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
 call_steps = _caller(2)

@@ -10,6 +10,7 @@ at the end, with what rounding took from it.
 
 from integrators.kernel.context import DONE
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import reconsider, solve_implicitly
@@ -30,11 +31,19 @@ def solve(ctx):
 
 
 @compiled
+def looked(ctx):
+    """Look for events in the step ahead, if anybody wants that; return DONE or HALTED."""
+    return call_look(ctx.look, ctx, ctx.look_memory) if ctx.look else DONE
+
+
+@compiled
 def step(ctx):
     """Take one step; the state stays where it was if the step fails."""
     outcome = solve(ctx)
     if outcome == DONE:
         outcome = finish(ctx)
+    if outcome == DONE:
+        outcome = looked(ctx)
     if outcome == DONE:
         commit(ctx)
     return outcome

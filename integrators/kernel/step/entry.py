@@ -1,10 +1,11 @@
 """What Python calls: the one C function of the steps."""
 
 from integrators.kernel.context import DONE
-from integrators.kernel.native.engine import ADVANCE, RESET
+from integrators.kernel.native.engine import ADVANCE, PART, RESET
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.views import doubles, integers
 from integrators.kernel.step.loop import advance, context, reset, walk
+from integrators.kernel.step.sample import part_step, write
 
 
 @compiled
@@ -13,6 +14,8 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
 
     RESET: put the trajectory at the state at ``out``. ADVANCE: see `loop.advance`.
     WALK: take up to ``budget`` steps, none beyond times[0], which are then in ``times``.
+    PART: write the state parts[0] beyond the present one to ``out``, and count nothing; parts[1] is
+    the length of the last one from there, or 0.
     """
     t, n, p, y = doubles(times), integers(targets), doubles(parts), doubles(out)
     if what == RESET:
@@ -20,4 +23,9 @@ def entry(what, ctx, side, between, count, times, targets, parts, first, out, bu
         return DONE
     if what == ADVANCE:
         return advance(context(ctx), context(side), between, count, t, n, p, first, y, budget)
+    if what == PART:
+        outcome = part_step(context(ctx), context(side), p[0], p[1])
+        if outcome == DONE:
+            write(context(side), context(side).next_state, y)
+        return outcome
     return walk(context(ctx), t, y, budget)

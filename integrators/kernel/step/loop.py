@@ -4,7 +4,7 @@ from integrators.kernel.context import BUDGET, DONE, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
-from integrators.kernel.step.advance import step
+from integrators.kernel.step.advance import looked, step
 from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length
 from integrators.kernel.step.finish import arrive
@@ -41,6 +41,9 @@ def approach(ctx, t, budget):
             return DONE, budget
         if budget == 0:
             return BUDGET, budget
+        outcome = looked(ctx)
+        if outcome != DONE:
+            return outcome, budget
         budget -= 1
         take(ctx)
 
@@ -109,6 +112,9 @@ def walk(ctx, times, out, budget):
             return DONE
         if budget == 0:
             return BUDGET
+        outcome = looked(ctx)
+        if outcome != DONE:
+            return outcome
         take(ctx)
         times[made] = ctx.t0
         write(ctx, ctx.state, out + dim * made)

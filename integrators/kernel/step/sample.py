@@ -99,10 +99,11 @@ def interpolate(ctx, c, out):
 
 
 @compiled
-def part_step(ctx, side, part):
+def part_step(ctx, side, part, known):
     """Solve in ``side`` a step of length ``part`` from the state of ``ctx``; leaves ``ctx`` as it is.
 
-    It starts inside the step ahead if that is solved, else after the step behind.
+    First stages come from the partial step of length ``known`` that ``side`` has made from there; if that
+    is 0, from inside the step ahead if that is solved, else from the step behind.
     """
     set_step(side, part)
     copy(ctx.state, side.state, vectors_of_state(ctx))
@@ -111,7 +112,9 @@ def part_step(ctx, side, part):
     side.t0, side.time_low = ctx.t0 + ctx.n * ctx.h, ctx.time_low
     rewind(side)
     prepare(side)
-    if ctx.solved:
+    if known != 0.0:
+        predict(side, side, known, 0.0)
+    elif ctx.solved:
         predict(side, ctx, ctx.h, 0.0)
     else:
         predict(side, ctx, ctx.length, 1.0)
@@ -165,7 +168,7 @@ def sample(ctx, side, between, t, part, out):
     if between == DENSE:
         interpolate(ctx, part / ctx.h, out)
         return DONE
-    outcome = part_step(ctx, side, part)
+    outcome = part_step(ctx, side, part, 0.0)
     add_counters(ctx, side)
     if outcome == DONE:
         write(side, side.next_state, out)

@@ -3,7 +3,7 @@
 import copy
 import os
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.caveats import unseen
+from integrators.events.event import Event
 from integrators.options import Share
 from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
+from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
 from integrators.protocol import Array, MethodBase, Status, Trajectories
 from integrators.stepping import ProgramBase, StepperBase
 from integrators.watchdog import CRAWL_STEPS, crawl
@@ -28,6 +30,9 @@ COLD = "HBVM_BENCH_COLD_COMPILE"
 
 NEAR = 8
 """Times its last step that a sample must be away for the compiled loop to be called."""
+
+STEPS_BEYOND = 256
+"""Steps that may be taken in vain beyond a terminal event."""
 
 CITATION = """\
 @article{BiscaniIzzo2021,
@@ -114,28 +119,52 @@ class TaylorProgram(ProgramBase):
     def __init__(self, system: System, method: Taylor):
         super().__init__(system, method)
         hy = load("heyoka")
-        from problems import emit
-
+        self._options = method.options(defaults=True)
         started = perf_counter()
         with _caches(hy) as use:
             before = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
-            self.template = hy.taylor_adaptive(
-                emit.heyoka(system),
-                [0.0] * system.dim,
-                pars=system.pack({}).tolist(),
-                tol=method.tol,
-                high_accuracy=method.high_accuracy,
-                compact_mode=method.compact_mode,
-                fast_math=method.fast_math,
-            )
+            self.template = self._integrator()
             after = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
         self.from_cache = use and (after[0] == before[0] or after[1] == before[1])
         self.compile_seconds = perf_counter() - started
-        self._options = method.options(defaults=True)
         self._lanes: Lanes | None = None
         # Copying takes a millisecond, and a copy's code is not in the processor's caches yet: the first
         # tenth of a millisecond would be slower than the library is.
         self._spare: list[Any] = []
+
+    def _integrator(self, **more: Any) -> Any:
+        """Return an integrator; heyoka compiles what it has not in a cache."""
+        from problems import emit
+
+        system, par = self.system, self.system.pack({}).tolist()
+        return load("heyoka").taylor_adaptive(
+            emit.heyoka(system), [0.0] * system.dim, pars=par, **self._options, **more
+        )
+
+    def with_events(
+        self, problem: Problem, events: Mapping[str, Event]
+    ) -> Callable[[ArrayLike, ArrayLike | None, float, float], "TaylorStepper"]:
+        """Return what starts a trajectory in which heyoka looks for events.
+
+        Its arguments are those of ``start``, and the time up to which is looked. The events are heyoka's
+        own: zeros of the function's Taylor polynomial, at the accuracy of the steps. Where the function
+        touches zero and turns back, heyoka sees nothing.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a function that cannot be traced.
+        """
+        started = perf_counter()
+        self._integrator(nt_events=heyoka_events(problem, events))
+        self.compile_seconds += perf_counter() - started
+
+        def start(y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> TaylorStepper:
+            stepper: Any = self.start(y0, par, t0)
+            stepper.look_for(events, self._integrator(nt_events=heyoka_events(problem, events)), end)
+            return stepper
+
+        return start
 
     def batch(
         self,
@@ -200,6 +229,8 @@ class TaylorStepper(StepperBase):
     """A trajectory of heyoka's; ``"side"`` (default), ``"steps"`` or ``"land"``, see `Taylor`."""
 
     samplings = ("side", "steps", "land")
+    search: TaylorSearch | None = None
+    """What keeps the events, see `look_for`."""
 
     def __init__(self, integrator: Any, y: Array, par: Array, t: float):
         super().__init__(y, t)
@@ -209,6 +240,29 @@ class TaylorStepper(StepperBase):
         if par.size:
             integrator.pars[:] = par
         self._place(t, y)
+
+    def look_for(self, events: Mapping[str, Event], integrator: Any, end: float) -> None:
+        """Go on with an integrator that finds events, and keep them up to a time."""
+        integrator.pars[:] = self._ta.pars
+        self._ta = integrator
+        self._place(self._t, self._y)
+        self.search = TaylorSearch(events, self._y, self._t, end, lambda: self._t)
+        self.search.watch(integrator)
+
+    def look_to(self, end: float) -> Status:
+        """Keep the events up to a time in the step ahead too."""
+        if self.search is not None and self._status is Status.RUNNING:
+            self._serve(np.array([end]), "side")
+            self.search.finish()
+        return self._status
+
+    def _ends(self) -> bool:
+        """Whether a terminal event has happened, which ends the integration."""
+        if self.search is None or not self.search.over:
+            return False
+        hits = self.search.hits
+        self._fail(Status.EVENT, hits.stop, hits.reason)
+        return True
 
     def _place(self, t: float, y: Array) -> None:
         self._ta.time = t
@@ -252,24 +306,28 @@ class TaylorStepper(StepperBase):
         outcome, h = (self._ta.step if self._sign > 0.0 else self._ta.step_backward)(write_tc=True)
         if outcome == self._outcome.success:
             self._stats.steps, self._stepped = self._stats.steps + 1, True
-            return abs(h)
+            return None if self._ends() else abs(h)
         self._broken(t)
         return None
 
     def _land(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
         watch = crawl(self, self._ta.time, t)
+        few = self.search is not None and self.search.terminates
+        most = STEPS_BEYOND if few else CRAWL_STEPS
         while True:
             before = self._ta.time
-            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=CRAWL_STEPS, write_tc=write_tc)
+            outcome, _, _, steps, *_ = self._ta.propagate_until(t, max_steps=most, write_tc=write_tc)
             self._stats.steps, self._stepped = self._stats.steps + steps, self._stepped or steps > 0
+            if self._ends():
+                return False
             if outcome == self._outcome.time_limit:
                 return True
             if outcome == self._outcome.err_nf_state:
                 self._broken(self._ta.time if np.isfinite(self._ta.time) else before)
             elif stalled := watch.sees(self._ta.time, steps):
                 self._fail(Status.STALLED, self._ta.time, stalled)
-            if self._status.failed:
+            if self._status is not Status.RUNNING:
                 return False
 
     def _pass(self, t: float, sign: float) -> bool:
@@ -299,6 +357,8 @@ class TaylorStepper(StepperBase):
         ta.state[:] = ta.tc[:, 0]
         ta.dtime = start + lost, lost - ((start + lost) - start)
         self._stats.steps -= 1
+        if self.search is not None:
+            self.search.take_back(ta.time)
         self._stats.extra["side_steps"] += 1
 
     def _broken(self, t: float) -> None:
@@ -309,3 +369,5 @@ class TaylorStepper(StepperBase):
 
     def _load(self, inner: Any) -> None:
         self._ta, self._sign, self._stepped = copy.copy(inner[0]), *inner[1:]
+        if self.search is not None:
+            self.search.watch(self._ta)

@@ -1,13 +1,15 @@
 """Poincaré sections."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from integrators.events.event import Event, named
-from integrators.events.search import search
+from integrators.events.event import Event
+from integrators.integrate import integrate
 from integrators.options import Count
 from integrators.protocol import MethodBase, check_problem
 from integrators.solution import Solution
+from integrators.watch import Report
 from problems import Problem
 from problems.calls import readable
 from problems.checks import checked
@@ -23,6 +25,7 @@ def section(
     direction: int = 1,
     count: int | None = None,
     t_end: float | None = None,
+    progress: bool | Report = False,
 ) -> Solution:
     """Return the states at which a trajectory passes through the surface g = 0: a Poincaré section.
 
@@ -40,6 +43,8 @@ def section(
         Passages after which to stop.
     t_end : float, optional
         The latest time; the problem's own by default.
+    progress : bool or callable, optional
+        As for `integrate`.
 
     Returns
     -------
@@ -64,21 +69,7 @@ def section(
     if end == problem.t0:
         raise InputError(f"t_end={end!r} of a section must be another time than t0={problem.t0!r}.")
     count = checked("a section", "count", count, Count | None)
-    program = method.compile(problem.system)
-    events = named(Event(g, direction=direction, terminal=count or 0, name="section"))
-    found = search(problem, method, program, events, end)
-    passages = found.events["section"]
-    return Solution(
-        t=passages.t,
-        y=passages.y,
-        status=found.status,
-        reason=found.reason,
-        t_stop=found.t_stop,
-        stats=found.stats,
-        compile_seconds=program.compile_seconds,
-        from_cache=program.from_cache,
-        problem=problem,
-        method=method,
-        events=found.events,
-        error=found.error,
-    )
+    event = Event(g, direction=direction, terminal=count or 0, name="section")
+    made = integrate(problem, method, [end], events=event, progress=progress)
+    passages = made.events["section"]
+    return replace(made, t=passages.t, y=passages.y)

@@ -1,0 +1,75 @@
+"""Events of many trajectories."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from integrators.events.finder import Ending
+from integrators.protocol import Array, Status, Trajectories, UserError
+from integrators.solution import Occurrences
+
+Member = tuple[Trajectories, dict[str, Occurrences]]
+
+
+def follow(
+    start: Callable[..., Any], starts: Array, par: Array, times: Array, t0: float, threads: int = 1
+) -> list[Member]:
+    """Integrate trajectories one by one, or as many at once as there are threads, and look for their events.
+
+    Parameters
+    ----------
+    start : callable
+        What `finder.started_with_events` has returned.
+    starts, par : ndarray, shapes (n, dim), (n, n_par)
+        Starts and parameters.
+    times : ndarray, shape (m,)
+        Times asked for.
+    t0 : float
+        Time of the starts.
+    threads : int
+        How many.
+
+    Returns
+    -------
+    list
+        Of each trajectory (a batch of one), and what has happened in it by the events' names.
+    """
+    stop = threading.Event()
+
+    def one(i: int) -> Member:
+        return _one(start, starts[i], par[i], times, t0, stop)
+
+    if threads == 1 or len(starts) == 1:
+        return [one(i) for i in range(len(starts))]
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            return list(pool.map(one, range(len(starts))))
+        except BaseException:
+            stop.set()  # the others come back at once
+            raise
+
+
+def _one(
+    start: Callable[..., Any], y0: Array, par: Array, times: Array, t0: float, stop: threading.Event
+) -> Member:
+    y, steps = np.full((1, times.size, y0.size), np.nan), np.zeros(1, dtype=np.int64)
+    end = float(times[-1])
+    try:
+        stepper = start(y0, par, t0, end)
+    except UserError as raised:
+        reason = f"{raised} at the start, t = {t0!r}."
+        return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps), {}
+    stepper.stop = stop
+    samples = stepper.advance(times)
+    status = samples.status
+    if status is Status.FINISHED:
+        stepper.look_to(end)
+    reached = end if status is Status.FINISHED else stepper.t
+    ending = Ending.of(stepper.search, status, samples.reason, t0, reached)
+    n = ending.count(samples.t, stepper.search)
+    y[0, :n], steps[0] = samples.y[:n], stepper.stats.steps
+    made = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)
+    return made, stepper.search.hits.occurrences()

@@ -1,0 +1,296 @@
+"""What the steps call when a step is solved: the one C function of the search for events."""
+
+from integrators.kernel.context import DONE, HALTED
+from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
+from integrators.kernel.events.memory import (
+    FINEST,
+    FULL,
+    GOING,
+    PART,
+    RAISED,
+    START,
+    TERMINAL,
+    UNRESOLVED,
+    UNSOLVABLE,
+    Search,
+)
+from integrators.kernel.events.sample import (
+    NAN,
+    function,
+    is_finite,
+    noise_of,
+    sample,
+    sample_first,
+    sign,
+    time_at,
+    weigh_first,
+)
+from integrators.kernel.events.value import context, forget_states, noise_at, state_at, value_at
+from integrators.kernel.events.zeros import find_zeros
+from integrators.kernel.native.attributes import view
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.step.sample import write
+from integrators.kernel.step.sweep import project
+
+DEEPEST = 8  # times that a step is halved where samples do not resolve a function
+ISOLATED = 16  # changes of sign in a part that is not resolved: a pole, a jump or a corner makes fewer
+LOST = 4.0  # times the rounding of one state: what many steps leave of a g that vanishes all along
+SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
+SAME = 1e-5  # of a step: two touches as close are one
+ULP = 2.0**-52
+
+searching = view(Search)
+
+
+@compiled
+def entry(address, memory):
+    """Look for events in what `Search.mode` names; return DONE, or HALTED as `Search.halted` says."""
+    ctx, search = context(address), searching(memory)
+    search.halted = GOING
+    search.raised = 0
+    set_start(ctx, search)
+    if search.mode == START:
+        begin(ctx, search)
+        return HALTED if search.raised else DONE
+    if not set_end(ctx, search):
+        search.halted = UNSOLVABLE
+        return HALTED
+    before = search.hits
+    for event in range(search.count):
+        search.touched_before[event] = search.touched[event]
+    search.halted = look(ctx, search)
+    if search.halted != GOING:
+        search.hits = before  # what is known of a step is all or nothing
+        for event in range(search.count):
+            search.touched[event] = search.touched_before[event]
+        return HALTED
+    return close(search, before)
+
+
+@compiled
+def set_start(ctx, search):
+    """Set the time and the state of the last own step."""
+    elapsed = ctx.n * ctx.h
+    search.time, lost = two_sum(ctx.t0, elapsed)
+    search.time_low = lost + fma(float(ctx.n), ctx.h, -elapsed) + ctx.time_low
+    write(ctx, ctx.state, search.step_state)
+
+
+@compiled
+def set_end(ctx, search):
+    """Set the time and the state up to which is looked; return whether there is one."""
+    forget_states(search)
+    if search.mode == PART:
+        search.stop = NAN
+        state = state_at(ctx, search, search.goal)
+        for d in range(search.dim):
+            search.stop_state[d] = state[d]
+        search.stop = search.goal
+        return is_finite(search.stop_state[0])
+    if ctx.varying:
+        stop, low = two_sum(ctx.t0, ctx.h)
+        search.stop = stop + (low + ctx.time_low)
+    else:
+        search.stop = ctx.t0 + (ctx.n + 1) * ctx.h
+    write(ctx, ctx.next_state, search.stop_state)
+    return True
+
+
+@compiled
+def begin(ctx, search):
+    """Set what is known of the functions at the start: one that is zero there is no event."""
+    weigh_first(ctx, search)
+    for event in range(search.count):
+        search.event = event
+        value = function(ctx, search, search.time, search.step_state)
+        noise = noise_of(ctx, search, search.time, search.step_state)
+        search.ends[event] = 0.0 if abs(value) <= noise else value
+        search.finite[event] = 1 if is_finite(value) else 0
+        search.touched[event] = NAN
+    search.known = search.time
+
+
+@compiled
+def close(search, before):
+    """Count what has happened; return HALTED at the last occurrence of a terminal event."""
+    for event in range(search.count):
+        search.ends[event] = search.sampled[FINEST * event + search.degree - 1]
+    search.known = search.stop
+    for i in range(before, search.hits):
+        event = search.hit_events[i]
+        search.happened[event] += 1
+        if search.happened[event] == search.limits[event]:
+            search.halted = TERMINAL
+    return DONE if search.halted == GOING else HALTED
+
+
+@compiled
+def look(ctx, search):
+    """Find the events up to `Search.stop`; return GOING or why that could not be done."""
+    project(ctx, ctx.projection, ctx.groups)
+    whole(ctx, search)
+    sample_first(ctx, search)
+    degree = search.degree
+    for event in range(search.count):
+        search.event = event
+        search.start_value = search.ends[event]
+        search.values[0] = search.start_value
+        for i in range(degree):
+            search.values[1 + i] = search.sampled[FINEST * event + i]
+        search.end_value = search.values[degree]
+        if search.finite[event] == 0:
+            for i in range(degree + 1):
+                if is_finite(search.values[i]):
+                    search.finite[event] = 1
+        outcome = examine(ctx, search)
+        if search.raised:
+            return RAISED
+        if outcome != GOING:
+            return outcome
+    return GOING
+
+
+@compiled
+def whole(ctx, search):
+    """Look at all that is to be looked at."""
+    stretch(ctx, search, 0, FINEST)
+
+
+@compiled
+def stretch(ctx, search, first, last):
+    """Look at so many 256ths of what is to be looked at."""
+    length = search.stop - search.time
+    search.start = search.time if first == 0 else search.time + first / FINEST * length
+    search.end = search.stop if last == FINEST else search.time + last / FINEST * length
+    state = state_at(ctx, search, search.start)
+    for d in range(search.dim):
+        search.start_state[d] = state[d]
+    state = state_at(ctx, search, search.end)
+    for d in range(search.dim):
+        search.end_state[d] = state[d]
+    size = max(abs(search.start), abs(search.end))
+    search.resolution = ULP * size / abs(search.end - search.start)
+
+
+@compiled
+def examine(ctx, search):
+    """Find the zeros of a function whose first samples are in `Search.values`."""
+    degree = search.degree
+    finite, unresolved = transform(search, degree)
+    if finite and not unresolved and keeps_away(search, degree):
+        return GOING
+    know(search, degree, finite)
+    if not (unresolved or suspect(search)) or vanishes(ctx, search):
+        return GOING
+    while unresolved and degree < FINEST and search.resolution < SHORTEST:
+        degree = min(4 * degree, FINEST)
+        sample(ctx, search, degree)
+        finite, unresolved = transform(search, degree)
+        know(search, degree, finite)
+    if unresolved and search.resolution < SHORTEST:
+        return divide(ctx, search)
+    return settle(ctx, search, degree, unresolved)
+
+
+@compiled
+def know(search, degree, finite):
+    """Set what is known of a function from its samples and their coefficients."""
+    if finite:
+        refine(search, degree)
+    else:
+        keep_samples(search, degree)
+
+
+@compiled
+def divide(ctx, search):
+    """Find the zeros in parts of the step that are halved until the samples resolve them."""
+    first, size = 0, FINEST // 2
+    while first < FINEST:
+        stretch(ctx, search, first, first + size)
+        if first == 0:
+            search.start_value = search.ends[search.event]
+        else:
+            search.start_value = function(ctx, search, search.start, search.start_state)
+        search.end_value = function(ctx, search, search.end, search.end_state)
+        sample(ctx, search, FINEST)
+        finite, unresolved = transform(search, FINEST)
+        know(search, FINEST, finite)
+        suspect(search)
+        if not vanishes(ctx, search):
+            if unresolved and size > 1 and search.resolution < SHORTEST:
+                size //= 2
+                continue
+            outcome = settle(ctx, search, FINEST, unresolved)
+            if outcome != GOING:
+                return outcome
+        first += size
+        while size < FINEST // 2 and first % (2 * size) == 0:
+            size *= 2
+    whole(ctx, search)
+    return GOING
+
+
+@compiled
+def vanishes(ctx, search):
+    """Whether the function is no more than rounding all along: at both ends, and where it is largest."""
+    if not (is_nothing(ctx, search, 0.0) and is_nothing(ctx, search, 1.0)):
+        return False
+    top = -1
+    for i in range(search.n):
+        inside = search.places[i] > 0.0 and search.places[i] < 1.0
+        if inside and (top < 0 or abs(search.fine[i]) > abs(search.fine[top])):
+            top = i
+    largest = search.places[top] if top >= 0 else 0.5
+    return is_nothing(ctx, search, largest) and is_nothing(ctx, search, 0.5)
+
+
+@compiled
+def is_nothing(ctx, search, x):
+    """Whether the value at a place may be rounding's."""
+    return abs(value_at(ctx, search, x)) <= LOST * noise_at(ctx, search, x)
+
+
+@compiled
+def settle(ctx, search, degree, unresolved):
+    """Find the zeros in the stretch, and note what happens there."""
+    if unresolved:
+        keep_samples(search, degree)
+        changes = 0
+        for i in range(search.n - 1):
+            if sign(search.fine[i]) != sign(search.fine[i + 1]):
+                changes += 1
+        if changes > ISOLATED:
+            return UNRESOLVED
+    if not suspect(search):
+        return GOING
+    find_zeros(ctx, search)
+    for i in range(search.zero_count):
+        if not note(ctx, search, search.zeros[i], search.zero_directions[i]):
+            return FULL
+    return GOING
+
+
+@compiled
+def note(ctx, search, x, direction):
+    """Note a zero, unless it is in another direction than wanted; return whether there was room."""
+    event = search.event
+    t = time_at(search, x)
+    if direction == 0:  # a touch at the end of a step is seen from both sides
+        again = abs(t - search.touched[event]) < SAME * abs(search.stop - search.time)
+        search.touched[event] = t
+        if again:
+            return True
+    if search.directions[event] != 0 and search.directions[event] != direction:
+        return True
+    i = search.hits
+    if i == search.room:
+        return False
+    state = state_at(ctx, search, t)
+    for d in range(search.dim):
+        search.hit_states[search.dim * i + d] = state[d]
+    search.hit_times[i] = t
+    search.hit_events[i] = event
+    search.hit_directions[i] = direction
+    search.hits = i + 1
+    return True

@@ -1,0 +1,136 @@
+"""Functions of time and state behind ``void(times, states, par, values)``, on eight states at once."""
+
+import ctypes
+import inspect
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from integrators.kernel.native import binary, store
+from integrators.kernel.native.field import SOURCES, build
+from problems import Problem, emit
+from problems.calculus.function import Function
+from problems.errors import InputError
+
+LANES = 8
+UNDEFINED = (ArithmeticError, ValueError)  # 1/0, math.sqrt(-1): not a number, as in compiled code
+
+
+class EventFunction:
+    """A user's function for one system.
+
+    Parameters
+    ----------
+    name : str
+        Of the event, for messages.
+    g : callable
+        The function.
+    problem : Problem
+        What it is a function of the states of. Other starts and parameters may follow.
+
+    Attributes
+    ----------
+    address : int
+        Of the C function.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it can neither be traced nor called with numbers.
+    """
+
+    def __init__(self, name: str, g: Callable[..., Any], problem: Problem):
+        self._system, self._raised = problem.system, _Raised()
+        try:
+            traced = problem.system.trace(g, f"event {name!r}")
+        except InputError as refused:
+            self._g, self._wanted = g, _wanted(g, refused)
+            self._check(problem, refused)
+            kind: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
+            self._alive = kind(self._call)
+            address = ctypes.cast(self._alive, ctypes.c_void_p).value
+            assert address is not None
+            self.address = address
+        else:
+            self.address = _compiled(traced).address
+
+    @property
+    def error(self) -> BaseException | None:
+        """What the function raised last in this thread, if Python runs it.
+
+        The values are NaN then, and the flag behind them (the ninth number there) is set.
+        """
+        return self._raised.error
+
+    def _check(self, problem: Problem, refused: InputError) -> None:
+        value: Any = np.nan
+        try:
+            with np.errstate(all="ignore"):
+                value = self._evaluate(problem.t0, problem.y0.copy(), self._parameters(problem.par))
+        except UNDEFINED:
+            pass
+        except Exception:
+            raise refused from None
+        try:
+            float(value)
+        except Exception:
+            raise refused from None
+
+    def _parameters(self, par: Any) -> SimpleNamespace:
+        return SimpleNamespace(**self._system.unpack(par))
+
+    def _evaluate(self, t: float, y: Any, par: SimpleNamespace) -> Any:
+        dof = self._system.dof
+        offered: dict[str, Any] = {"t": t, "y": y, "par": par, "m": np}
+        if dof is not None:
+            offered |= {"q": y[:dof], "p": y[dof:]}
+        return self._g(*[offered[name] for name in self._wanted])
+
+    def _call(self, t: int, states: int, par: int, values: int) -> None:
+        """Evaluate state by state; equal ones that follow each other only once."""
+        found = _numbers(values, LANES + 1)
+        found[:LANES] = np.nan
+        try:
+            times, dim = _numbers(t, LANES).tolist(), self._system.dim
+            columns = _numbers(states, LANES * dim).reshape(dim, LANES).T.copy()
+            given = self._parameters(_numbers(par, self._system.n_par).copy())
+            for i in range(LANES):
+                if i and times[i] == times[i - 1] and np.array_equal(columns[i], columns[i - 1]):
+                    found[i] = found[i - 1]
+                    continue
+                with suppress(*UNDEFINED), np.errstate(all="ignore"):
+                    found[i] = self._evaluate(times[i], columns[i].copy(), given)
+        except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
+            self._raised.error = error
+            found[LANES] = 1.0
+
+
+class _Raised(threading.local):
+    """What a function has raised; a callback runs in the thread that has called the kernel."""
+
+    error: BaseException | None = None
+
+
+def _numbers(address: int, count: int) -> Any:
+    room: Any = (ctypes.c_double * count).from_address(address) if count else b""
+    return np.frombuffer(room)
+
+
+def _compiled(traced: Function) -> binary.Native:
+    """Compile a traced function on lanes, or load it."""
+    text, function = emit.numba_of(traced, "event")
+    name = store.key("event", text, binary.sources(*SOURCES))
+    return binary.obtain(name, lambda: build(function, LANES))
+
+
+def _wanted(g: Callable[..., Any], refused: InputError) -> list[str]:
+    """Return the names of the arguments that a function has no value for."""
+    try:
+        parameters = inspect.signature(g).parameters.values()
+    except (TypeError, ValueError):
+        raise refused from None
+    return [parameter.name for parameter in parameters if parameter.default is parameter.empty]

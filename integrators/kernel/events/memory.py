@@ -1,0 +1,105 @@
+"""What a search for events keeps in memory, by name; see `integrators.kernel.native.memory`."""
+
+from integrators.kernel.native.memory import Array, Integer, Memory, Real
+
+FINE = 8  # places between two samples of a function where its zeros are looked for
+FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
+PLACES = FINE * FINEST + 1
+ROOM = 3 * PLACES  # for marks and zeros, of which a place has three at most
+CACHED = 32  # states of a step that are remembered
+
+# What is looked at: the step that is solved, what of it there is up to a time, the start alone.
+WHOLE, PART, START = range(3)
+# Why a look has come back without success.
+GOING, TERMINAL, FULL, UNRESOLVED, RAISED, UNSOLVABLE = range(6)
+
+
+class Search(Memory):
+    """The events of a trajectory: their functions, what of them is known, and work space for one step.
+
+    A *place* is a part of the stretch of time that is looked at, 0 at its start and 1 at its end.
+    """
+
+    # --- what is looked for ---
+    count = Integer()  # events
+    functions = Array("count", of=int)  # addresses of void(times, states, par, values), on eight states
+    directions = Array("count", of=int)  # 1, -1, or 0 for all
+    limits = Array("count", of=int)  # the occurrence that ends the integration; 0: none
+    dim = Integer()
+    terms = Integer()  # of the step's polynomial
+    chunks = Integer()  # of eight first samples
+    degree = Integer()  # of the polynomials through the first samples; a power of 2
+    steps = Integer()  # address of the compiled steps, for partial ones
+    own = Integer()  # address of the trajectory's context
+    side = Integer()  # address of that for partial steps
+    asked = Integer()  # address of `part`
+    part = Real()  # length of the partial step ...
+    part_known = Real()  # ... and of the last one from the same state, if there was one
+    cosines = Array()  # of the angles pi i / (FINE FINEST)
+    transforms = Array(of=int)  # addresses of tables, samples -> coefficients, by an eighth of the degree
+    first_weights = Array(16, "terms", "chunks")  # `weights` at the first samples of a whole step
+
+    # --- what lasts from step to step ---
+    ends = Array("count")  # values of the functions at the present state
+    touched = Array("count")  # when each was last seen to touch zero
+    finite = Array("count", of=int)  # 1: the function was finite somewhere
+    happened = Array("count", of=int)
+    known = Real()  # the time up to which all is known
+    evaluations = Integer()  # of the field, for partial steps
+    iterations = Integer()
+    partial = Integer()  # partial steps
+
+    # --- what has happened; arrays that the owner empties, and makes larger ---
+    room = Integer()
+    hits = Integer()
+    hit_times = Array()
+    hit_states = Array()
+    hit_events = Array(of=int)
+    hit_directions = Array(of=int)
+
+    # --- how it stands ---
+    mode = Integer()  # WHOLE, PART or START
+    goal = Real()  # the time up to which a PART is looked at
+    halted = Integer()  # GOING, or why not
+    failure = Integer()  # outcome of the step, where UNSOLVABLE
+    event = Integer()  # that is being looked for
+    raised = Integer()  # 1: its function has raised
+    touched_before = Array("count")  # `touched` at the start of the step
+
+    # --- the step, and the stretch of it that is looked at ---
+    time = Real()  # of the present state: a sum of two
+    time_low = Real()
+    stop = Real()  # time of the end of what is looked at
+    step_state = Array("dim")  # states at both
+    stop_state = Array("dim")
+    start = Real()  # times of the stretch
+    end = Real()
+    start_state = Array("dim")
+    end_state = Array("dim")
+    start_value = Real()
+    end_value = Real()
+    resolution = Real()  # part of the stretch that times can be told apart by
+    sampled = Array("count", FINEST)  # values of each function at the first samples, but for the first
+    times = Array(8)
+    block = Array("dim", 8)  # states, one in a column
+    found = Array(16)  # values of a function on a block; [8]: 1 where it has raised
+    weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
+    values = Array(FINEST + 8)  # samples
+    coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
+    n = Integer()  # places where something is known
+    places = Array(PLACES)
+    fine = Array(PLACES)  # values of the polynomial there, or samples
+    scale = Real()  # the largest of them
+    lows = Array(PLACES, of=int)
+    low_count = Integer()
+    marks = Array(ROOM)  # places where the sign of the function is known
+    mark_signs = Array(ROOM, of=int)
+    mark_count = Integer()
+    zeros = Array(ROOM)
+    zero_directions = Array(ROOM, of=int)
+    zero_count = Integer()
+
+    # --- states at ends of partial steps ---
+    cache_times = Array(CACHED)
+    cache_states = Array(CACHED, "dim")
+    cache_next = Integer()

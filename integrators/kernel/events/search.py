@@ -1,0 +1,206 @@
+"""The search for events of one trajectory, as Python sees it."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.events.event import Event
+from integrators.events.finder import Hits
+from integrators.kernel.context import DONE, Context
+from integrators.kernel.events.engine import look
+from integrators.kernel.events.functions import EventFunction
+from integrators.kernel.events.memory import (
+    FINE,
+    FINEST,
+    FULL,
+    PART,
+    RAISED,
+    START,
+    TERMINAL,
+    UNRESOLVED,
+    UNSOLVABLE,
+    WHOLE,
+    Search,
+)
+from integrators.kernel.native.memory import aligned
+from integrators.protocol import Array, Status, UserError
+
+LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
+HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
+LASTING = ("ends", "touched", "finite", "happened")
+
+
+@lru_cache(maxsize=1)
+def _tables() -> tuple[Array, list[Array], NDArray[np.int64]]:
+    """Return cosines, tables from samples to coefficients of Chebyshev polynomials, and where these are.
+
+    The coefficients follow by the discrete cosine transform. Row i of a table is for sample i.
+    """
+    cosines = np.cos(np.pi * np.arange(FINE * FINEST + 1) / (FINE * FINEST))
+    cosines[FINE * FINEST // 2] = 0.0  # a place in the middle is exact
+    tables = [aligned(0)] * (FINEST // LEAST + 1)
+    degree = LEAST
+    while degree <= FINEST:
+        half = np.ones(degree + 1)
+        half[[0, -1]] = 0.5
+        width = 32 * (degree // 32 + 1)
+        table = aligned((degree + 1) * width)
+        angles = np.outer(np.arange(degree + 1), np.arange(degree + 1)) * (np.pi / degree)
+        made = 2.0 / degree * half[:, None] * np.cos(angles) * half[None, :]
+        table.reshape(degree + 1, width)[:, : degree + 1] = made
+        tables[degree // LEAST] = table
+        degree *= 2
+    return cosines, tables, np.array([table.ctypes.data for table in tables])
+
+
+class KernelSearch:
+    """Looks for events in the steps of a trajectory; satisfies `integrators.events.finder.Finder`.
+
+    Parameters
+    ----------
+    events : mapping of str to Event
+        What to look for.
+    functions : sequence of EventFunction
+        Theirs.
+    contexts : pair of Context
+        Of the trajectory, and for partial steps; the solver of steps need not be there.
+    steps : int
+        Address of the compiled steps.
+    end : float
+        The time up to which is looked.
+
+    Raises
+    ------
+    UserError
+        With what a function raises at the start.
+    """
+
+    def __init__(
+        self, events: Mapping[str, Event], functions: Sequence[EventFunction],
+        contexts: tuple[Context, Context], steps: int, end: float,
+    ):  # fmt: skip
+        self._functions = functions
+        self._context, side = contexts
+        self._dim, n = self._context.shape.dim, len(events)
+        degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
+        numbers = {
+            "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
+            "steps": steps, "own": self._context.address, "side": side.address,
+        }  # fmt: skip
+        cosines, self._tables, transforms = _tables()
+        self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
+        memory.asked = memory.address + 8 * Search.part.place
+        memory.functions[:] = [function.address for function in functions]
+        memory.directions[:] = [event.direction for event in events.values()]
+        memory.limits[:] = [event.last for event in events.values()]
+        self._hits = Hits(events, 1.0 if end >= self._context.t0 else -1.0, self._dim)
+        self._make_room(max(8, min(HITS, NUMBERS // self._dim)))
+        self.trouble: tuple[Status, str, Exception | None] | None = None
+        if self._look(START) != DONE:
+            error = self._error
+            raise UserError(error) from error
+        self._context.point({"look_memory": self._memory.words})  # keeps it alive
+        self._context.look = look.code().address
+
+    def _make_room(self, room: int) -> None:
+        self._times, self._states = np.empty(room), np.empty((room, self._dim))
+        self._events, self._directions = np.empty((2, room), dtype=np.int64)
+        self._memory.point(
+            {
+                "hit_times": self._times, "hit_states": self._states,
+                "hit_events": self._events, "hit_directions": self._directions,
+            }
+        )  # fmt: skip
+        self._memory.room = room
+
+    def _look(self, mode: int) -> int:
+        self._memory.mode = mode
+        outcome = look(self._context.address, self._memory.address)
+        self._memory.mode = WHOLE
+        return outcome
+
+    @property
+    def _error(self) -> Exception:
+        """What a function has raised; Ctrl-C and the like are raised as they are."""
+        error = next(function.error for function in self._functions if function.error is not None)
+        if not isinstance(error, Exception):
+            raise error
+        return error
+
+    def attend(self) -> bool:
+        """Do what a look has come back for; return whether the integration goes on."""
+        memory = self._memory
+        halted, enough = memory.halted, memory.hits > memory.room // 2
+        self.hits  # noqa: B018 -- makes room
+        if halted == FULL and not enough:
+            self._make_room(2 * memory.room)
+        if halted in (RAISED, UNRESOLVED):
+            self._give_up(halted)
+        return halted != TERMINAL
+
+    def _give_up(self, halted: int) -> None:
+        """Look for nothing any more, and say why; the trajectory goes on."""
+        self._context.look = 0
+        known = f"are known up to t = {self._memory.known!r} only."
+        if halted == UNRESOLVED:
+            memory = self._memory
+            reason = (
+                f"the event {self._hits.names[memory.event]!r} varies too fast to be followed between t = "
+                f"{memory.start!r} and {memory.end!r}, where {FINEST} samples do not show "
+                "how: give the method shorter steps, or the event a smoother function."
+            )
+            self.trouble = Status.STALLED, f"{reason} Events {known}", None
+            return
+        error = self._error
+        self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+
+    @property
+    def hits(self) -> Hits:
+        """What has happened."""
+        n, self._memory.hits = self._memory.hits, 0
+        self._hits.take(self._times[:n], self._states[:n], self._events[:n], self._directions[:n])
+        return self._hits
+
+    def finish(self, end: float) -> None:
+        """Look at what there is of the step ahead, which is solved, up to a time."""
+        self._memory.goal = end
+        while self._context.look and self._look(PART) != DONE and self._memory.halted != UNSOLVABLE:
+            if not self.attend():
+                break
+
+    @property
+    def unknown(self) -> list[str]:
+        """The events whose functions were finite nowhere."""
+        return [name for name, known in zip(self._hits.names, self._memory.finite, strict=True) if not known]
+
+    def save(self) -> dict[str, Any]:
+        """Return what the rest of the search depends on; the trajectory has its own `checkpoint`."""
+        arrays = {name: getattr(self._memory, name).copy() for name in LASTING}
+        return {
+            "arrays": arrays, "known": self._memory.known, "work": self.work(), "hits": self.hits.save(),
+            "trouble": self.trouble,
+        }  # fmt: skip
+
+    def load(self, kept: Mapping[str, Any]) -> None:
+        """Go on from where `save` was called."""
+        for name, array in kept["arrays"].items():
+            getattr(self._memory, name)[:] = array
+        self._memory.known, self._memory.partial = kept["known"], kept["work"]["partial_steps"]
+        self._memory.evaluations, self._memory.iterations = (
+            kept["work"][name] for name in ("evaluations", "iterations")
+        )
+        self._hits.load(kept["hits"])
+        self.trouble = kept["trouble"]
+        if self.trouble is not None:
+            self._context.look = 0
+
+    def work(self) -> dict[str, int]:
+        """Return what the search has cost."""
+        memory = self._memory
+        return {
+            "partial_steps": memory.partial, "evaluations": memory.evaluations,
+            "iterations": memory.iterations,
+        }  # fmt: skip

@@ -1,0 +1,179 @@
+"""Where a function changes its sign between two places, and where it is largest."""
+
+from integrators.kernel.events.sample import is_finite, sign
+from integrators.kernel.events.value import value_at
+from integrators.kernel.native.jit import compiled
+
+BESIDE = 1e-6  # of the stretch: extrema as close to its end are looked for from both sides
+APART = 1e4  # units that times can be told apart by: a pole is looked at from a distance of as many
+POLE, ROOM = 1e3, 10.0  # where g is as many times larger than beside it, its sign changes through infinity
+MOST = 200  # evaluations for a zero
+CLOSE = 1e-3  # of the stretch: two places as close tell the slope at the zero between or beside them
+EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
+EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
+GOLDEN = 0.3819660112501051  # (3 - sqrt 5) / 2
+ROOT = 2.0**-26  # square root of the unit in the last place
+MOST_LOOKS = 500  # evaluations for an extremum
+NAN = float("nan")
+INFINITY = float("inf")
+
+
+@compiled
+def guess(search, a, b):
+    """Return where the values that are known change their sign between two places, and how steep they are."""
+    places, fine = search.places, search.fine
+    for i in range(search.n - 1):
+        x, y = places[i], places[i + 1]
+        if y > a and x < b and sign(fine[i]) != sign(fine[i + 1]):
+            slope = (fine[i + 1] - fine[i]) / (y - x)
+            return min(max(x - fine[i] / slope, a), b), slope
+    return (a + b) / 2.0, 0.0
+
+
+@compiled
+def continued(ctx, search, x, otherwise):
+    """Return the value at a place, or in a hole between two known signs that of one of them."""
+    value = value_at(ctx, search, x)
+    return value if is_finite(value) else otherwise
+
+
+@compiled
+def zero_between(ctx, search, a, b):
+    """Return the place of a change of sign between two places, to the last bit of time.
+
+    The polynomial tells where to begin. Then secants, and halves where these do not close in.
+    """
+    low, high, at_low, at_high = a, b, value_at(ctx, search, a), value_at(ctx, search, b)
+    otherwise, width = at_high, b - a
+    x, slope = guess(search, a, b)
+    behind, at_behind = NAN, NAN
+    for i in range(MOST):
+        width = high - low
+        if width <= search.resolution:
+            break
+        if not (x > low and x < high):
+            x = low + width / 2.0
+        value = continued(ctx, search, x, otherwise)
+        if value == 0.0:
+            return x
+        if (value > 0.0) == (at_high > 0.0):
+            high, at_high = x, value
+        else:
+            low, at_low = x, value
+        distance = abs(x - behind)
+        if distance > 0.0 and value != at_behind:
+            slope = (value - at_behind) / (x - behind)
+        following = x - value / slope if slope != 0.0 else NAN
+        if distance < CLOSE and abs(following - x) <= search.resolution / 2.0:
+            break
+        behind, at_behind = x, value
+        x = following
+        if i > 2 and i % 3 == 2 and high - low > width / 2.0:
+            x = low + (high - low) / 2.0
+    return low if abs(at_low) < abs(at_high) else high
+
+
+@compiled
+def largest_beside(ctx, search, x, distance):
+    """Return the largest size of a value at a distance from a place; -1 where there is none."""
+    found = -1.0
+    for place in (x - distance, x + distance):
+        if place >= 0.0 and place <= 1.0:
+            value = abs(value_at(ctx, search, place))
+            if is_finite(value):
+                found = max(found, value)
+    return found
+
+
+@compiled
+def is_pole(ctx, search, x, a, b):
+    """Whether the sign changes at a place through infinity; ``a`` and ``b`` are on both sides of it."""
+    value = abs(value_at(ctx, search, x))
+    if value <= max(abs(value_at(ctx, search, a)), abs(value_at(ctx, search, b))):
+        return False  # times are so dense that it would be larger
+    distance = min(max(BESIDE, APART * search.resolution), (b - a) / 2.0)
+    sides = largest_beside(ctx, search, x, distance)
+    most = min(POLE, distance / (ROOM * search.resolution))  # times cannot be closer to the pole
+    return sides >= 0.0 and not value <= most * sides
+
+
+@compiled
+def deepest(ctx, search, a, b, way):
+    """Return where ``way`` times the function is largest in a bracket, or first found to be positive.
+
+    Brent's minimizer: parabolas, and golden sections where these do not close in (R. P. Brent, "Algorithms
+    for Minimization without Derivatives", Prentice-Hall 1973, ch. 5).
+    """
+    x = w = v = a + GOLDEN * (b - a)
+    value = value_at(ctx, search, x)
+    if way * value > 0.0:
+        return x
+    fx = -way * value if is_finite(value) else INFINITY
+    fw = fv = fx
+    step, before = 0.0, 0.0
+    for _ in range(MOST_LOOKS):
+        middle = (a + b) / 2.0
+        least = ROOT * abs(x) + EXTREMUM / 3.0
+        if abs(x - middle) <= 2.0 * least - (b - a) / 2.0:
+            break
+        golden = True
+        if abs(before) > least:
+            r = (x - w) * (fx - fv)
+            q = (x - v) * (fx - fw)
+            p = (x - v) * q - (x - w) * r
+            q = 2.0 * (q - r)
+            if q > 0.0:
+                p = -p
+            q = abs(q)
+            r, before = before, step
+            if abs(p) < abs(q * r / 2.0) and p > q * (a - x) and p < q * (b - x):
+                step = p / q
+                golden = False
+                if x + step - a < 2.0 * least or b - x - step < 2.0 * least:
+                    step = least if middle >= x else -least
+        if golden:
+            before = a - x if x >= middle else b - x
+            step = GOLDEN * before
+        u = x + (max(step, least) if step >= 0.0 else min(step, -least))
+        value = value_at(ctx, search, u)
+        if way * value > 0.0:
+            return u
+        fu = -way * value if is_finite(value) else INFINITY
+        if fu <= fx:
+            if u >= x:
+                a = x
+            else:
+                b = x
+            v, fv, w, fw, x, fx = w, fw, x, fx, u, fu
+        else:
+            if u < x:
+                a = u
+            else:
+                b = u
+            if fu <= fw or w == x:
+                v, fv, w, fw = w, fw, u, fu
+            elif fu <= fv or v in (x, w):
+                v, fv = u, fu
+    return x
+
+
+@compiled
+def extremum(ctx, search, a, b, way):
+    """Return the place that `deepest` finds between two.
+
+    Where it is at one of the two, the polynomial has misplaced them, and they are moved.
+    """
+    x = a
+    for _ in range(MOVES):
+        x = deepest(ctx, search, a, b, way)
+        width = b - a
+        if way * value_at(ctx, search, x) > 0.0 or min(x - a, b - x) > EDGE * width:
+            break
+        if x - a < b - x:
+            a, b = a - width, a + width
+        else:
+            a, b = b - width, b + width
+        a, b = max(a, 0.0), min(b, 1.0)
+        if x - a <= EDGE * width or b - x <= EDGE * width:  # the end of the stretch
+            break
+    return x

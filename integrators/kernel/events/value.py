@@ -1,0 +1,90 @@
+"""A function at any place of a step: exact, at the end of a partial step of the method itself."""
+
+from llvmlite import ir
+from numba import types
+from numba.core.typing.templates import signature
+
+from integrators.kernel.context import DONE, Context
+from integrators.kernel.events.memory import CACHED
+from integrators.kernel.events.sample import NAN, function, noise_of, part_at, time_at
+from integrators.kernel.native.attributes import view
+from integrators.kernel.native.engine import PART
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.emit import INTEGER
+from integrators.kernel.simd.lanes import intrinsic
+from integrators.kernel.simd.views import DOUBLES
+
+context = view(Context)
+
+
+@intrinsic
+def call_part(typing, steps, what, own, side, part, out):
+    """Call the compiled steps for a partial step; see `integrators.kernel.step.entry`."""
+
+    def generate(context, builder, sig, args):
+        function, what, own, side, part, out = args
+        none = ir.Constant(INTEGER, 0)
+        out = builder.ptrtoint(out, INTEGER)
+        words = [what, own, side, none, none, none, none, part, none, out, none]
+        kind = ir.FunctionType(INTEGER, [INTEGER] * len(words))
+        return builder.call(builder.inttoptr(function, kind.as_pointer()), words)
+
+    return signature(types.int64, *[types.int64] * 5, DOUBLES), generate
+
+
+@compiled
+def forget_states(search):
+    """Begin with a new step."""
+    for i in range(CACHED):
+        search.cache_times[i] = NAN
+    search.cache_next = 0
+    search.part_known = 0.0
+
+
+@compiled
+def state_at(ctx, search, t):
+    """Return the state at a time, by a partial step of the method; NaN where that fails."""
+    if t == search.time:
+        return search.step_state
+    if t == search.stop:
+        return search.stop_state
+    for i in range(CACHED):
+        if search.cache_times[i] == t:
+            return search.cache_states + search.dim * i
+    i = search.cache_next
+    state = search.cache_states + search.dim * i
+    search.cache_next = (i + 1) % CACHED
+    search.cache_times[i] = t
+    search.part = part_at(search, t)
+    side = context(search.side)
+    outcome = call_part(search.steps, PART, search.own, search.side, search.asked, state)
+    ctx.wanted = (
+        0  # a partial step that only the implicit solver would solve is none: own steps do not change
+    )
+    search.iterations += side.iterations
+    search.evaluations += side.evaluations
+    search.partial += 1
+    search.part_known = search.part if outcome == DONE else 0.0
+    side.iterations = side.evaluations = side.restarts = 0
+    if outcome != DONE:
+        for d in range(search.dim):
+            state[d] = NAN
+    return state
+
+
+@compiled
+def value_at(ctx, search, x):
+    """Return the value of the function at a place, which may be a little beyond the end; NaN: none."""
+    if x == 0.0:
+        return search.start_value
+    if x == 1.0:
+        return search.end_value
+    t = time_at(search, x)
+    return function(ctx, search, t, state_at(ctx, search, t))
+
+
+@compiled
+def noise_at(ctx, search, x):
+    """Return how much of the value at a place rounding of the state may account for."""
+    t = time_at(search, x)
+    return noise_of(ctx, search, t, state_at(ctx, search, t))

@@ -1,0 +1,244 @@
+"""All zeros of a function in a stretch of time: bracketed on the polynomial, solved on partial steps.
+
+The polynomial of a step is cheap and only of order s + 1. So it says where zeros may be, and the
+states at the ends of partial steps say where they are.
+"""
+
+from integrators.kernel.events.chebyshev import NEAR
+from integrators.kernel.events.sample import is_finite, sign
+from integrators.kernel.events.solve import (
+    APART,
+    BESIDE,
+    EXTREMUM,
+    extremum,
+    is_pole,
+    zero_between,
+)
+from integrators.kernel.events.value import noise_at, value_at
+from integrators.kernel.native.jit import compiled
+
+SURE = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
+BLUR = 1e-7  # of the stretch: how well a minimizer that compares values finds an extremum, with room
+CORNER = 3.0  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
+
+
+@compiled
+def mark(search, x, direction):
+    """Note the sign of the function at a place, in order."""
+    i = search.mark_count
+    while i > 0 and search.marks[i - 1] > x:
+        search.marks[i], search.mark_signs[i] = search.marks[i - 1], search.mark_signs[i - 1]
+        i -= 1
+    search.marks[i], search.mark_signs[i] = x, direction
+    search.mark_count += 1
+
+
+@compiled
+def add_zero(search, x, direction):
+    """Note a zero, in order."""
+    i = search.zero_count
+    while i > 0 and search.zeros[i - 1] > x:
+        search.zeros[i], search.zero_directions[i] = search.zeros[i - 1], search.zero_directions[i - 1]
+        i -= 1
+    search.zeros[i], search.zero_directions[i] = x, direction
+    search.zero_count += 1
+
+
+@compiled
+def turns_between(search, i, a, b):
+    """Whether the parabola through place i and its neighbours turns back from zero between two places."""
+    x, p = search.places + (i - 1), search.fine + (i - 1)
+    left, right = (p[1] - p[0]) / (x[1] - x[0]), (p[2] - p[1]) / (x[2] - x[1])
+    bend = (right - left) / (x[2] - x[0])
+    if bend * p[1] <= 0.0:
+        return False
+    turn = x[1] - (left + bend * (x[1] - x[0])) / (2.0 * bend)
+    return a < turn and turn < b
+
+
+@compiled
+def add_low(search, i):
+    """Note a place where the polynomial turns back from near zero."""
+    search.lows[search.low_count] = i
+    search.low_count += 1
+
+
+@compiled
+def find_lows(search, first, last):
+    """Note the places inside a run of one sign where the polynomial turns back from near zero."""
+    p, end, least = search.fine, search.n - 1, NEAR * search.scale
+    search.low_count = 0
+    if last - first < 2:
+        return
+    if first == 0 and abs(p[0]) < least and turns_between(search, 1, -BESIDE, search.places[1]):
+        add_low(search, 0)
+    for i in range(first + 1, last):
+        size = abs(p[i])
+        if size <= abs(p[i - 1]) and size < abs(p[i + 1]) and size < least:
+            add_low(search, i)
+    before = search.places[end - 1]
+    if last == end and abs(p[end]) < least and turns_between(search, end - 1, before, 1.0 + BESIDE):
+        add_low(search, end)
+
+
+@compiled
+def change_beside(ctx, search, x, distance):
+    """Return by how much values differ at a distance from a place."""
+    here, found = value_at(ctx, search, x), 0.0
+    for place in (x - distance, x + distance):
+        if place >= 0.0 and place <= 1.0:
+            value = value_at(ctx, search, place)
+            if is_finite(value):
+                found = max(found, abs(value - here))
+    return found
+
+
+@compiled
+def blur(ctx, search, x):
+    """Return by how much the value at an extremum may differ from that where a minimizer ended.
+
+    At a corner the minimizer ends closer: there g is as different beside it as it is steep.
+    """
+    near = max(BLUR, APART * search.resolution / 100.0)
+    change = change_beside(ctx, search, x, near)
+    if change_beside(ctx, search, x, 2.0 * near) < CORNER * change:
+        return change_beside(ctx, search, x, max(10.0 * EXTREMUM, 10.0 * search.resolution))
+    return change
+
+
+@compiled
+def extremum_around(ctx, search, i, j, way):
+    """Return the place of an extremum between the neighbours of two places."""
+    return extremum(ctx, search, search.places[max(i - 1, 0)], search.places[min(j + 1, search.n - 1)], way)
+
+
+@compiled
+def mark_low(ctx, search, low, way):
+    """Note what the function does where the polynomial, of sign ``way``, comes near zero and turns back."""
+    x, p = search.places[low], search.fine[low]
+    value = value_at(ctx, search, x)
+    # Between these it may fall by as much as it rises, at a corner.
+    reach = 0.0
+    for i in range(max(low - 1, 0), min(low + 2, search.n)):
+        reach = max(reach, abs(search.fine[i] - p))
+    reach += SURE * abs(value - p)
+    if not is_finite(value) or (sign(value) == way and abs(value) > reach):
+        return
+    if sign(value) != -way:
+        x = extremum_around(ctx, search, low, low, -way)
+        value = value_at(ctx, search, x)
+    if not is_finite(value):
+        return
+    noise = noise_at(ctx, search, x)
+    if sign(value) == -way and abs(value) > noise:
+        mark(search, x, -way)
+    elif abs(value) <= noise or abs(value) <= blur(ctx, search, x):
+        add_zero(search, x, 0)
+
+
+@compiled
+def mark_run(ctx, search, first, last):
+    """Note where the function has which sign in a run: at its largest values, and at extrema near zero."""
+    way = sign(search.fine[first])
+    find_lows(search, first, last)
+    starts = first == 0 and search.places[0] == 0.0
+    ends = last == search.n - 1 and search.places[last] == 1.0
+    count = search.low_count
+    if (starts or ends) and count == 0:  # the sign is that of the stretch's end
+        return
+    for i in range(count + 1):
+        a = search.lows[i - 1] if i > 0 else first
+        b = search.lows[i] if i < count else last
+        top = a
+        for j in range(a, b + 1):
+            top = j if abs(search.fine[j]) > abs(search.fine[top]) else top
+        x = search.places[top]
+        if x > 0.0 and x < 1.0:
+            value = value_at(ctx, search, x)
+            if value == 0.0 or sign(value) == -way:  # the polynomial errs: g may still get there nearby
+                x = extremum_around(ctx, search, a, b, way)
+                value = value_at(ctx, search, x)
+                if is_finite(value) and sign(value) != way and abs(value) <= blur(ctx, search, x):
+                    add_zero(search, x, 0)
+            if is_finite(value) and value != 0.0:
+                mark(search, x, sign(value))
+        if i < count:
+            mark_low(ctx, search, search.lows[i], way)
+
+
+BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its end g may have a sign again
+
+
+@compiled
+def direction_at_end(ctx, search, before):
+    """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
+    for distance in BEYOND:
+        x = 1.0 + max(distance, 100.0 * search.resolution)
+        value = value_at(ctx, search, x)
+        if search.raised:  # a function that goes no farther than the integration
+            search.raised = 0
+            break
+        if abs(value) > noise_at(ctx, search, x):
+            return 0 if sign(value) == before else -before
+    return -before
+
+
+@compiled
+def solve(ctx, search, a, b, after):
+    """Note the zero between two places where the function has different signs; there is none at a pole."""
+    wanted = search.directions[search.event]
+    if wanted != 0 and wanted != after:
+        return
+    x = zero_between(ctx, search, a, b)
+    if not is_pole(ctx, search, x, a, b):
+        add_zero(search, x, after)
+
+
+@compiled
+def find_zeros(ctx, search):
+    """Set the zeros in (0, 1], in order."""
+    search.mark_count = search.zero_count = 0
+    n, p = search.n, search.fine
+    if search.scale == 0.0:  # zero all along
+        return
+    first = 0
+    while first < n:
+        last = first
+        while last + 1 < n and sign(p[last + 1]) == sign(p[first]):
+            last += 1
+        if p[first] != 0.0:
+            mark_run(ctx, search, first, last)
+        first = last + 1
+    for i in range(1, n - 1):
+        before = sign(p[i - 1])
+        if p[i] == 0.0 and before != 0 and before == sign(p[i + 1]):  # a sample right at a touch
+            mark_low(ctx, search, i, before)
+    if search.places[0] == 0.0 and p[0] != 0.0:
+        mark(search, 0.0, sign(p[0]))
+    count, marks, signs = search.mark_count, search.marks, search.mark_signs
+    for i in range(count - 1):
+        if signs[i] != signs[i + 1]:
+            solve(ctx, search, marks[i], marks[i + 1], signs[i + 1])
+    if search.places[n - 1] == 1.0 and count > 0:
+        before = signs[count - 1]
+        if p[n - 1] == 0.0:
+            add_zero(search, 1.0, direction_at_end(ctx, search, before))
+        elif before != sign(p[n - 1]):
+            solve(ctx, search, marks[count - 1], 1.0, sign(p[n - 1]))
+    drop_false_touches(search)
+
+
+@compiled
+def drop_false_touches(search):
+    """Drop touches that are the crossing's own, close beside it."""
+    kept = 0
+    for i in range(search.zero_count):
+        x, direction = search.zeros[i], search.zero_directions[i]
+        own = True
+        for j in range(search.zero_count):
+            if direction == 0 and abs(search.zeros[j] - x) <= BESIDE and search.zero_directions[j] != 0:
+                own = False
+        if own:
+            search.zeros[kept], search.zero_directions[kept] = x, direction
+            kept += 1
+    search.zero_count = kept

@@ -1,0 +1,132 @@
+"""heyoka's own search for events, as a `integrators.events.finder.Finder`."""
+
+from collections.abc import Callable, Mapping
+from itertools import compress
+from typing import Any
+
+import numpy as np
+
+from integrators.events.event import Event
+from integrators.events.finder import Hits
+from integrators.peers import load
+from integrators.protocol import Array
+from problems import emit
+from problems.problem import Problem
+
+CLOSE = 64  # units in the last place: an event so near the start is none
+
+
+class Recorder:
+    """What heyoka calls when an event has happened; copies of an integrator share it."""
+
+    def __init__(self, event: int):
+        self._event = event
+        self.record: Callable[[Any, float, int, int], None] | None = None
+
+    def __call__(self, integrator: Any, t: float, direction: int) -> None:
+        if self.record is not None:
+            self.record(integrator, t, self._event, direction)
+
+    def __deepcopy__(self, memo: Any) -> "Recorder":
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_event": self._event, "record": None}
+
+
+def heyoka_events(problem: Problem, events: Mapping[str, Event]) -> list[Any]:
+    """Return events for an integrator of the problem's system, none of which ends a step.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a function that cannot be traced.
+    """
+    hy, made = load("heyoka"), []
+    for i, (name, event) in enumerate(events.items()):
+        traced = problem.system.trace(event.g, f"event {name!r}")
+        made.append(hy.nt_event(emit.heyoka_of(problem.system, traced), Recorder(i)))
+    return made
+
+
+class TaylorSearch:
+    """Keeps what heyoka finds in the steps of a trajectory.
+
+    Parameters
+    ----------
+    events : mapping of str to Event
+        What is looked for.
+    y, t, end : ndarray, float, float
+        The start, and the time up to which is looked.
+    present : callable
+        Returns the time up to which the trajectory is wanted; the library may be ahead.
+    """
+
+    trouble = None
+    unknown: tuple[str, ...] = ()
+
+    def __init__(self, events: Mapping[str, Event], y: Array, t: float, end: float, present: Any):
+        self._events, self._start, self._end, self._present = list(events.values()), t, end, present
+        self._hits = Hits(events, 1.0 if end >= t else -1.0, y.size)
+        self._ahead: list[tuple[float, Array, int, int]] = []
+        self._counts = [0] * len(events)
+        self._finished = False
+        self.terminates = any(event.last for event in self._events)
+        """Whether one of them is terminal."""
+        self.over = False
+        """Whether a terminal event has happened."""
+
+    def watch(self, integrator: Any) -> None:
+        """Hear of the events of an integrator."""
+        for event in integrator.nt_events:
+            event.callback.record = self._record
+
+    def _record(self, integrator: Any, t: float, event: int, direction: int) -> None:
+        sign, wanted = self._hits.sign, self._events[event].direction
+        way = int(direction * sign)
+        near = abs(t - self._start) <= CLOSE * np.spacing(max(abs(t), abs(self._start)))
+        if near or sign * (t - self._end) > 0.0 or wanted not in (0, way):
+            return
+        integrator.update_d_output(t)
+        self._ahead.append((t, integrator.d_output.copy(), event, way))
+        self._counts[event] += 1
+        self.over = self.over or self._counts[event] == self._events[event].last
+
+    def take_back(self, t: float) -> None:
+        """Forget what happened after a time, from which a step is taken again."""
+        kept = len(self._ahead)
+        while kept and self._hits.sign * (self._ahead[kept - 1][0] - t) > 0.0:
+            kept -= 1
+        for hit in self._ahead[kept:]:
+            self._counts[hit[2]] -= 1
+        del self._ahead[kept:]
+
+    def finish(self) -> None:
+        """Let all count that has happened up to the end."""
+        self._finished = True
+
+    @property
+    def hits(self) -> Hits:
+        """What has happened up to the present."""
+        now, self._ahead = self._ahead, []
+        if not (self._finished or self.over):
+            ahead = [self._hits.sign * (hit[0] - self._present()) > 0.0 for hit in now]
+            self._ahead = list(compress(now, ahead))
+            now = list(compress(now, [not is_ahead for is_ahead in ahead]))
+        if now:
+            t, y, event, direction = (np.array(column) for column in zip(*now, strict=True))
+            self._hits.take(t, y, event, direction)
+        return self._hits
+
+    def work(self) -> dict[str, int]:
+        """Return nothing: heyoka does not count it."""
+        return {}
+
+    def save(self) -> Any:
+        """Return what the rest of the search depends on."""
+        return {"hits": self.hits.save(), "ahead": list(self._ahead), "counts": list(self._counts)}
+
+    def load(self, kept: Any) -> None:
+        """Go on from where `save` was called."""
+        self._hits.load(kept["hits"])
+        self._ahead, self._counts = list(kept["ahead"]), list(kept["counts"])

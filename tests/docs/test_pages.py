@@ -1,0 +1,66 @@
+"""Links of the documentation lead somewhere, and what its pages show runs."""
+
+import os
+import tempfile
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import pytest
+
+from tests.docs import pages
+
+EXECUTED = [path for path in pages.sources() if pages.cells(path)]
+TUTORIALS = pages.listed(pages.DOCS / "tutorials" / "index.md")
+PEERS = ("heyoka", "rebound", "diffrax", "jax")
+
+
+def _name(path):
+    return str(path.relative_to(pages.ROOT))
+
+
+@pytest.mark.parametrize("page", pages.sources(), ids=_name)
+def test_every_link_leads_to_a_file_and_to_a_heading_in_it(page):
+    broken = []
+    for target in pages.links(page):
+        name, _, anchor = target.partition("#")
+        path = (page.parent / name).resolve() if name else page
+        if not path.exists() or (anchor and path.suffix == ".md" and anchor not in pages.anchors(path)):
+            broken.append(target)
+    for name in pages.listed(page):
+        if not pages.page(name, page).is_file():
+            broken.append(name)
+    assert broken == []
+
+
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_a_tutorial_runs_something_and_says_what_next(name):
+    page = pages.DOCS / "tutorials" / f"{name}.md"
+    assert page in EXECUTED
+    assert page.read_text(encoding="utf-8").partition("\n## What next\n")[2].count("](") >= 2
+
+
+@pytest.mark.parametrize("page", EXECUTED, ids=_name)
+def test_every_picture_is_described_in_words(page):
+    drawn = sum("plt.show()" in cell for cell in pages.cells(page))
+    assert drawn >= 1
+    assert page.read_text(encoding="utf-8").count("\n    alt: ") == drawn
+
+
+@pytest.mark.parametrize("page", EXECUTED, ids=_name)
+def test_the_cells_of_a_page_run(page, monkeypatch, tmp_path):
+    monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(pages.ROOT), prepend=":")
+    monkeypatch.setenv("PATH", os.environ["PATH"])  # which a page changes: it is given back
+    monkeypatch.chdir(page.parent)  # where a notebook runs
+    with mpl.rc_context():
+        plt.switch_backend("Agg")
+        try:
+            pages.run(page)
+        except ImportError as error:
+            library = next((name for name in PEERS if name in str(error)), None)
+            if library is None:
+                raise
+            pytest.skip(f"{_name(page)} DID NOT RUN: {library} is missing (pip install 'hbvm-bench[peers]')")
+        finally:
+            plt.close("all")
