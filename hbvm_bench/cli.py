@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.exceptions import TyperException
 
-from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.identity import typed_problem
 from hbvm_bench.commands import listing
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import find
@@ -161,7 +161,7 @@ def reference(
 
     from hbvm_bench.reference import solutions, trusted
 
-    made = make_problem(problem)
+    made = typed_problem(problem)
     if out is not None:
         ensure_writable(out.parent)
     stored = solutions.find_file(made)

@@ -19,6 +19,7 @@ import numpy as np
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM, TOLERANCE
 from integrators.protocol import Array, MethodBase, Status
+from problems.calls import readable
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -113,6 +114,7 @@ class _Trial:
     steps: int
 
 
+@readable
 def advise(problem: Problem, accuracy: float = 1e-10) -> Advice:
     """Say which method and step reach an accuracy at the end of a problem, and at what cost.
 

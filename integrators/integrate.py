@@ -27,6 +27,7 @@ from integrators.protocol import (
 from integrators.solution import Solution
 from integrators.watch import Bar, Pieces, Report, Watch, identity, read
 from problems import limits
+from problems.calls import readable
 from problems.checks import Must, checked
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
@@ -36,6 +37,7 @@ DEFAULT_SAMPLES = 1001
 NotNegative = Annotated[float, Must("a number of seconds, 0 or more", lambda x: x >= 0)]
 
 
+@readable
 def integrate(
     problem: Problem,
     method: MethodBase | None = None,

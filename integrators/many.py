@@ -29,6 +29,7 @@ from integrators.protocol import (
 )
 from integrators.solution import Occurrences
 from integrators.watch import SOON, Bar, Progress, Report
+from problems.calls import readable
 from problems.checks import NOTHING, Named, checked
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
@@ -83,6 +84,7 @@ class Solutions(Trajectories):
         return np.array([status is Status.FINISHED for status in self.status])
 
 
+@readable
 def integrate_many(
     problem: Problem,
     method: MethodBase | None = None,

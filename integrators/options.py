@@ -44,6 +44,9 @@ Count = Annotated[int, at_least(1)]
 
 
 class _Stages:
+    def __repr__(self) -> str:
+        return "a number of stages"
+
     def checked(self, owner: str, name: str, value: Any) -> int:
         given = checked(owner, name, value, Count)
         limits.check(f"{owner} with {name}={shown(value)}", "STAGES", given)
@@ -55,6 +58,9 @@ Stages = Annotated[int, _Stages()]
 
 
 class _Landings:
+    def __repr__(self) -> str:
+        return "finite times"
+
     def checked(self, owner: str, name: str, value: Any) -> tuple[float, ...]:
         times = numbers(value)
         if times is None:

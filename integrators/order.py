@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from integrators.legendre import legendre, legendre_integrals
 from integrators.protocol import Array, MethodBase
 from integrators.tableau import Tableau, tableau
+from problems.calls import readable
 from problems.errors import InputError
 
 HOLDS = 1e-11  # for k <= 60, what holds does so to 3e-15, and what does not misses by 1e-4 at least
@@ -39,6 +40,7 @@ HIGHEST = 10  # order up to which the trees are gone through: 719 of order 10
 Tree = tuple["Tree", ...]
 
 
+@readable
 def order_of(method: Tableau | MethodBase) -> int:
     """Return the order of a Runge-Kutta method, checked numerically from its coefficients.
 
@@ -84,6 +86,7 @@ def order_of(method: Tableau | MethodBase) -> int:
     return order
 
 
+@readable
 def stability(method: Tableau | MethodBase, z: ArrayLike) -> NDArray[np.complex128]:
     """Return R(z) of a Runge-Kutta method: y' = lambda y goes over a step into R(h lambda) y.
 

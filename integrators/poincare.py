@@ -11,10 +11,12 @@ from integrators.protocol import MethodBase, check_problem
 from integrators.solution import Solution
 from integrators.watch import Report
 from problems import Problem
+from problems.calls import readable
 from problems.checks import checked
 from problems.errors import InputError
 
 
+@readable
 def section(
     problem: Problem,
     method: MethodBase,

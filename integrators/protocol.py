@@ -295,12 +295,11 @@ class Compiled:
 
 
 class _Signature:
-    """What ``help`` and ``inspect.signature`` show of a method: its options with their plain types."""
+    """What ``help`` shows of a method: its options and their defaults; the docstring has the types."""
 
     def __get__(self, method: object, cls: type) -> inspect.Signature:
-        made, plain = inspect.signature(cls.__init__), get_type_hints(cls)
-        options = [p.replace(annotation=plain.get(p.name)) for p in made.parameters.values()]
-        return made.replace(parameters=options[1:])
+        options = list(inspect.signature(cls.__init__).parameters.values())[1:]
+        return inspect.Signature([p.replace(annotation=inspect.Signature.empty) for p in options])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,6 +24,7 @@ from integrators.plain import (
     unpacked_problem,
 )
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, as_numbers
+from problems.calls import readable
 from problems.errors import InputError, MissingLibraryError, shown
 from problems.problem import Problem
 
@@ -53,6 +54,7 @@ class Occurrences:
         return self.t.size
 
 
+@readable
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """A trajectory and what it cost; ``print`` tells the essential.

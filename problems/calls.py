@@ -11,6 +11,7 @@ from problems.errors import InputError, shown, unknown
 
 P = ParamSpec("P")
 R = TypeVar("R")
+Described = TypeVar("Described", bound=Callable[..., Any])
 
 
 def check(
@@ -67,7 +68,18 @@ def checked_arguments(init: Callable[P, R]) -> Callable[P, R]:
         call = bound(type(values[0]).__name__, own, values[1:], options)
         return init(values[0], *call.args, **call.kwargs)  # type: ignore[call-arg]
 
-    return wrapper
+    return readable(wrapper)
+
+
+def readable(described: Described) -> Described:
+    """Let ``help`` show the names and defaults of a function or class; its docstring has the types."""
+    signature, empty = inspect.signature(described), inspect.Signature.empty
+    plain = [
+        p.replace(annotation=empty, default={} if p.default is checks.NOTHING else p.default)
+        for p in signature.parameters.values()
+    ]
+    described.__signature__ = signature.replace(parameters=plain, return_annotation=empty)
+    return described
 
 
 class Called:

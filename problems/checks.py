@@ -30,6 +30,9 @@ class Must:
     be: str
     holds: Callable[[Any], bool] = lambda value: True
 
+    def __repr__(self) -> str:
+        return self.be
+
 
 Positive = Annotated[float, Must("a positive number", lambda x: x > 0)]
 """A finite number above 0."""

@@ -158,6 +158,7 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     ----------
     use : str
         The problem as it prints; ``{name}`` stands for a value, see `hbvm_bench.campaign.sweep`.
+        ``mine.py:swing(g=1.1)`` is a function in a Python file beside the campaign's.
     values : dict
         Values that the methods' texts may name, such as the step that suits the problem.
     sweep : dict of list
@@ -170,6 +171,9 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         For readers: a line, and what to know when reading the numbers.
     within : dict of float
         The errors, by metric, that times are compared at first; see `Goal`.
+    reference : bool
+        Whether a reference is computed before the run, by two methods, where none comes with the
+        package; see `hbvm_bench.run.references`.
     """
 
     use: str
@@ -177,6 +181,7 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     title: str = ""
     note: str = ""
     within: Accuracy = {}
+    reference: bool = False
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None

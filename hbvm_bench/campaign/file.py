@@ -100,7 +100,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         limits.check(f"campaign {self.name!r}", "CASES", self._count(), "give fewer values to its sweeps")
         made = [
             Case(
-                problem=fill(entry.use, chosen),
+                problem=fill(entry.use, values),
                 method=text,
                 grid=self.grid if entry.grid is None else entry.grid,
                 settings=method.settings,
@@ -108,9 +108,9 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 checks=self.checks,
             )
             for entry in self.entries()
-            for chosen in _chosen(entry)
+            for values in chosen(entry)
             for method in self.methods
-            for text in _settings(method, name_of(entry), chosen, self.quick)
+            for text in _settings(method, name_of(entry), values, self.quick)
         ]
         return made + [
             Case(
@@ -147,12 +147,24 @@ def _combinations(sweep: Mapping[str, Sequence[object]]) -> int:
 
 def name_of(entry: ProblemEntry) -> str:
     """Return what a campaign calls a problem."""
-    return entry.name or parse_spec(PLACEHOLDER.sub("0", entry.use)).name
+    return entry.name or parse_spec(text_of(entry)).name.rpartition(":")[2]
 
 
-def _chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
+def text_of(entry: ProblemEntry) -> str:
+    """Return the text of a problem with something in each placeholder, so that it can be parsed."""
+    return PLACEHOLDER.sub("0", entry.use)
+
+
+def chosen(entry: ProblemEntry) -> list[dict[str, Scalar]]:
+    """Return the values of an entry, one dictionary for every combination of its sweep.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a value that no placeholder takes.
+    """
     _all_used(entry.use, entry.sweep)
-    return [entry.values | chosen for chosen in combinations(entry.sweep)]
+    return [entry.values | values for values in combinations(entry.sweep)]
 
 
 def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar], quick: bool) -> list[str]:
@@ -160,8 +172,8 @@ def _settings(method: MethodEntry, problem: str, values: Mapping[str, Scalar], q
         return []
     for text in method.texts:
         _all_used(text, method.sweep)
-    chosen = list(combinations(method.sweep))
-    made = [fill(text, {**values, **one}) for text in method.texts for one in chosen]
+    swept = list(combinations(method.sweep))
+    made = [fill(text, {**values, **one}) for text in method.texts for one in swept]
     return [made[place] for place in method.quick] if quick and method.quick else made
 
 

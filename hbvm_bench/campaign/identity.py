@@ -20,6 +20,7 @@ import msgspec
 
 import integrators.registry
 import problems.registry
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Checks
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
@@ -90,9 +91,17 @@ def resolve(case: Case) -> Resolved:
 
 @lru_cache(maxsize=64)
 def make_problem(text: str) -> Problem:
-    """Make the problem that ``text`` specifies; the last ones are kept, for a campaign has them often."""
+    """Make the problem that ``text`` specifies; the last ones are kept, for a campaign has them often.
+
+    No user's code is run: of a problem of the user's own the formula must be known (`own`).
+    """
     spec = parse_spec(text)
-    return problems.load(spec.name, **spec.arguments)
+    return own.find(spec) or problems.load(spec.name, **spec.arguments)
+
+
+def typed_problem(text: str) -> Problem:
+    """Make the problem that a user typed; if it is one of a Python file, the file is run."""
+    return own.read(text) if own.is_file(text) else make_problem(text)
 
 
 def make_method(text: str) -> MethodBase:
@@ -120,7 +129,7 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
             "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
             "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
             "versions": versions_of(method),
-            "reference": _reference_digest(problem),
+            "reference": solutions.digest(problem),
             "source": source_digest(method, case),
         }
         | {
@@ -162,10 +171,12 @@ def source_digest(method: MethodBase, case: Case) -> str:
     import, at their heads or anywhere below, of our packages and of the method's and the problem's own. So
     a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
     nor any because of a metric, which is evaluated when a record is read, or of a report. Comments,
-    docstrings, the layout and what a problem's decorator says do not count.
+    docstrings, the layout and what a problem's decorator says do not count. A problem of the user's
+    own has no source: its name holds the digest of its formula.
     """
-    problem = problems.registry.factory(parse_spec(case.problem).name)
-    return digest_of((*measures(), type(method).__module__, problem.__module__))
+    spec = parse_spec(case.problem)
+    made_in = [] if own.find(spec) else [problems.registry.factory(spec.name).__module__]
+    return digest_of((*measures(), type(method).__module__, *made_in))
 
 
 @cache
@@ -264,14 +275,6 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
                 block = getattr(node, blocks, ())
                 left += block if isinstance(block, list) else ()
     return found
-
-
-@lru_cache(maxsize=64)
-def _reference_digest(problem: Problem) -> str:
-    stored = solutions.find_file(problem)
-    if stored is None:
-        return ""
-    return hashlib.sha256(msgspec.json.encode([stored.t, stored.y])).hexdigest()
 
 
 @cache

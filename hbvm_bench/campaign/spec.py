@@ -2,10 +2,13 @@
 
 ``kepler(e=0.6)``, ``HBVM(k=16, s=8, h=0.25)`` and a bare ``IAS15`` are
 specifications. They are parsed with `ast` against a whitelist of nodes and
-never evaluated, so that a campaign file or a command line cannot run code.
+never evaluated, so that a campaign file or a command line cannot run code. In
+``mine.py:swing(g=1.1)`` the name is that of a function in a Python file, which
+`hbvm_bench.campaign.own` reads where that was asked for.
 """
 
 import ast
+import re
 import sys
 import warnings
 from dataclasses import dataclass, field
@@ -16,6 +19,7 @@ from problems.errors import InputError
 
 LONGEST = 4000  # characters; a specification is one line of text
 DEEPEST = 8  # nesting of lists in an argument
+_FILE = re.compile(r"\s*(?P<file>[^\s()'\"][^()'\"]*\.py(@\w+)?):")
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ class Spec:
     Attributes
     ----------
     name : str
-        Name of a problem or a method in its registry.
+        Name of a problem or a method in its registry, or ``"mine.py:swing"``.
     arguments : dict
         Values by argument name: numbers, strings, booleans, ``None`` and
         tuples of these.
@@ -46,7 +50,7 @@ def parse_spec(text: str) -> Spec:
     Parameters
     ----------
     text : str
-        ``"HBVM(k=16, s=8, h=0.25)"``, ``"IAS15()"`` or ``"IAS15"``.
+        ``"HBVM(k=16, s=8, h=0.25)"``, ``"IAS15()"``, ``"IAS15"`` or ``"mine.py:swing(g=1.1)"``.
 
     Returns
     -------
@@ -60,6 +64,9 @@ def parse_spec(text: str) -> Spec:
     """
     if len(text) > LONGEST:
         raise InputError(f"a specification of {len(text)} characters is too long; at most {LONGEST}.")
+    if (found := _FILE.match(text)) is not None:
+        call = parse_spec(text[found.end() :])
+        return Spec(f"{found['file']}:{call.name}", call.arguments)
     line = "".join(" " if character.isspace() else character for character in text)  # columns stay
     if not line.strip():
         raise InputError('an empty specification; write a name or a call such as "HBVM(k=4, s=2, h=0.1)".')
@@ -86,6 +93,12 @@ def parse_spec(text: str) -> Spec:
             raise _at(line, keyword, f"{keyword.arg!r} is given twice")
         arguments[keyword.arg] = _literal(line, keyword.value, DEEPEST)
     return Spec(tree.func.id, arguments)
+
+
+def file_of(text: str) -> str:
+    """Return the Python file that a specification names, ``""`` where it names none."""
+    found = _FILE.match(text)
+    return "" if found is None else found["file"]
 
 
 def _literal(line: str, node: ast.expr, depth: int) -> Any:

@@ -8,7 +8,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 import problems
-from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.identity import typed_problem
 from hbvm_bench.report import terminal
 from hbvm_bench.summaries import engines as engines_
 from hbvm_bench.summaries import findings
@@ -63,7 +63,7 @@ def advise(
     """Say which of our methods and which step reach an accuracy, at what cost: a few short runs."""
     from integrators.advice import advise as advise_
 
-    advice = advise_(make_problem(problem), accuracy)
+    advice = advise_(typed_problem(problem), accuracy)
     if as_json:
         terminal.print_json(
             {

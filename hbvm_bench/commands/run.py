@@ -3,19 +3,21 @@
 import shlex
 import sys
 from collections.abc import Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, load
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
-from hbvm_bench.run import executors, loop, supervise, timing_pass
+from hbvm_bench.run import executors, loop, references, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
@@ -31,12 +33,16 @@ PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 def run(
     name: Annotated[str | None, typer.Argument(help="A campaign's name, or a TOML file.")] = None,
     problem: Annotated[
-        list[str] | None, typer.Option("-p", "--problem", help='A problem, as in "sitnikov(e=0.6)".')
+        list[str] | None,
+        typer.Option("-p", "--problem", help='A problem, as in "sitnikov(e=0.6)" or "mine.py:swing(g=1.1)".'),
     ] = None,
     method: Annotated[
         list[str] | None, typer.Option("-m", "--method", help='A method, as in "HBVM(k=16, s=8, h=0.25)".')
     ] = None,
     step: Annotated[float | None, typer.Option(help="Distance of the samples, with -p and -m.")] = None,
+    reference: Annotated[
+        bool, typer.Option("--reference", help="With -p: compute references by two methods, for positions.")
+    ] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Where results go; default runs/NAME.")] = None,
     report_to: Annotated[Path | None, typer.Option("--report", help="Also write the report there.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Cases side by side; default one per core.")] = None,
@@ -58,11 +64,12 @@ def run(
 
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
-    campaign = _campaign(name, problem, method, step)
+    campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
+    campaign = own.opened(campaign, None if name is None else Path(name).parent, partial(_say_run, name))
     if report_to is not None:
         ensure_writable(report_to, keep=False)
-    command = _command(name, problem, method, step) + " --quick" * quick
+    command = _command(name, problem, method, step, reference) + " --quick" * quick
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
     store = carry_out(campaign, out, command, executor=executor, jobs=jobs, timing=timing)
     records = reading.records(store)
@@ -111,12 +118,23 @@ def carry_out(
     typer.Exit
         With 130 after Ctrl-C, and 1 if an executor lost some cases; what finished is kept.
     """
-    cases = loop.plan(campaign)
     store = Store(directory)
+    store.learn()
+    cases = loop.plan(campaign)
     with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
         store.prepare()
+        if references.make_missing(campaign, store, _say):  # to which the grid and the ids belong
+            cases = loop.plan(campaign)
         _measure(campaign, cases, store, pool, timing, command)
     return store
+
+
+def _say(sentence: str) -> None:
+    print(f"hbvm-bench: {sentence}", file=sys.stderr)
+
+
+def _say_run(campaign: str | None, file: str) -> None:
+    _say(f"running the Python file {file}" + (f", which {campaign} names" if campaign else ""))
 
 
 def _measure(
@@ -147,11 +165,15 @@ def _given_up(why: str, cases: list[Resolved], store: Store, code: int) -> typer
 
 
 def _campaign(
-    name: str | None, problems: list[str] | None, methods: list[str] | None, step: float | None
+    name: str | None,
+    problems: list[str] | None,
+    methods: list[str] | None,
+    step: float | None,
+    reference: bool,
 ) -> Campaign:
     if name is not None:
-        if problems or methods or step is not None:
-            raise InputError("give either a campaign or -p, -m and --step, not both.")
+        if problems or methods or step is not None or reference:
+            raise InputError("give either a campaign or -p, -m, --step and --reference, not both.")
         return load(name)
     if not problems or not methods:
         raise InputError('give a campaign, or at least one -p "PROBLEM(...)" and one -m "METHOD(...)".')
@@ -162,19 +184,24 @@ def _campaign(
     return Campaign(
         name="custom",
         title="Problems and methods given on the command line",
-        problems=list(problems),
+        problems=[ProblemEntry(use=text, reference=reference) for text in problems],
         methods=[MethodEntry(use=text) for text in methods],
         grid=Grid(step=step),
     )
 
 
 def _command(
-    name: str | None, problems: list[str] | None, methods: list[str] | None, step: float | None
+    name: str | None,
+    problems: list[str] | None,
+    methods: list[str] | None,
+    step: float | None,
+    reference: bool,
 ) -> str:
     words = ["hbvm-bench", "run", *([name] if name else [])]
     words += [word for text in problems or [] for word in ("-p", text)]
     words += [word for text in methods or [] for word in ("-m", text)]
     words += ["--step", repr(step)] if step is not None else []
+    words += ["--reference"] if reference else []
     return shlex.join(words)
 
 

@@ -97,6 +97,8 @@ def quartic(*, k: Positive = 1.0, q: float = 1.0, t_end: float = 100.0) -> Probl
     return Problem(system, q0=[q], p0=[0.0], t_end=t_end)
 ```
 
+In a file `mine.py` it can be used at once, with the decorator or without, as `mine.py:quartic(k=2.0)` on the
+command line and in a campaign file beside it (see [campaigns](campaigns.md)).
 A package names it under the entry point group `hbvm_bench.problems`, as `examples/integrator` does
 (`quartic = "package.module:quartic"`); in this repository it is the file `problems/catalogue/quartic.py` and
 nothing else, with `expected=` for the tests.
@@ -109,7 +111,7 @@ Position errors are measured against solutions that two independent computations
 method in 128-bit arithmetic and Gauss collocation in double-double arithmetic (for large systems the
 collocation and the Taylor method in long double). Each is a text file in `hbvm_bench/reference/data/`, with
 its provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
-recomputes and compares.
+recomputes and compares; `reference = true` in a campaign makes one for any other problem.
 
 | problem | up to t = | the two differ by (relative) |
 |---|---|---|

@@ -6,6 +6,7 @@ Legendre coefficients of the field: the last of s is of the size h^{s-1}, the
 error of the step about its square.
 """
 
+import ast
 import hashlib
 from collections.abc import Callable
 from functools import cache
@@ -14,6 +15,7 @@ from typing import Any
 import mpmath
 import numpy as np
 from numba import njit
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hbvm_bench.reference import extended
@@ -50,7 +52,8 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
     Raises
     ------
     problems.errors.InputError
-        If the iteration does not converge, or the step shrinks to nothing.
+        If the iteration does not converge, or the step shrinks to nothing; for functions that
+        double-double arithmetic does not have.
     """
     advance = _program(problem.system)
     nodes, weights, matrix, legendre = _tables(STAGES)
@@ -58,7 +61,12 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
     out = np.empty((len(at), *y.shape))
     t, h = float(problem.t0), 0.0
     for i, end in enumerate(np.asarray(at, dtype=np.float64).tolist()):
-        code, h = advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay)
+        try:
+            code, h = advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay)
+        except NumbaError:
+            raise InputError(
+                f"the field of {problem!r} has a function or a table that is not to be had in double-double."
+            ) from None
         if code:
             raise InputError(f"{problem!r} could not be integrated beyond t = {t!r} in double-double.")
         t = end
@@ -125,10 +133,22 @@ def _program(system: System) -> Callable[..., Any]:
     made = emit.source(system, "field", "numba", limit=0)
     key = hashlib.sha256(made.text.encode()).hexdigest()
     if key not in _programs:
-        namespace: dict[str, Any] = {"np": np, **extended.FUNCTIONS}
-        exec(compile(made.text, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
+        namespace: dict[str, Any] = {"np": np, "number": number, **extended.FUNCTIONS}
+        tree = ast.fix_missing_locations(_Numerators().visit(ast.parse(made.text)))
+        exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
         _programs[key] = _compiled(njit(namespace[made.name]))
     return _programs[key]
+
+
+class _Numerators(ast.NodeTransformer):
+    """Turns literals that are divided into double-double numbers: 1.0/30.0 is no double."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Div) and isinstance(node.left, ast.Constant):
+            zero = ast.Constant(0.0)
+            node.left = ast.Call(ast.Name("number", ast.Load()), [node.left, zero], [])
+        return node
 
 
 def _compiled(field: Any) -> Any:

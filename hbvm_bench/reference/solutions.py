@@ -6,10 +6,11 @@ field, and its accuracy is what a second run with another tolerance leaves of it
 """
 
 import ast
+import hashlib
 import platform
 from dataclasses import dataclass
 from decimal import Context, Decimal
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -83,30 +84,89 @@ def folder() -> Path:
 
 
 def find(problem: Problem) -> Reference | None:
-    """Return the stored reference of a problem, or ``None``.
+    """Return the reference of a problem, or ``None``.
 
     Parameters
     ----------
     problem : Problem
-        Matched by its name, its initial state and its parameters, bit for bit. Of several
-        references the one that has the problem's end time is returned, or else the first.
+        Matched by its initial state and its parameters, bit for bit, and its name. Of several
+        references the one that has the problem's end time is returned, or else the first. One that
+        was made here (`know`) is preferred: it has this very span and formula.
     """
-    path = _path(problem)
-    return None if path is None else _parsed(path)
+    found = _stored(problem)
+    return None if found is None else found.reference
 
 
 def find_file(problem: Problem) -> ReferenceFile | None:
-    """Return the stored reference of a problem with all its digits, or ``None``; see `find`."""
-    path = _path(problem)
-    return None if path is None else read(path)
+    """Return the reference of a problem with all its digits, or ``None``; see `find`."""
+    found = _stored(problem)
+    return None if found is None else found.file
 
 
-def _path(problem: Problem) -> Path | None:
+def digest(problem: Problem) -> str:
+    """Return the SHA-256 of the times and states of a problem's reference; ``""`` where it has none."""
+    found = _stored(problem)
+    return "" if found is None else found.digest
+
+
+def know(text: str) -> None:
+    """Know a reference that does not come with the package, from its text; see `encode`.
+
+    Raises
+    ------
+    ValueError, LookupError
+        If it is none.
+    """
+    found = _Stored(msgspec.json.decode(text, type=ReferenceFile))
+    said = found.file.provenance
+    key = (*found.file.start, *found.file.parameters, said["field"], float(said["t_end"]).hex())
+    if found.reference.high.shape != found.reference.low.shape or len(found.reference.t) != len(found.file.y):
+        raise ValueError("a reference must have one state for each of its times")
+    _made_here[key] = found
+
+
+def made_here(problem: Problem) -> str:
+    """Return the text of a problem's reference that does not come with the package; ``""`` without one."""
+    found = _made_here.get(_key(problem))
+    return "" if found is None else encode(found.file)
+
+
+class _Stored:
+    """A reference as its file has it, and what is made of it when it is asked for."""
+
+    def __init__(self, file: ReferenceFile) -> None:
+        self.file = file
+
+    @cached_property
+    def reference(self) -> Reference:
+        return parse(self.file)
+
+    @cached_property
+    def digest(self) -> str:
+        return hashlib.sha256(msgspec.json.encode([self.file.t, self.file.y])).hexdigest()
+
+
+_made_here: dict[tuple[str, ...], _Stored] = {}
+
+
+def _key(problem: Problem) -> tuple[str, ...]:
+    end = float(problem.t_end).hex()
+    return (*start(problem), *hexadecimal(problem.par), emit.fingerprint(problem.system), end)
+
+
+def _stored(problem: Problem) -> _Stored | None:
+    if _made_here and (found := _made_here.get(_key(problem))) is not None:
+        return found
     wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
-    places = (folder(), folder() / LONG)
+    places = (folder(), folder() / LONG) if (problem.name or "").isidentifier() else ()
     paths = [path for place in places for path in sorted(place.glob(f"{problem.name}*.json"))]
-    fitting = [path for path in paths if (read(path).start, read(path).parameters) == wanted]
-    return next((path for path in fitting if end in read(path).t), fitting[0] if fitting else None)
+    fitting = [one for one in map(_read, paths) if (one.file.start, one.file.parameters) == wanted]
+    return next((one for one in fitting if end in one.file.t), fitting[0] if fitting else None)
+
+
+@lru_cache(maxsize=64)
+def _read(path: Path) -> _Stored:
+    return _Stored(read(path))
 
 
 def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
@@ -196,15 +256,9 @@ def start(problem: Problem) -> list[str]:
     return [float(problem.t0).hex(), *hexadecimal(problem.y0)]
 
 
-@lru_cache(maxsize=64)
 def read(path: Path) -> ReferenceFile:
     """Return a stored reference with all its digits."""
     return msgspec.json.decode(path.read_bytes(), type=ReferenceFile)
-
-
-@lru_cache(maxsize=8)
-def _parsed(path: Path) -> Reference:
-    return parse(read(path))
 
 
 def parse(stored: ReferenceFile) -> Reference:

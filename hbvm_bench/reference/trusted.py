@@ -83,10 +83,18 @@ def times(problem: Problem, until: float | None = None) -> Array:
         count = int(part * GRID * (1 + 1e-12))
         if count == 0:
             raise InputError(f"until={until!r} comes before the first sample, {problem.t0 + span / GRID!r}.")
-    rows = next((rows for most, rows in ROWS if problem.system.dim <= most), FEW_ROWS)
-    places = np.append(np.arange(0, count, -(-count // rows)), count)
     # As the bench computes its own grid, so that the times are the same doubles.
-    return problem.t0 + span * places / GRID
+    return problem.t0 + span * _places(problem, count) / GRID
+
+
+def some(problem: Problem, samples: Array) -> Array:
+    """Return as many of the times of a grid as a reference of the problem has; both ends among them."""
+    return samples[_places(problem, len(samples) - 1)]
+
+
+def _places(problem: Problem, count: int) -> NDArray[np.int64]:
+    rows = next((rows for most, rows in ROWS if problem.system.dim <= most), FEW_ROWS)
+    return np.append(np.arange(0, count, -(-count // rows)), count)
 
 
 def ask(problem: Problem, at: Array) -> Opinions:
@@ -151,6 +159,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
             "field": emit.fingerprint(problem.system),
+            "t_end": repr(float(problem.t_end)),
         },
         t=solutions.hexadecimal(opinions.times[:kept]),
         y=[[_text(problem, value) for value in row] for row in opinions.states[:kept]],

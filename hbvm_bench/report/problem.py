@@ -262,6 +262,8 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
         return None
     made = known.provenance
     said = [f"Reference: {made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"]
+    if "agreement" in made:
+        said.append(f"The two agree to {made['agreement']}")
     floor = problem.errors(known.high, known.t)
     least = ", ".join(
         f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}"

@@ -99,7 +99,8 @@ def summary(records: Sequence[Record]) -> list[str]:
             sentences.append(f"No case that was timed keeps {level}.")
     elif groups["on"]:
         sentences.append(
-            "This problem has no stored reference: positions are not measured, and nothing is ranked."
+            "This problem has no stored reference: positions are not measured, and nothing is ranked. "
+            "`reference = true` in the campaign file, or `--reference`, computes one before the run."
         )
     shares = [record.timing.share for record in records if record.timing and record.timing.rounds]
     if shares and median(shares) < UNDISTURBED:

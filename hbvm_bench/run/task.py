@@ -12,6 +12,7 @@ from typing import TypeVar
 
 import msgspec
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits
 from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
@@ -41,8 +42,13 @@ class UnfinishedRunError(Exception):
 
 def task_of(resolved: Resolved, limits: Limits) -> bytes:
     """Return the JSON of the `Request` for an accuracy run, which `execute` takes."""
-    versions = versions_of(resolved.method)
-    return msgspec.json.encode(Request(cases={resolved.id: resolved.case}, limits=limits, versions=versions))
+    request = Request(
+        cases={resolved.id: resolved.case},
+        limits=limits,
+        versions=versions_of(resolved.method),
+        beside=own.beside(resolved.problem),
+    )
+    return msgspec.json.encode(request)
 
 
 def execute(task: bytes) -> tuple[bytes, bytes]:
@@ -73,6 +79,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
         If the sources changed meanwhile.
     """
     asked = msgspec.json.decode(task, type=Request)
+    own.learn(asked.beside)
     ((key, case),) = asked.cases.items()
     try:
         resolved = resolve(case)

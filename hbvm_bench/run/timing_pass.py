@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine
@@ -161,7 +162,8 @@ def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits,
 
 def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None) -> list[Timing]:
     """Return what a worker process answers; without an answer each timing says why."""
-    request = Request(cases={one.id: one.case for one in cases}, limits=limits, plan=plan, core=core)
+    asked, beside = {one.id: one.case for one in cases}, own.beside(cases[0].problem)
+    request = Request(cases=asked, limits=limits, plan=plan, beside=beside, core=core)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
         ended = start(Path(scratch), request)
         reply = decoded(Path(scratch) / REPLY, list[Timing])

@@ -22,6 +22,7 @@ from typing import Any, Literal, NamedTuple
 import msgspec
 import numpy as np
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Ensemble, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
 from hbvm_bench.measure import ensemble, timing, together
@@ -71,6 +72,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         What to time; ``None`` for the accuracy run.
     versions : dict
         Behind the ids, to name what differs elsewhere.
+    beside : own.Beside
+        What must be known of their problem.
     core : int or None
         The core to stay on.
     """
@@ -79,6 +82,7 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     limits: Limits
     plan: TimingPlan | None = None
     versions: dict[str, str] = {}
+    beside: own.Beside = own.Beside()
     core: int | None = None
 
 
@@ -102,6 +106,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         What this process has not loaded itself but found loaded, being a fork of ``parent``.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
+    own.learn(request.beside)
     limit_and_die_with(parent)
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})

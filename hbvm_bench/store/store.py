@@ -5,12 +5,14 @@
     DIR/campaign.json        what was asked for: the campaign and the ids of its cases
     DIR/cases/<id>.json      one record per case
     DIR/cases/<id>.npz       its series
+    DIR/problems/<name>.json what is known of a problem that does not come with the package, or its reference
 
 A file is complete or not there, so that the store is also the cache: a rerun
 does what is missing. Nothing is pickled.
 """
 
 import fcntl
+import hashlib
 import io
 import math
 import os
@@ -27,6 +29,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Case
 from hbvm_bench.campaign.identity import is_ours, make_method, make_problem
 from hbvm_bench.campaign.spec import Spec, parse_spec
@@ -37,6 +40,7 @@ from problems.errors import InputError
 
 INDEX = "campaign.json"
 CASES = "cases"
+PROBLEMS = "problems"
 NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
 NAME = re.compile(r"\w[\w .-]{0,99}")
 SERIES = ("t", "y", "distance", "position_t", "position", "phase")  # every trajectory has them
@@ -156,8 +160,25 @@ class Store:
             return b""
 
     def write_index(self, index: Index) -> None:
-        """Store what the run was asked to do."""
+        """Store what the run was asked to do, and its problems where they do not come with the package."""
+        for text in dict.fromkeys(case.problem for _, case in index.listed()):
+            with suppress(InputError):  # of a plugin that is not here
+                self.keep(text)
         write_json(self.directory / INDEX, index)
+
+    def keep(self, text: str) -> None:
+        """Store the formula of a problem of the user's own, and a reference that was made here."""
+        known = own.beside(make_problem(text))
+        if known != own.Beside():
+            name = hashlib.sha256(text.encode()).hexdigest()[:NAME_LENGTH]
+            (self.directory / PROBLEMS).mkdir(parents=True, exist_ok=True)
+            write_json(self.directory / PROBLEMS / f"{name}.json", known)
+
+    def learn(self) -> None:
+        """Know the problems and references that are stored here; no code is run."""
+        for path in (self.directory / PROBLEMS).glob("[!.]*.json"):
+            with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
+                own.learn(decoded(path.read_bytes(), own.Beside))
 
     def index(self) -> Index:
         """Return what the run was asked to do.
@@ -176,6 +197,7 @@ class Store:
             ) from None
         except OSError as error:
             raise InputError(f"cannot read {str(self.directory)!r}: {error.strerror}.") from None
+        self.learn()
         try:
             index = decoded(content, Index)
             cases = index.cases or index.campaign.cases()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import problems
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.summaries import engines
@@ -95,6 +96,8 @@ def inspect(text: str, parameters: str = "") -> Findings:
 
 def _problem(text: str) -> Problem | None:
     """Return the problem that a text names, or ``None`` if it is a formula."""
+    if own.is_file(text):
+        return own.read(text)
     try:
         name = parse_spec(text).name
     except InputError:

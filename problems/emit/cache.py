@@ -80,7 +80,7 @@ def locked(path: Path) -> Iterator[None]:
     try:
         with contextlib.suppress(OSError):  # a folder that can only be read, a file system without locks
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
             if fcntl is not None:
                 fcntl.flock(handle, fcntl.LOCK_EX)
         yield

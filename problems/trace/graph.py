@@ -604,6 +604,7 @@ class Graph:
                 return self.call(node.op, args[0])
 
 
+_SPACES = ("t", "y", "par", "out")
 _ARITHMETIC = ("add", "sub", "mul", "div", "neg", "atan2", "where")
 
 
@@ -613,7 +614,10 @@ def _affine(plain: Sequence[Any]) -> Affine:
 
 _OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
     "const": lambda data, _: float(data),
-    "symbol": lambda data, _: (str(data[0]), data[1] if isinstance(data[1], int) else _affine(data[1])),
+    "symbol": lambda data, _: (
+        _SPACES[_SPACES.index(data[0])],  # which is printed into code: no other text
+        data[1] if isinstance(data[1], int) else _affine(data[1]),
+    ),
     "index": lambda data, _: _affine(data),
     "pow": lambda data, _: int(data),
     "sum": lambda data, loops: loops[data],

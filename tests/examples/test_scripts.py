@@ -10,6 +10,10 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "examples"
 
 SAYS = {
+    "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
+    "lattice.py": ["energy kept: True"],
+    "ensemble.py": ["28% of 10000 orbits are chaotic"],
+    "own_campaign.py": ["exit code: 0 report: True", "DOP853"],
     "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
     "measured_forcing.py": ["steps that end at a knot: 40 of 40"],
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
@@ -19,7 +23,8 @@ SAYS = {
 
 
 def test_every_script_has_its_words():
-    assert sorted(path.name for path in SCRIPTS.glob("*.py")) == sorted(SAYS)
+    names = {path.name for path in SCRIPTS.glob("*.py")} - {"side_by_side.py"}  # which others import
+    assert names == set(SAYS)
 
 
 @pytest.mark.parametrize("name", SAYS)

@@ -4,9 +4,12 @@ import copy
 import dataclasses
 import inspect
 import pickle
+import pydoc
 
 import pytest
 
+import integrators
+import problems
 from integrators import HBVM, Gauss
 from problems.errors import InputError
 
@@ -333,7 +336,24 @@ def test_methods_are_copied_and_pickled(method):
 
 
 def test_a_signature_is_the_options():
-    assert str(inspect.signature(Gauss)).startswith("(*, s: int, h: Optional[float] = None, ")
+    assert str(inspect.signature(Gauss)).startswith("(*, s, h=None, tol=None, ")
+
+
+@pytest.mark.parametrize(
+    "public",
+    [
+        *(HBVM, Gauss, integrators.integrate, integrators.integrate_many, integrators.advise),
+        *(integrators.Solution, problems.Problem, problems.Hamiltonian, problems.VectorField),
+    ],
+    ids=lambda public: public.__name__,
+)
+def test_help_is_for_reading(public):
+    text = pydoc.plain(pydoc.render_doc(public))
+    assert "<function" not in text
+    assert "object at 0x" not in text
+    call = next(line for line in text.splitlines() if f"{public.__name__}(" in line and "class" not in line)
+    assert len(call) < 220
+    assert "Annotated" not in call
 
 
 def test_a_limit_can_be_raised(monkeypatch):

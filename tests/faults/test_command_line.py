@@ -50,7 +50,7 @@ run sitnikov --jobs 0                                      | Invalid value for '
 run sitnikov --jobs -1                                     | Invalid value for '--jobs': Input should be
 run sitnikov --jobs a                                      | Invalid value for '--jobs': Input should be a
 run sitnikov --jobs 1.5                                    | Invalid value for '--jobs': Input should be a
-run sitnikov --step 1                                      | give either a campaign or -p, -m and --step,
+run sitnikov --step 1                                      | give either a campaign or -p, -m, --step and
 run sitnikov --executor nowhere                            | there is no executor 'nowhere'; give local,
 RUN --executor nowhere                                     | there is no executor 'nowhere'; give local,
 RUN --executor no.such:thing                               | there is no executor 'no.such:thing': No module
@@ -67,7 +67,7 @@ RUN --step 1e-320                                          | the limit is
 RUN --step 0                                               | --step must be a positive number, not 0.0
 RUN --step inf                                             | --step must be a positive number, not inf
 RUN --step abc                                             | Invalid value for '--step': Input should be a
-RUN --timing yes                                           | give either a campaign or -p, -m and --step,
+RUN --timing yes                                           | give either a campaign or -p, -m, --step and
 RUN -p "kepler()"                                          | HBVM(k=4, s=2, h=0.1) on kepler(e=0.6) is given
 run -p "kepler()" -m ""                                    | an empty specification; write a name or a call
 run -p "" -m "IAS15()"                                     | an empty specification; write a name or a call

@@ -44,8 +44,9 @@ FAULTS = (
         RuntimeError,
     ),
     Fault("install(HBVM())", installed, r"chooses k and s .* HBVM\(k=8, s=8\)"),
-    Fault("install(HBVM(tol=))", lambda: installed(k=8, s=4, tol=1e-9), "tol=1e-09 .* give h="),
-    Fault("install(Gauss(h=, tol=))", lambda: installed(s=4, h=0.1, tol=1e-9), "tol=1e-09 .* give h="),
+    Fault(
+        "install(HBVM(max_step=))", lambda: installed(k=8, s=4, tol=1e-9, max_step=1.0), "max_step= .* leave"
+    ),
     Fault(
         "install(HBVM(solver=))", lambda: installed(k=8, s=4, h=0.1, solver="newton"), "'newton' .* leave it"
     ),

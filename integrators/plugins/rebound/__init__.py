@@ -33,7 +33,7 @@ rebound = layout.rebound
 NAME = "hbvm"
 
 DOCUMENTATION = """\
-HBVM(k,s), a Hamiltonian Boundary Value Method with fixed timesteps (Brugnano, Iavernaro, Trigiante 2010).
+HBVM(k,s), a Hamiltonian Boundary Value Method (Brugnano, Iavernaro, Trigiante 2010); with tol, own timesteps.
 It is of order 2s and conserves the energy for any sequence of timesteps as soon as k is large enough.
 HBVM(s,s) is the Gauss-Legendre collocation method, which is symplectic and conserves the angular momentum.
 The method is implicit. It handles arbitrary forces, including those that depend on velocities or time.
@@ -58,6 +58,14 @@ FIELDS = (
         layout.LARGEST_ERROR,
         None,
     ),
+    (
+        "Estimated local error of a step, in the same units, that its length follows; sim.dt is then the "
+        "next step. Default is 0: steps of constant length.",
+        DOUBLE,
+        "tol",
+        layout.TOL,
+        None,
+    ),
 )
 
 MESSAGES = {
@@ -65,7 +73,8 @@ MESSAGES = {
     layout.ROUGH: "HBVM solves to round-off, for smooth forces; a tree's are not: set sim.gravity = 'basic'.",
     layout.DIVERGED: "The iteration for a step of HBVM did not converge; take a smaller sim.dt.",
     layout.UNRESOLVED: "A step of HBVM is too long: its estimated error exceeds "
-    "sim.integrator.largest_error times the bodies' velocity; take a smaller sim.dt, or ias15.",
+    "sim.integrator.largest_error times the bodies' velocity; take a smaller sim.dt, or set "
+    "sim.integrator.tol for own steps.",
 }
 
 # REBOUND keeps addresses of what is in here.
@@ -76,19 +85,22 @@ _tables: dict[tuple[int, int], Any] = {}
 def install(simulation: Any, method: HBVM | Gauss) -> None:
     """Make ``method`` the integrator of a simulation, and its h, where it has one, the timestep.
 
+    With ``tol``, as in ``HBVM(k=10, s=8, tol=1e-12)``, steps vary: for close encounters. A symplectic
+    method, such as Gauss, then loses its long-time behaviour, one with k > s keeps the energy.
+
     Parameters
     ----------
     simulation : rebound.Simulation
         The simulation.
     method : HBVM or Gauss
-        As for `integrators.integrate`, with k and s. Without h, ``HBVM(k=8, s=8)``, the timestep
-        remains ``simulation.dt``.
+        As for `integrators.integrate`, with k and s. Without h and tol, ``HBVM(k=8, s=8)``, the
+        timestep remains ``simulation.dt``; with tol, h is the first step.
 
     Raises
     ------
     problems.errors.InputError
-        If it is another method, or one with options that are not to be had here: ``tol``, since
-        steps are of one length, or a ``solver``, since the equations are solved by fixed-point iteration.
+        If it is another method, or one with options that are not to be had here: those of the steps
+        but ``h`` and ``tol``, or a ``solver``, since the equations are solved by fixed-point iteration.
     """
     if isinstance(method, Gauss):
         method = method.as_hbvm()
@@ -98,11 +110,9 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
         raise InputError(
             f"{method!r} chooses k and s itself, REBOUND's plugin does not: give HBVM(k=8, s=8)."
         )
-    if method.tol is not None and (method.h is not None or method.tol != TOLERANCE):
-        raise InputError(
-            f"tol={method.tol!r} asks for steps of varying length, which the plugin does not take: give h= "
-            "instead, or neither of them and set sim.dt."
-        )
+    if given := method.control():
+        raise InputError(f"{next(iter(given))}= is not to be had in REBOUND: leave it out.")
+    given_tol = method.tol is not None and (method.h is not None or method.tol != TOLERANCE)
     if method.solver not in ("auto", "fixed_point"):
         raise InputError(
             f"solver={method.solver!r} is not to be had in REBOUND, where steps are solved by fixed-point "
@@ -110,7 +120,7 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
         )
     simulation.integrator = NAME
     options: Any = simulation.integrator  # not the name, but what holds its options
-    options.k, options.s = method.k, method.s
+    options.k, options.s, options.tol = method.k, method.s, method.tol if given_tol else 0.0
     if method.h is not None:
         simulation.dt = method.h
 

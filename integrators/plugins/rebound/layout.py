@@ -7,8 +7,8 @@ from integrators.peers import load
 rebound = load("rebound")
 
 # The state of the integrator, in words of eight bytes: what REBOUND saves, and then what it does not.
-K, S, REST, REST_COUNT, FORCES, FORCES_COUNT, LENGTH, ITERATIONS, EVALUATIONS, LARGEST_ERROR = range(10)
-SAVED = 10
+K, S, REST, REST_COUNT, FORCES, FORCES_COUNT, LENGTH, ITERATIONS, EVALUATIONS, LARGEST_ERROR, TOL = range(11)
+SAVED = 11
 TABLES, TABLES_K, TABLES_S, WORK, WORK_COUNT, MEGNO = range(SAVED, SAVED + 6)
 WORDS = SAVED + 6
 

@@ -39,6 +39,9 @@ ROUNDING = 1e-15  # below it, the first change that does not decrease ends the i
 PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION
 FLOOR = 1e-3  # of the largest size of all bodies: where rounding of the forces may hide a small one
 SECOND_ORDER = 30.0  # times the error allowed: of 20 steps a circle, each has one of 3e-3 of the velocity
+SAFETY = 0.8  # of the length that would just meet the tolerance
+SHORTER, HALF, LONGER = 0.1, 0.5, 2.0  # factors from one step to the next; where a step cannot be solved
+TINY = 1e-300
 HALF_UNIT = 2.3e-16  # what an addition rounds off is no more than half of this, relative
 
 # Functions of REBOUND, and one of ours, that compiled code calls.
@@ -263,7 +266,7 @@ def update(table, h, q, v, rest, forces):
 
 @compiled
 def step(simulation, state):
-    """Take one step of length dt."""
+    """Take one step of length dt, or with a tolerance one as long as its estimated error allows."""
     number, clock = words(state, at.WORDS), reals(simulation, at.SIMULATION)
     k = number[at.K]
     n = 3 * (words(simulation, at.SIMULATION)[at.COUNT] + words(simulation, at.SIMULATION)[at.VARIATIONS])
@@ -289,21 +292,31 @@ def step(simulation, state):
         if abs(rest[1, d]) > HALF_UNIT * abs(v[d]):
             rest[1, d] = 0.0
     t, h = clock[at.TIME], clock[at.DT]
-    problem = at.DIVERGED
-    solved = solve(simulation, state, table, t, h, q, v, rest, forces, work, weights)
-    if solved:
-        bodies, most = words(simulation, at.SIMULATION)[at.COUNT], reals(state, at.WORDS)[at.LARGEST_ERROR]
-        if number[at.S] == 1:
-            most *= SECOND_ORDER
-        if most < np.inf:
-            solved = local_error(h, v, number[at.S], table[6 + 2 * k :], forces, work, bodies) <= most
-            problem = at.UNRESOLVED
+    bodies, tol = words(simulation, at.SIMULATION)[at.COUNT], reals(state, at.WORDS)[at.TOL]
+    varies = 0.0 < tol < np.inf
+    most = tol if varies else reals(state, at.WORDS)[at.LARGEST_ERROR]
+    if number[at.S] == 1 and not varies:
+        most *= SECOND_ORDER
+    while True:
+        problem, factor = at.DIVERGED, HALF
+        solved = solve(simulation, state, table, t, h, q, v, rest, forces, work, weights)
+        if solved and most < np.inf:
+            error = local_error(h, v, number[at.S], table[6 + 2 * k :], forces, work, bodies)
+            problem, solved = at.UNRESOLVED, error <= most
+            wanted = SAFETY * (most / max(error, TINY)) ** (1.0 / (2 * number[at.S] + 1))
+            factor = min(LONGER, max(SHORTER, wanted))
+        if solved or not varies or t + factor * h == t:
+            break
+        h *= factor
+        reals(state, at.WORDS)[at.LENGTH] = 0.0  # the forces are those of this attempt
     if solved:
         update(table, h, q, v, rest, forces)
     scatter(simulation, 0, q)
     scatter(simulation, 3, v)
     if solved:
         clock[at.TIME], clock[at.DONE] = t + h, h
+        if varies:
+            clock[at.DT] = factor * h
         reals(state, at.WORDS)[at.LENGTH] = h
         if flags[at.CALCULATE_MEGNO] != 0:
             _add_growth(simulation, reals(state, at.WORDS)[at.MEGNO], h)

@@ -186,6 +186,32 @@ def test_the_largest_error_of_a_step_is_the_users() -> None:
         simulation.integrate(5.0)
 
 
+@pytest.mark.parametrize(
+    ("method", "energy"),
+    [
+        (HBVM(k=10, s=8, tol=1e-12), 6e-13),  # measured 1.3e-13
+        (HBVM(k=8, s=4, h=0.01, tol=1e-10), 4e-13),  # measured 7.8e-14
+        (Gauss(s=8, tol=1e-12), 1e-9),  # measured 1.2e-10: symplectic, and the steps change
+    ],
+    ids=str,
+)
+def test_own_steps_pass_an_encounter(method: HBVM | Gauss, energy: float) -> None:
+    simulation = eccentric(0.01)
+    install(simulation, method)
+    before = simulation.energy()
+    copied = simulation.copy()
+    for one in (simulation, copied):
+        one.integrate(20.0)
+        one.integrate(40.0)
+    assert simulation.t == 40.0
+    assert simulation.steps_done < 1000  # measured 272, 595 and 275
+    assert abs(simulation.energy() / before - 1) < energy
+    assert copied == simulation
+    simulation.dt *= -1
+    simulation.integrate(0.0)
+    assert abs(simulation.energy() / before - 1) < energy
+
+
 def test_without_h_the_timestep_is_the_simulations() -> None:
     simulation = rebound.Simulation()
     simulation.dt = 0.02

@@ -1,0 +1,352 @@
+"""Problems of the user's own: functions in Python files, run once and kept as the formulas they give.
+
+``mine.py:swing(g=1.1)`` is a function of a file (or a `Problem` there). Its code is run where a user
+asked for it and nowhere else: what it returns is kept, with the start and all numbers, as data named
+by a digest, and the problem is then called ``mine.py@3f2a1c9e:swing(g=1.1)``. Processes that do the
+cases, other machines and whoever reads a report get these data, not the file.
+"""
+
+import hashlib
+import importlib
+import importlib.util
+import inspect
+import json
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from msgspec.structs import replace
+
+from hbvm_bench.campaign.entries import ProblemEntry
+from hbvm_bench.campaign.file import Campaign, chosen, name_of, text_of
+from hbvm_bench.campaign.spec import Spec, file_of, parse_spec
+from hbvm_bench.campaign.sweep import fill
+from hbvm_bench.reference import solutions
+from integrators.plain import packed_problem, unpacked_problem
+from problems import calls
+from problems.errors import InputError, shown, unknown
+from problems.problem import Problem
+
+DIGITS = 8  # of a digest, in a problem's name
+KEPT = "@"
+
+_formulas: dict[str, str] = {}  # JSON, by the problem's text
+
+
+class _Place(NamedTuple):
+    """Where a problem is written: ``mine.py``, ``3f2a1c9e``, ``swing``."""
+
+    file: str
+    digest: str
+    function: str
+
+    @classmethod
+    def of(cls, spec: Spec) -> "_Place":
+        file, _, function = spec.name.rpartition(":")
+        name, _, digest = (file, "", "") if file.endswith(".py") else file.rpartition(KEPT)
+        return cls(name, digest, function)
+
+
+class Beside(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What must be known of a problem beside its text: JSON, empty where nothing must.
+
+    Attributes
+    ----------
+    formula : str
+        Of a problem of the user's own.
+    reference : str
+        A reference that does not come with the package.
+    """
+
+    formula: str = ""
+    reference: str = ""
+
+
+def beside(problem: Problem) -> Beside:
+    """Return what another process needs for a problem."""
+    return Beside(formula=formula(repr(problem)), reference=solutions.made_here(problem))
+
+
+def learn(known: Beside) -> None:
+    """Know what another process knew of a problem.
+
+    Raises
+    ------
+    ValueError, TypeError, LookupError
+        If it is damaged.
+    """
+    if known.formula:
+        _know(known.formula)
+    if known.reference:
+        solutions.know(known.reference)
+
+
+def formula(text: str) -> str:
+    """Return the data of a kept problem, as JSON, by the text that it prints as; ``""`` for any other."""
+    return _formulas.get(text, "")
+
+
+def find(spec: Spec) -> Problem | None:
+    """Return a problem of the user's own whose data are known here; ``None`` for a text that is no file's.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If they are not known: no code is run for it.
+    """
+    place = _Place.of(spec)
+    if not place.file:
+        return None
+    if str(spec) not in _formulas:
+        why = (
+            "its formula should lie beside the results of its run, and does not"
+            if place.digest
+            else "no Python file is run here"
+        )
+        raise InputError(f"the problem {shown(str(spec))} is not known: {why}.")
+    return _unpacked(_formulas[str(spec)])
+
+
+def read(text: str) -> Problem:
+    """Run the Python file of a problem, and return the problem.
+
+    Parameters
+    ----------
+    text : str
+        ``"mine.py:swing(g=1.1)"``; the file may lie anywhere.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is no such file, name or argument, if the file raises, or gives no problem.
+    """
+    spec = parse_spec(text)
+    return _Files(None).problem(spec)
+
+
+def is_file(text: str) -> bool:
+    """Whether a text names a problem in a Python file, which has to be run."""
+    return file_of(text).endswith(".py")
+
+
+def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None]) -> Campaign:
+    """Return a campaign whose problems from Python files are kept as formulas; the files are run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        As read.
+    folder : Path or None
+        Where the campaign's file lies, beside which the Python files must lie. ``None``: they may
+        lie anywhere.
+    tell : callable
+        Called with the name of each file before it is run.
+
+    Raises
+    ------
+    problems.errors.InputError
+        As of `read`, and for a problem that is no formula.
+    """
+    files = _Files(folder)
+    texts = [text_of(entry) for entry in campaign.entries()] + [one.problem for one in campaign.ensembles]
+    asked = [_Place.of(parse_spec(text)).file for text in texts if is_file(text)]
+    for file in dict.fromkeys(asked):
+        files.path(file)
+        tell(file)
+    if not asked:
+        return campaign
+    return replace(
+        campaign,
+        problems=[one for entry in campaign.entries() for one in _kept(entry, files)],
+        ensembles=[
+            replace(one, problem=files.kept(one.problem)) if is_file(one.problem) else one
+            for one in campaign.ensembles
+        ],
+    )
+
+
+def _kept(entry: ProblemEntry, files: "_Files") -> list[ProblemEntry]:
+    """Return an entry with its problem kept: one entry for each of its sweep's combinations."""
+    if not is_file(text_of(entry)):
+        return [entry]
+    return [
+        replace(entry, use=files.kept(fill(entry.use, values)), values=values, sweep={}, name=name_of(entry))
+        for values in chosen(entry)
+    ]
+
+
+class _Files:
+    """Python files, each of which is run once.
+
+    Parameters
+    ----------
+    folder : Path or None
+        The folder in which they must lie; ``None``: anywhere.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self.modules: dict[Path, ModuleType] = {}
+
+    def kept(self, text: str) -> str:
+        """Return what the problem of a file is called once its formula is known here."""
+        spec = parse_spec(text)
+        problem, place = self.problem(spec), _Place.of(spec)
+        if not problem.system.traced:
+            raise InputError(
+                f"{spec} is no formula but a function that is called; a run keeps problems as formulas: "
+                "write it as a problems.VectorField or a problems.Hamiltonian."
+            )
+        named = _titled(problem, f"{place.file}{KEPT}{_digest(problem)}:{place.function}", spec.arguments)
+        _know(_packed(named))
+        return repr(named)
+
+    def problem(self, spec: Spec) -> Problem:
+        """Return the problem that a file gives."""
+        place = _Place.of(spec)
+        path = self.path(place.file)
+        with _importing_from(path.parent):
+            if path not in self.modules:
+                self.modules[path] = _module(path, place.file)
+            made = _called(spec, place, self.modules[path])
+        return _titled(made, f"{place.file}:{place.function}", spec.arguments)
+
+    def path(self, file: str) -> Path:
+        """Return where a file lies, if it may be run."""
+        if self.folder is None:
+            path = Path(file).expanduser()
+        elif Path(file).name != file:
+            raise InputError(
+                f"{file} does not lie beside the campaign file; a campaign runs only Python files that do, "
+                f"by their names alone: {Path(file).name}."
+            )
+        else:
+            path = self.folder / file
+            if path.is_file() and path.resolve().parent != self.folder.resolve():
+                raise InputError(
+                    f"{file} is a link out of the campaign's folder; a campaign runs only Python files in it."
+                )
+        if not path.is_file():
+            where = "" if self.folder is None else " beside the campaign file"
+            raise InputError(f"there is no Python file {file!r}{where}.")
+        return path.resolve()
+
+
+@contextmanager
+def _importing_from(folder: Path) -> Iterator[None]:
+    """Let imports find the modules of a folder, and forget these afterwards: names may be taken twice."""
+    before, writes = set(sys.modules), sys.dont_write_bytecode
+    sys.path.insert(0, str(folder))
+    sys.dont_write_bytecode = True  # nothing is left in the user's folder
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        sys.dont_write_bytecode = writes
+        for name in sys.modules.keys() - before:
+            origin = getattr(sys.modules[name], "__file__", None)
+            if origin and folder in Path(origin).parents:
+                del sys.modules[name]
+
+
+def _module(path: Path, file: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    with _one_sentence(path, f"{file} cannot be run"):
+        spec.loader.exec_module(module)
+    return module
+
+
+def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
+    """Return what a name of a module is or, as a function, gives."""
+    what = f"{place.file}:{place.function}"
+    if not hasattr(module, place.function) or place.function.startswith("_"):
+        known = {
+            key for key, one in vars(module).items() if isinstance(one, Problem) or _is_function(one, module)
+        }
+        raise unknown(f"problem of {place.file}", place.function, known)
+    made = getattr(module, place.function)
+    if isinstance(made, Problem):
+        if spec.arguments:
+            raise InputError(f"{what} is a problem and takes no arguments; write {what}.")
+        return made
+    if not callable(made):
+        raise InputError(f"{what} is {shown(made)}, neither a problem nor a function that returns one.")
+    if not hasattr(made, "entry"):  # which checks its own
+        calls.check(what, inspect.signature(made), (), spec.arguments, "argument")
+    with _one_sentence(Path(str(module.__file__)), f"{spec} cannot be made"):
+        found = made(**spec.arguments)
+    if not isinstance(found, Problem):
+        raise InputError(f"{what} returns {shown(found)}, not a problems.Problem.")
+    return found
+
+
+def _is_function(value: object, module: ModuleType) -> bool:
+    return inspect.isfunction(value) and value.__module__ == module.__name__ and value.__name__[0] != "_"
+
+
+@contextmanager
+def _one_sentence(path: Path, what: str) -> Iterator[None]:
+    """Tell in one sentence, with the line of the file, whatever a user's code raises."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{what}: {error}") from error
+    except (Exception, SystemExit) as error:
+        lines = [
+            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
+        ]
+        line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+        words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+        where = "" if line is None else f" in line {line}"
+        raise InputError(f"{what}, {type(error).__name__}{where}: {words or 'no message'}.") from error
+
+
+def _titled(problem: Problem, name: str, arguments: Mapping[str, Any]) -> Problem:
+    """Return a problem under the name by which a command line or a campaign has it."""
+    return problem.entitled(
+        name=name,
+        title=name.rpartition(":")[2] if problem.title == problem.system.name else problem.title,
+        arguments=arguments,
+        references=problem.references,
+        notes=problem.notes,
+    )
+
+
+def _digest(problem: Problem) -> str:
+    """Return some digits of the SHA-256 of all that numbers depend on: no titles, notes or comments."""
+    arrays = [None if one is None else one.tolist() for one in (problem.y0, problem.par, problem.times)]
+    whole = [type(problem.system).__name__, problem.system.__getstate__(), arrays, problem.t0, problem.t_end]
+    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:DIGITS]
+
+
+def _packed(problem: Problem) -> str:
+    arrays: dict[str, np.ndarray] = {}
+    plain = packed_problem(problem, arrays)
+    return json.dumps({"problem": plain, "arrays": {name: a.tolist() for name, a in arrays.items()}})
+
+
+def _unpacked(text: str) -> Problem:
+    plain = json.loads(text)
+    found = unpacked_problem(plain["problem"], {name: np.array(a) for name, a in plain["arrays"].items()})
+    assert found is not None
+    return found
+
+
+def _know(text: str) -> None:
+    problem = _unpacked(text)
+    if _Place.of(parse_spec(repr(problem))).digest != _digest(problem):
+        raise ValueError("a problem is not the one that its name says")
+    _formulas[repr(problem)] = text
+
+
+__all__ = ["Beside", "beside", "find", "formula", "is_file", "learn", "opened", "read"]

@@ -1,0 +1,64 @@
+"""References for the problems of a campaign that ask for one: made once, kept beside the results."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hbvm_bench.campaign.file import Campaign, chosen
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.sweep import fill
+from hbvm_bench.reference import solutions, trusted
+from hbvm_bench.store.store import Store
+from problems.errors import InputError, MissingLibraryError
+
+
+def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) -> bool:
+    """Make the references that a campaign asks for and that are not known yet.
+
+    Two computations share nothing but the formula, see `hbvm_bench.reference.trusted`; where they
+    differ too early there is none, and the report says that no position was measured.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Its problems say ``reference``.
+    store : Store
+        They are kept there.
+    tell : callable
+        Called with a sentence before and after each.
+
+    Returns
+    -------
+    bool
+        Whether there are new ones.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        Without heyoka.
+    """
+    made = False
+    for entry in campaign.entries():
+        for values in chosen(entry) if entry.reference else []:
+            text = fill(entry.use, values)
+            problem = make_problem(text)
+            samples = (campaign.grid if entry.grid is None else entry.grid).times(problem)
+            known = solutions.find(problem)
+            if known is not None and known.t.size > 1 and np.isin(known.t, samples).all():
+                continue
+            tell(f"computing a reference of {text} by two methods ...")
+            try:
+                found = trusted.make(problem, at=trusted.some(problem, samples))
+            except MissingLibraryError:
+                raise
+            except InputError as error:
+                tell(f"{text} has no reference: {error}")
+                continue
+            solutions.know(solutions.encode(found))
+            store.keep(text)
+            tell(f"the two agree to {found.provenance['agreement']}")
+            made = True
+    return made
+
+
+__all__ = ["make_missing"]
