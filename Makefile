@@ -7,7 +7,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
 
-.PHONY: bench reports test docs lint format venv lock clean
+.PHONY: bench reports test test-all docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
@@ -17,6 +17,9 @@ reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov dr
 
 test: venv  ## the test suite
 	$(BIN)/python -m pytest
+
+test-all: venv  ## with the slow tests: studies that are run whole, and killed in the middle
+	$(BIN)/python -m pytest -m ""
 
 docs: venv  ## the site: docs/_build/html/index.html
 	@lock="$$(sha256sum < requirements-docs.lock)"; \

@@ -22,6 +22,7 @@ def test_the_gauss_errors_of_table_1_agree_with_the_printed_ones(cells):
     assert all(0.1 <= ratio <= 3.0 for ratio in ratios.values()), ratios
 
 
+@pytest.mark.slow
 def test_the_typical_gauss_error_agrees_within_a_factor_3_in_all_eight_cells():
     ratios = {
         (h, s): np.median(experiment.spread(s, h, ends=experiment.ENDS[:9])) / error

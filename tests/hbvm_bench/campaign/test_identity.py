@@ -36,6 +36,8 @@ NOT_ASKED = {
         "integrators.registry",
         "integrators.watch",
     ),
+    # which many trajectories may be asked for, and a case is not
+    *("integrators.events", *(f"integrators.events.{name}" for name in ("event", "finder", "members"))),
 }
 
 

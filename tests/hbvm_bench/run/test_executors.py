@@ -63,6 +63,7 @@ def run_on(name, chosen, store, jobs=None, limits=LIMITS):
         return list(loop.run_accuracy(chosen, store, limits, pool))
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_in_the_middle_gives_what_this_machine_gives(toys, tmp_path):
     chosen = [*cases(6, wait=0.2), resolve(Case(problem=SHORT, method="Crashing()"))]
     here, there = store_in(tmp_path / "here"), store_in(tmp_path / "there")
@@ -78,6 +79,7 @@ def test_a_cluster_that_loses_a_worker_in_the_middle_gives_what_this_machine_giv
     assert there.load(chosen[-1].id).result.reason == "the process ended by signal SIGSEGV"
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_killed_costs_no_finished_case(toys, tmp_path):
     chosen = cases(4, wait=0.5)
     store = store_in(tmp_path / "run")
@@ -127,6 +129,7 @@ shortest = 1e-4
 """
 
 
+@pytest.mark.slow
 def test_a_runner_that_is_killed_while_it_times_loses_no_round_and_takes_none_twice(toys, tmp_path):
     file = tmp_path / "timed.toml"
     file.write_text(TIMED.format(problem=SHORT))

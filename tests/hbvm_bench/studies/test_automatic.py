@@ -105,6 +105,7 @@ def test_a_side_on_another_trajectory_has_no_ratio():
     assert duel.words == "not compared"
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
     """Nothing is lost, and nothing is done twice; times in one process are taken as a whole."""
     pytest.importorskip("heyoka")

@@ -178,6 +178,7 @@ def test_endure_runs_prints_json_and_redraws(tmp_path, capsys):
     assert main(["endure", "--redraw", "--out", str(tmp_path)]) == 0
 
 
+@pytest.mark.slow
 def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     """Nothing is lost, and nothing is done twice."""
     command = [sys.executable, "-m", "hbvm_bench.cli", *ARGUMENTS, "--out", str(tmp_path)]

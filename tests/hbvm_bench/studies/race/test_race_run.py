@@ -11,6 +11,7 @@ from hbvm_bench.cli import main
 from hbvm_bench.studies.race import results
 
 
+@pytest.mark.slow
 def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
     pytest.importorskip("heyoka")
     arguments = ["race", "--quick", "--problem", "kepler", "--rounds", "2", "--json", "--out", str(tmp_path)]
@@ -83,6 +84,7 @@ def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
     assert "interrupted" in said
 
 
+@pytest.mark.slow
 def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     """Nothing is lost, and nothing is done twice, whether it was measuring or timing."""
     pytest.importorskip("heyoka")

@@ -238,8 +238,9 @@ def test_a_batch_takes_each_trajectory_through_steps_of_its_own():
     starts = np.array([problem.y0, 1.1 * problem.y0])
     batch = program.batch(starts, times=[3.0, 12.0], threads=2)
     for i, start in enumerate(starts):
-        alone = program.start(start).advance([3.0, 12.0])
-        assert np.array_equal(batch.y[i], alone.y)
+        assert np.array_equal(batch.y[i], program.batch(starts[i : i + 1], times=[3.0, 12.0]).y[0])
+        alone = program.start(start).advance([3.0, 12.0])  # which does not end steps at the times
+        assert np.abs(batch.y[i] - alone.y).max() < 1e-9  # measured 1e-11
     assert batch.steps[0] != batch.steps[1]
 
 

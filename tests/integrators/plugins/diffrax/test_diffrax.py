@@ -69,7 +69,7 @@ def test_dense_output_is_the_step_at_its_ends_and_of_order_s_plus_1_between() ->
     assert np.log2(between(20) / between(40)) == pytest.approx(3.0, abs=0.5)
 
 
-@pytest.mark.parametrize("solver", [HBVM(k=8, s=4), Gauss(s=3)])
+@pytest.mark.parametrize("solver", [HBVM(k=8, s=4), pytest.param(Gauss(s=3), marks=pytest.mark.slow)])
 def test_gradients_agree_with_finite_differences_and_between_the_adjoints(solver: Any) -> None:
     y0, g = jnp.array([0.3, 1.5]), jnp.asarray(1.1)
 
@@ -91,6 +91,7 @@ def test_gradients_agree_with_finite_differences_and_between_the_adjoints(solver
     assert np.abs(gradient - found).max() <= 1e-6 * np.abs(gradient).max()  # measured 1e-11
 
 
+@pytest.mark.slow
 def test_gradients_agree_with_the_backsolve_adjoint() -> None:
     def loss(g: Any, adjoint: Any) -> Any:
         solution = dx.diffeqsolve(
