@@ -27,7 +27,7 @@ def test_every_script_has_its_words():
     assert names == set(SAYS)
 
 
-# The campaign's reference is computed by two methods, half a minute of compiling; the tutorial's has one that is stored.
+# Its reference is computed by two methods, half a minute of compiling; that of the tutorial is stored.
 SLOW = {"own_campaign.py"}
 
 
