@@ -125,10 +125,11 @@ class KernelSearch:
     @property
     def _error(self) -> Exception:
         """What a function has raised; Ctrl-C and the like are raised as they are."""
-        error = next(function.error for function in self._functions if function.error is not None)
-        if not isinstance(error, Exception):
-            raise error
-        return error
+        error = self._functions[self._memory.raised - 1].error
+        if isinstance(error, Exception):
+            return error
+        assert error is not None
+        raise error
 
     def attend(self) -> bool:
         """Do what a look has come back for; return whether the integration goes on."""

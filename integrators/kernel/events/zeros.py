@@ -102,7 +102,7 @@ def blur(ctx, search, x):
     near = max(BLUR, APART * search.resolution / 100.0)
     change = change_beside(ctx, search, x, near)
     if change_beside(ctx, search, x, 2.0 * near) < CORNER * change:
-        return change_beside(ctx, search, x, max(10.0 * EXTREMUM, 10.0 * search.resolution))
+        return change_beside(ctx, search, x, max(3.0 * EXTREMUM, 10.0 * search.resolution))
     return change
 
 
@@ -118,7 +118,7 @@ def mark_low(ctx, search, low, way):
     x, p = search.places[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner.
-    reach = 0.0
+    reach = search.missing
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
         reach = max(reach, abs(search.fine[i] - p))
     reach += SURE * abs(value - p)
@@ -172,15 +172,15 @@ BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its en
 @compiled
 def direction_at_end(ctx, search, before):
     """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
+    raised, after = search.raised, 0
     for distance in BEYOND:
         x = 1.0 + max(distance, 100.0 * search.resolution)
         value = value_at(ctx, search, x)
-        if search.raised:  # a function that goes no farther than the integration
-            search.raised = 0
-            break
         if abs(value) > noise_at(ctx, search, x):
-            return 0 if sign(value) == before else -before
-    return -before
+            after = sign(value)
+            break
+    search.raised = raised  # a function may go no farther than the integration
+    return 0 if after == before else -before
 
 
 @compiled
