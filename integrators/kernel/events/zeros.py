@@ -65,22 +65,25 @@ def add_low(search, i):
 
 @compiled
 def find_lows(search, first, last):
-    """Note the places inside a run of one sign where the polynomial turns back from near zero."""
+    """Note the places inside a run of one sign where the polynomial turns back from near zero.
+
+    Near the ends of the stretch its parabola may miss a corner, but not that coefficients are missing.
+    """
     p, end, least, corner = search.fine, search.n - 1, NEAR * search.scale, SURE * search.missing
     search.low_count = 0
     if last - first < 2:
         return
-    if first == 0 and abs(p[0]) < least:
-        if abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.places[1]):
-            add_low(search, 0)
+    turns = abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.places[1])
+    if first == 0 and abs(p[0]) < least and turns:
+        add_low(search, 0)
     for i in range(first + 1, last):
         size = abs(p[i])
         if size <= abs(p[i - 1]) and size < abs(p[i + 1]) and size < least:
             add_low(search, i)
     before = search.places[end - 1]
-    if last == end and abs(p[end]) < least:
-        if abs(p[end]) < corner or turns_between(search, end - 1, before, 1.0 + BESIDE):
-            add_low(search, end)
+    turns = abs(p[end]) < corner or turns_between(search, end - 1, before, 1.0 + BESIDE)
+    if last == end and abs(p[end]) < least and turns:
+        add_low(search, end)
 
 
 @compiled
@@ -119,7 +122,7 @@ def mark_low(ctx, search, low, way):
     """Note what the function does where the polynomial, of sign ``way``, comes near zero and turns back."""
     x, p = search.places[low], search.fine[low]
     value = value_at(ctx, search, x)
-    # Between these it may fall by as much as it rises, at a corner.
+    # Between these it may fall by as much as it rises, at a corner, which the polynomial also rounds.
     reach = SURE * search.missing
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
         reach = max(reach, abs(search.fine[i] - p))
