@@ -55,7 +55,8 @@ class Solutions(Trajectories):
     problem, method
         What was integrated, and how.
     events : list of dict of str to Occurrences
-        What happened in each trajectory, by the events' names; empty where none were looked for.
+        What happened in each trajectory, by the events' names: nothing in one that Ctrl-C has left out.
+        Empty where none were looked for.
 
     Examples
     --------
@@ -193,6 +194,8 @@ def integrate_many(
     )
     with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
         _integrate(program, made, threads, report, start)
+    if start is not None:
+        made.events.extend({} for _ in range(n - len(made.events)))
     return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
 
 

@@ -142,13 +142,17 @@ class HBVMStepper(ABC):
 
     def look_to(self, end: float) -> Status:
         """Look for events from the last own step to a time that lies in the step ahead."""
-        if self.search is not None and self._status is Status.RUNNING:
+        search = self.search
+        if search is not None and search.trouble is None and self._status is Status.RUNNING:
             if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
                 return self._status
             if not self._context.solved:  # as after samples that are own steps
-                self.advance([end], sample="side")
+                made = self.advance([end], sample="side")
+                if made.status is not Status.FINISHED:
+                    reason = f"{made.reason} Events are known up to t = {self.t!r} only."
+                    search.trouble = made.status, reason, self.error
             if self._status is Status.RUNNING:
-                self.search.finish(end)
+                search.finish(end)
         return self._status
 
     def _begin(self, y: Array, t0: float) -> None:

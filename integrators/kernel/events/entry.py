@@ -39,6 +39,7 @@ LOST = 4.0  # times the rounding of one state: what many steps leave of a g that
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
 SAME = 1e-5  # of a step: two touches as close are one
 ULP = 2.0**-52
+TINY = 2.0**-1000  # a sign without a size
 
 searching = view(Search)
 
@@ -181,7 +182,10 @@ def examine(ctx, search):
     if finite and not unresolved and keeps_away(search, degree):
         return GOING
     know(search, degree, finite)
-    if not (unresolved or suspect(search)) or vanishes(ctx, search):
+    if not (unresolved or suspect(search)):
+        return GOING
+    if vanishes(ctx, search):  # the sign at its end is rounding's: that before it lasts
+        search.sampled[FINEST * search.event + degree - 1] = TINY * sign(search.start_value)
         return GOING
     while unresolved and degree < FINEST and search.resolution < SHORTEST:
         degree = min(4 * degree, FINEST)
@@ -205,28 +209,29 @@ def know(search, degree, finite):
 @compiled
 def divide(ctx, search):
     """Find the zeros in parts of the step that are halved until the samples resolve them."""
-    first, size = 0, FINEST // 2
+    first, size, start_value = 0, FINEST // 2, search.start_value
     while first < FINEST:
         stretch(ctx, search, first, first + size)
-        if first == 0:
-            search.start_value = search.ends[search.event]
-        else:
-            search.start_value = function(ctx, search, search.start, search.start_state)
+        search.start_value = start_value
         search.end_value = function(ctx, search, search.end, search.end_state)
         sample(ctx, search, FINEST)
         finite, unresolved = transform(search, FINEST)
         know(search, FINEST, finite)
         suspect(search)
-        if not vanishes(ctx, search):
+        if vanishes(ctx, search):
+            start_value = TINY * sign(start_value)
+        else:
             if unresolved and size > 1 and search.resolution < SHORTEST:
                 size //= 2
                 continue
             outcome = settle(ctx, search, FINEST, unresolved)
             if outcome != GOING:
                 return outcome
+            start_value = search.end_value
         first += size
         while size < FINEST // 2 and first % (2 * size) == 0:
             size *= 2
+    search.sampled[FINEST * search.event + search.degree - 1] = start_value
     whole(ctx, search)
     return GOING
 

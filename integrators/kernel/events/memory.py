@@ -61,9 +61,8 @@ class Search(Memory):
     mode = Integer()  # WHOLE, PART or START
     goal = Real()  # the time up to which a PART is looked at
     halted = Integer()  # GOING, or why not
-    failure = Integer()  # outcome of the step, where UNSOLVABLE
     event = Integer()  # that is being looked for
-    raised = Integer()  # 1: its function has raised
+    raised = Integer()  # 1 + the event whose function has raised, or 0
     touched_before = Array("count")  # `touched` at the start of the step
 
     # --- the step, and the stretch of it that is looked at ---
@@ -86,6 +85,7 @@ class Search(Memory):
     weights = Array(16, "terms")  # of the coefficients of the step's polynomial, at eight times
     values = Array(FINEST + 8)  # samples
     coefficients = Array(FINEST + 32)  # of Chebyshev polynomials
+    missing = Real()  # what the coefficients that follow add up to at a corner, where the j-th is like 1/j^2
     n = Integer()  # places where something is known
     places = Array(PLACES)
     fine = Array(PLACES)  # values of the polynomial there, or samples

@@ -135,7 +135,7 @@ def call(ctx, search, event):
         return
     call_field(search.functions[event], search.times, search.block, ctx.par, found)
     if found[8] != 0.0:
-        search.raised = 1
+        search.raised = 1 + event
         found[8] = 0.0
 
 

@@ -125,10 +125,11 @@ class KernelSearch:
     @property
     def _error(self) -> Exception:
         """What a function has raised; Ctrl-C and the like are raised as they are."""
-        error = next(function.error for function in self._functions if function.error is not None)
-        if not isinstance(error, Exception):
-            raise error
-        return error
+        error = self._functions[self._memory.raised - 1].error
+        if isinstance(error, Exception):
+            return error
+        assert error is not None
+        raise error
 
     def attend(self) -> bool:
         """Do what a look has come back for; return whether the integration goes on."""
@@ -137,25 +138,27 @@ class KernelSearch:
         self.hits  # noqa: B018 -- makes room
         if halted == FULL and not enough:
             self._make_room(2 * memory.room)
-        if halted in (RAISED, UNRESOLVED):
+        if halted in (RAISED, UNRESOLVED, UNSOLVABLE):
             self._give_up(halted)
         return halted != TERMINAL
 
     def _give_up(self, halted: int) -> None:
         """Look for nothing any more, and say why; the trajectory goes on."""
         self._context.look = 0
-        known = f"are known up to t = {self._memory.known!r} only."
+        memory = self._memory
+        known = f"are known up to t = {memory.known!r} only."
+        if halted == RAISED:
+            error = self._error
+            self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+            return
+        reason = f"the partial step from t = {memory.known!r} to t = {memory.goal!r} cannot be solved."
         if halted == UNRESOLVED:
-            memory = self._memory
             reason = (
                 f"the event {self._hits.names[memory.event]!r} varies too fast to be followed between t = "
                 f"{memory.start!r} and {memory.end!r}, where {FINEST} samples do not show "
                 "how: give the method shorter steps, or the event a smoother function."
             )
-            self.trouble = Status.STALLED, f"{reason} Events {known}", None
-            return
-        error = self._error
-        self.trouble = Status.USER_ERROR, f"{UserError(error)}: events {known}", error
+        self.trouble = Status.STALLED, f"{reason} Events {known}", None
 
     @property
     def hits(self) -> Hits:
@@ -167,9 +170,8 @@ class KernelSearch:
     def finish(self, end: float) -> None:
         """Look at what there is of the step ahead, which is solved, up to a time."""
         self._memory.goal = end
-        while self._context.look and self._look(PART) != DONE and self._memory.halted != UNSOLVABLE:
-            if not self.attend():
-                break
+        while self._context.look and self._look(PART) != DONE and self.attend():
+            pass
 
     @property
     def unknown(self) -> list[str]:

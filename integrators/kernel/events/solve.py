@@ -12,7 +12,6 @@ CLOSE = 1e-3  # of the stretch: two places as close tell the slope at the zero b
 EXTREMUM = 1e-10  # of the stretch: where an extremum is, if the values near it can be told apart
 EDGE, MOVES = 1e-3, 8  # part of a bracket that is its edge; how often it is moved
 GOLDEN = 0.3819660112501051  # (3 - sqrt 5) / 2
-ROOT = 2.0**-26  # square root of the unit in the last place
 MOST_LOOKS = 500  # evaluations for an extremum
 NAN = float("nan")
 INFINITY = float("inf")
@@ -110,10 +109,9 @@ def deepest(ctx, search, a, b, way):
         return x
     fx = -way * value if is_finite(value) else INFINITY
     fw = fv = fx
-    step, before = 0.0, 0.0
+    step, before, least = 0.0, 0.0, max(EXTREMUM / 3.0, search.resolution)
     for _ in range(MOST_LOOKS):
         middle = (a + b) / 2.0
-        least = ROOT * abs(x) + EXTREMUM / 3.0
         if abs(x - middle) <= 2.0 * least - (b - a) / 2.0:
             break
         golden = True

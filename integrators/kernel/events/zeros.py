@@ -19,7 +19,7 @@ from integrators.kernel.native.jit import compiled
 
 SURE = 10.0  # an extremum this many times the polynomial's error away from zero does not reach it
 BLUR = 1e-7  # of the stretch: how well a minimizer that compares values finds an extremum, with room
-CORNER = 3.0  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
+CORNER = 2.5  # times as much at twice the distance: where g is smooth it is 4, at a corner 2
 
 
 @compiled
@@ -66,19 +66,21 @@ def add_low(search, i):
 @compiled
 def find_lows(search, first, last):
     """Note the places inside a run of one sign where the polynomial turns back from near zero."""
-    p, end, least = search.fine, search.n - 1, NEAR * search.scale
+    p, end, least, corner = search.fine, search.n - 1, NEAR * search.scale, SURE * search.missing
     search.low_count = 0
     if last - first < 2:
         return
-    if first == 0 and abs(p[0]) < least and turns_between(search, 1, -BESIDE, search.places[1]):
-        add_low(search, 0)
+    if first == 0 and abs(p[0]) < least:
+        if abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.places[1]):
+            add_low(search, 0)
     for i in range(first + 1, last):
         size = abs(p[i])
         if size <= abs(p[i - 1]) and size < abs(p[i + 1]) and size < least:
             add_low(search, i)
     before = search.places[end - 1]
-    if last == end and abs(p[end]) < least and turns_between(search, end - 1, before, 1.0 + BESIDE):
-        add_low(search, end)
+    if last == end and abs(p[end]) < least:
+        if abs(p[end]) < corner or turns_between(search, end - 1, before, 1.0 + BESIDE):
+            add_low(search, end)
 
 
 @compiled
@@ -102,7 +104,7 @@ def blur(ctx, search, x):
     near = max(BLUR, APART * search.resolution / 100.0)
     change = change_beside(ctx, search, x, near)
     if change_beside(ctx, search, x, 2.0 * near) < CORNER * change:
-        return change_beside(ctx, search, x, max(10.0 * EXTREMUM, 10.0 * search.resolution))
+        return change_beside(ctx, search, x, max(3.0 * EXTREMUM, 10.0 * search.resolution))
     return change
 
 
@@ -118,7 +120,7 @@ def mark_low(ctx, search, low, way):
     x, p = search.places[low], search.fine[low]
     value = value_at(ctx, search, x)
     # Between these it may fall by as much as it rises, at a corner.
-    reach = 0.0
+    reach = SURE * search.missing
     for i in range(max(low - 1, 0), min(low + 2, search.n)):
         reach = max(reach, abs(search.fine[i] - p))
     reach += SURE * abs(value - p)
@@ -172,15 +174,15 @@ BEYOND = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # of the stretch: how far beyond its en
 @compiled
 def direction_at_end(ctx, search, before):
     """Return the direction of a zero at the very end: by the sign of the function just beyond it."""
+    raised, after = search.raised, 0
     for distance in BEYOND:
         x = 1.0 + max(distance, 100.0 * search.resolution)
         value = value_at(ctx, search, x)
-        if search.raised:  # a function that goes no farther than the integration
-            search.raised = 0
-            break
         if abs(value) > noise_at(ctx, search, x):
-            return 0 if sign(value) == before else -before
-    return -before
+            after = sign(value)
+            break
+    search.raised = raised  # a function may go no farther than the integration
+    return 0 if after == before else -before
 
 
 @compiled

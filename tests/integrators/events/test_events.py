@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import integrators
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
 from integrators.protocol import Status
-from problems import Hamiltonian, InputError, Problem, VectorField
+from problems import Foreign, Hamiltonian, InputError, Problem, VectorField
 
 OSCILLATOR = Hamiltonian(
     lambda q, p: (q[0] * q[0] + p[0] * p[0]) / 2, dof=1, parameters={"level": 0.5}, name="oscillator"
@@ -184,6 +184,35 @@ def test_a_function_that_ends_with_the_integration_is_not_asked_beyond_it_in_vai
     assert (zeros.t.tolist(), zeros.direction.tolist()) == ([2.0], [1])
 
 
+def test_what_a_function_raises_inside_a_step_that_ends_at_a_zero_is_not_lost():
+    def hole(t):
+        if 1.69 < t < 1.71:
+            raise LookupError("a hole")
+        return (t - 1.7) * (t - 2.0)
+
+    made, _ = happened(oscillator(t_end=3.0), HBVM(k=6, s=4, h=0.5), Event(hole))
+    assert made.status is Status.USER_ERROR
+    assert "a hole" in made.reason
+
+
+@pytest.mark.parametrize(
+    ("sample", "status", "reason"),
+    [
+        ("dense", Status.STALLED, "the partial step from t = 9.5 to t = 9.8 cannot be solved."),
+        ("steps", Status.NOT_FINITE, "the vector field is not finite in the step from t = 9.5."),
+    ],
+)
+def test_a_last_part_of_a_step_that_cannot_be_solved_is_no_silence(sample, status, reason):
+    def field(t, y):  # not a number where only the partial step asks for it
+        return [y[1], math.nan if 9.73 < t < 9.74 else -y[0]]
+
+    problem = Problem(Foreign(field, dim=2), y0=[0.0, 1.0], t_end=9.8)
+    made = integrate(problem, Gauss(s=2, h=0.5), [9.8], sample, events=Event(lambda y: y[0], name="y"))
+    assert made.status is status
+    assert made.reason == f"{reason} Events are known up to t = 9.5 only."
+    assert len(made.events["y"]) == 3
+
+
 @pytest.mark.parametrize("method", [HBVM(k=6, s=4, h=0.1), HBVM()], ids=str)
 def test_what_is_zero_but_for_rounding_all_along_is_no_event(method):
     """An invariant's error: only rounding decides its sign."""
@@ -206,6 +235,44 @@ def test_a_corner_above_zero_is_no_touch(method):
     )
     assert len(above) == 0
     assert np.allclose(touch.t, [np.pi - 0.3], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.65, 1.02])
+@pytest.mark.parametrize(
+    "method", [*METHODS, WHOLE, Gauss(s=4, h=0.3), Gauss(s=12, h=3.3), HBVM(k=10, s=5, tol=1e-12)], ids=str
+)
+def test_a_touch_at_a_corner_is_found_wherever_it_lies_in_a_step(method, phase):
+    _, (corners, skew, crossings, above) = happened(
+        oscillator(phase=phase, t_end=40.0),
+        method,
+        Event(lambda q, m: m.abs(q[0]), name="corner"),
+        Event(lambda q, p, m: -m.abs(q[0]) * (2 + p[0]), name="skew"),
+        Event(lambda q: q[0], name="crossing"),
+        Event(lambda q, m: m.abs(q[0]) + 3e-9, name="above"),
+    )
+    assert len(crossings) >= 12
+    for touches in (corners, skew):
+        assert len(touches) == len(crossings)
+        assert np.abs(touches.t - crossings.t).max() < 1e-9  # measured 1.1e-10
+        assert not touches.direction.any()
+    assert len(above) == 0
+
+
+@pytest.mark.parametrize("h", [0.25, 1.0, 2.0])
+def test_a_crossing_so_slow_that_rounding_decides_its_sign_for_steps_is_one_event(h):
+    """The level is 67 units in the last place away, and 7 are passed in a unit of time."""
+    slow = Problem(VectorField(lambda y: [1e-7], dim=1, name="slow"), y0=[1e8], t_end=40.0)
+    level = 1e8 + 1e-6
+    _, found = happened(
+        slow,
+        Gauss(s=2, h=h),
+        Event(lambda y: y[0] - level, name="up"),
+        Event(lambda y: level - y[0], name="down"),
+        Event(lambda y: y[0] - 1e8, name="start"),
+    )
+    assert [zeros.direction.tolist() for zeros in found] == [[1], [-1], []]
+    # Measured 13.48: where g is 24 units, which rounding of the state may account for.
+    assert 9.5 < found[0].t[0] == found[1].t[0] < 14.0
 
 
 def test_a_jump_across_zero_is_where_the_sign_changes():

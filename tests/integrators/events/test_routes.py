@@ -123,6 +123,36 @@ class TestMany:
         assert set(many.status) == {Status.FINISHED, Status.USER_ERROR}
         assert all("out of the table" in many.reason[i] for i in np.flatnonzero(~many.arrived))
 
+    def test_each_event_has_what_its_own_function_raised(self):
+        turn = Problem(problems.VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[0.0, 1.0], t_end=10.0)
+
+        def bounded(way, t, y):
+            if way * y[0] > 1.5:
+                raise LookupError(f"beyond {way}")
+            return float(y[0]) + 5.0
+
+        events = [Event(lambda t, y, way=way: bounded(way, t, y), name=f"{way}") for way in (1, -1)]
+        many = integrate_many(
+            turn, HBVM(k=6, s=4, h=0.5), starts=[[0.0, 2.0], [0.0, -2.0]], times=[10.0], events=events
+        )
+        assert ["beyond 1" in many.reason[0], "beyond -1" in many.reason[1]] == [True, True]
+
+    @pytest.mark.parametrize("threads", [1, 2])
+    def test_ctrl_c_leaves_an_entry_for_each(self, henon_heiles, threads):
+        calls = iter(range(10**9))
+
+        def g(t, y):
+            if next(calls) == 3000:
+                raise KeyboardInterrupt
+            return float(y[0])
+
+        many = integrate_many(
+            henon_heiles, HBVM(k=6, s=4, h=0.25), starts=self.given(henon_heiles, n=40), times=[20.0],
+            threads=threads, events=Event(g),
+        )  # fmt: skip
+        assert Status.INTERRUPTED in many.status
+        assert [bool(found) for found in many.events] == many.arrived.tolist()
+
     def test_parameters_are_each_trajectorys(self):
         spring = problems.Hamiltonian(
             lambda q, p, par: p[0] ** 2 / 2 + par.k * q[0] ** 2 / 2, dof=1, parameters={"k": 1.0}
