@@ -174,10 +174,10 @@ def step(group, lane, ctx):
 @compiled
 def vanishes(ctx):
     """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
+    found = False
     for g in range(ctx.group_count):
-        if 0.0 < ctx.largest[g] < SMALLEST:
-            return True
-    return False
+        found = found or 0.0 < ctx.largest[g] < SMALLEST
+    return found
 
 
 @compiled

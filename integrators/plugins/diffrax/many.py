@@ -67,8 +67,8 @@ class JaxProgram:
         gauss = isinstance(method, Gauss)
         if system.kind == "poisson" and not gauss and options["k"] > options["s"]:
             raise InputError(
-                f"{method} has no form on JAX that keeps the energy of a Poisson system such as {system.name}; "
-                "use Gauss(s, h), or leave backend= out."
+                f"{method} has no form on JAX that keeps the energy of a Poisson system such as "
+                f"{system.name}; use Gauss(s, h), or leave backend= out."
             )
         made: Any = plugin.Gauss if gauss else plugin.HBVM
         self._solver = made(**{name: options[name] for name in ("k", "s") if name in options})
