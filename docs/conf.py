@@ -24,6 +24,7 @@ extensions = [
     "sphinx_design",
     "formulas",
     "made",
+    "navigation",
     "reports",
 ]
 exclude_patterns = ["_build", "_ext", "reference/made"]
@@ -54,7 +55,6 @@ html_show_sourcelink = False
 html_copy_source = False
 html_sidebars = {"index": [], "start": [], "faq": []}  # alone in their sections
 html_theme_options = {
-    "collapse_navigation": True,
     "show_toc_level": 2,
     "navigation_with_keys": False,
     "header_links_before_dropdown": 7,

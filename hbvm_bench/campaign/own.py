@@ -282,7 +282,17 @@ def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
     if not callable(made):
         raise InputError(f"{what} is {shown(made)}, neither a problem nor a function that returns one.")
     if not hasattr(made, "entry"):  # which checks its own
-        calls.check(what, inspect.signature(made), (), spec.arguments, "argument")
+        try:
+            signature = inspect.signature(made)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} does not tell its arguments; wrap it in a function of yours.") from None
+        named = [
+            one
+            for one in signature.parameters.values()
+            if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
+        ]
+        if len(named) == len(signature.parameters):
+            calls.check(what, signature, (), spec.arguments, "argument")
     with _one_sentence(Path(str(module.__file__)), f"{spec} cannot be made"):
         found = made(**spec.arguments)
     if not isinstance(found, Problem):
@@ -306,7 +316,7 @@ def _one_sentence(path: Path, what: str) -> Iterator[None]:
             frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
         ]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
-        words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split())
+        words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split()).rstrip(".")
         where = "" if line is None else f" in line {line}"
         raise InputError(f"{what}, {type(error).__name__}{where}: {words or 'no message'}.") from error
 

@@ -84,7 +84,8 @@ def part(
         for key in GROUPS
         if (members := [row for row in table if row.group == key])
     ]
-    witnesses = [words.WITNESSES] if ensemble is not None else []
+    ends = max((len(series.get("position_t", ())) for _, series in found), default=0)
+    witnesses = [words.WITNESSES.format(ends)] if ensemble is not None and ends else []
     summary = attempt(
         (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
     )

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from statistics import median
 
-from hbvm_bench.measure import ensemble
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE, METRICS
 from hbvm_bench.store.records import Record
@@ -16,8 +15,8 @@ RIGHT_ENERGY = 1e-13
 UNDISTURBED = 0.9  # of a core, in the timing pass
 
 WITNESSES = (
-    f"The position errors are of {ensemble.WITNESSES} of the trajectories, whose ends are known in 128 bits, "
-    "relative to the largest distance of a body from the origin at these ends."
+    "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
+    "128 bits, relative to the largest distance of a body from the origin at these ends."
 )
 """Of an ensemble, where the size differs from `POSITION`'s."""
 

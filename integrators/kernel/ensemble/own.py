@@ -14,6 +14,7 @@ from integrators.kernel.simd.memory import call_steps
 from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST
 from integrators.kernel.step.loop import reset
+from integrators.kernel.step.rule import SMALLEST
 from integrators.kernel.step.vary import HELD_BACK_STEPS, accepts, begin_attempts, remaining, take, within
 from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
 
@@ -166,8 +167,17 @@ def step(group, lane, ctx):
         group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
     write(group, lane, ctx)
-    if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or crawls(group, lane, ctx)):
+    if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)):
         unload(group, lane, 0)
+
+
+@compiled
+def vanishes(ctx):
+    """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
+    found = False
+    for g in range(ctx.group_count):
+        found = found or 0.0 < ctx.largest[g] < SMALLEST
+    return found
 
 
 @compiled

@@ -173,6 +173,8 @@ def _count(name: str) -> Any:
 class HBVM(_LineIntegral):
     """HBVM(k, s), which conserves the energy, as a solver of diffrax.
 
+    Not that of a Poisson system y' = B(y) grad H(y) whose B varies: a term does not tell B.
+
     Equations and properties: see `integrators.HBVM`. The step is that of
     `diffrax.diffeqsolve`, constant or chosen by a controller; the energy is kept
     for any sequence of steps. The error estimate is ``h |gamma_s|^2 / |gamma_0|``.

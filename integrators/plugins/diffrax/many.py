@@ -45,7 +45,8 @@ class JaxProgram:
     Raises
     ------
     problems.errors.InputError
-        For a method that the JAX solver does not have, or without JAX and diffrax.
+        For a method that the JAX solver does not have, or has not for this system, or without JAX and
+        diffrax.
     """
 
     from_cache = None
@@ -64,6 +65,11 @@ class JaxProgram:
                 f"{system.name} has no form on JAX, since its code is not traced; leave backend= out."
             )
         gauss = isinstance(method, Gauss)
+        if system.kind == "poisson" and not gauss and options["k"] > options["s"]:
+            raise InputError(
+                f"{method} has no form on JAX that keeps the energy of a Poisson system such as "
+                f"{system.name}; use Gauss(s, h), or leave backend= out."
+            )
         made: Any = plugin.Gauss if gauss else plugin.HBVM
         self._solver = made(**{name: options[name] for name in ("k", "s") if name in options})
         self._term = dx.ODETerm(emit.jax(system, "field"))

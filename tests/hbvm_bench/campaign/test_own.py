@@ -19,6 +19,7 @@ from problems.errors import InputError
 
 SWING = """
 import problems
+from math import hypot
 from constants import G
 
 def swing(*, g: float = G, p: float = 1.0):
@@ -36,6 +37,12 @@ def called():
 
 def fails(n=0):
     return 1/n
+
+def says():
+    raise ValueError("g must be positive.")
+
+def anything(*a, **k):
+    return 3
 
 def _hidden():
     return rest
@@ -139,7 +146,10 @@ def test_data_that_are_not_what_their_name_says_are_refused(folder):
         ("mine.py:half", "mine.py:half is 0.5, neither a problem nor a function"),
         ("mine.py:number()", "mine.py:number returns 3, not a problems.Problem"),
         ("mine.py:rest(g=1)", "takes no arguments"),
-        ("mine.py:fails()", "mine.py:fails() cannot be made, ZeroDivisionError in line 19: division by zero"),
+        ("mine.py:fails()", "mine.py:fails() cannot be made, ZeroDivisionError in line 20: division by zero"),
+        ("mine.py:says()", "mine.py:says() cannot be made, ValueError in line 23: g must be positive."),
+        ("mine.py:hypot(x=1)", "mine.py:hypot"),  # whose signature no Python tells alike
+        ("mine.py:anything(n=1)", "mine.py:anything returns 3, not a problems.Problem"),
         ("broken.py:x", "broken.py cannot be run, SyntaxError in line 2: "),
         ("absent.py:x", "absent.py cannot be run, ModuleNotFoundError in line 1: No module named 'nowhere'"),
     ],

@@ -81,12 +81,13 @@ def test_a_run_that_fails_has_no_law_and_says_why():
 def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     pytest.importorskip("heyoka")
     problem = problems.load("henon_heiles", energy=0.1, t_end=20.0)
-    asked = Ensemble(count=9, spread=0.01)
+    asked = Ensemble(count=40, spread=0.01)
     program = Gauss(s=8, h=0.5).compile(problem.system)
     measured, status, reason = ensemble.measure(problem, program, asked)
     assert status is Status.FINISHED
     assert reason == ""
-    assert measured.y.shape == (9, 4)
+    assert measured.y.shape == (40, 4)
+    assert measured.position.size == ensemble.WITNESSES == 32
     metrics = evaluate(measured)
     assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured

@@ -7,13 +7,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from hbvm_bench.campaign.file import Campaign, MethodEntry
+from hbvm_bench.campaign.file import Campaign, Ensemble, MethodEntry
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.report import words
 from hbvm_bench.report.campaign import document
 from hbvm_bench.report.figures.over_time import BINS, envelope
 from hbvm_bench.report.figures.style import looks, panels
 from hbvm_bench.report.markdown import code, plain
+from hbvm_bench.report.problem import part
 from hbvm_bench.report.write import write
 from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Index, Store
@@ -250,6 +251,15 @@ def test_without_a_reference_nothing_is_ranked(run):
     said = words.summary([bare, bare])
     assert any("no stored reference" in sentence for sentence in said)
     assert not any(sentence.startswith(("Smallest", "Fastest")) for sentence in said)
+
+
+def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
+    record = run.records()[0]
+    case = msgspec.structs.replace(record.case, ensemble=Ensemble(count=100))
+    record = msgspec.structs.replace(record, case=case)
+    for ends, said in ((7, True), (0, False)):
+        made = part(case.problem, [(record, {"position_t": np.ones(ends)})], looks([case.method]), [], 1)
+        assert (f"the largest of {ends} trajectories" in str(made.summary)) == said
 
 
 def test_times_taken_on_a_busy_machine_say_so(run):

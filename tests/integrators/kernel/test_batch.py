@@ -311,6 +311,27 @@ def test_a_kink_and_a_stiff_system_go_one_by_one_from_own_steps():
         assert extra["kinks"] if program is kinked else "implicit" in extra
 
 
+def test_each_of_many_times_costs_a_step_in_a_lane():
+    problem = problems.load("kepler", e=0.99)
+    program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
+    times = np.linspace(0.0, 12.5, 501)[1:]
+    stepper = program.start(problem.y0)
+    expected = stepper.advance(times).y
+    batch = program.batch([problem.y0], times=times)
+    assert stepper.stats.steps < 100 < 500 <= batch.steps[0] < 600  # measured 59 and 546
+    assert distance(batch.y[0], expected) < 1e-10  # measured 5e-12
+
+
+def test_what_is_next_to_nothing_leaves_its_lane():
+    program = AdaptiveProgram(VectorField(lambda y: [y[1], -y[0] - y[1]], dim=2), k=8, s=7, tol=1e-12)
+    starts = np.array([[1.0, 0.0], [1.1, 0.0], [0.0, 0.0]])  # the last one stays at rest, in its lane
+    batch = program.batch(starts, times=[1000.0])
+    assert batch.status == [Status.FINISHED] * 3
+    assert 0.0 < np.abs(batch.y[:2]).max() < 1e-210  # e^-500 is 7e-218
+    assert np.array_equal(batch.y[:2], [program.start(y).advance([1000.0]).y for y in starts[:2]])
+    assert batch.steps.max() < 2000  # measured 898; in its lane, millions
+
+
 def test_where_something_else_says_where_steps_end_they_go_one_by_one():
     system = problems.load("kepler").system
     for more in ({"max_step": 0.1}, {"max_steps": 10}, {"breakpoints": [1.0]}):
