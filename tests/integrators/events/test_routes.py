@@ -201,15 +201,16 @@ class TestHeyoka:
 
 
 SLOW = """
-import signal, time
+import signal
 import problems
 from integrators import HBVM, Event, integrate
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 {g}
+henon_heiles, method = problems.load("henon_heiles"), HBVM(k=8, s=4, h=0.1)
+integrate(henon_heiles, method, [1.0], events={events})  # compiles
 print("begun", flush=True)
-began = time.monotonic()
-made = integrate(problems.load("henon_heiles"), HBVM(k=8, s=4, h=0.1), [1e9], events={events})
+made = integrate(henon_heiles, method, [1e9], events={events})
 print(made.status, made.reason, len(made.events["g"]))
 """
 
