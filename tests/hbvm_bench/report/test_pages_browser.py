@@ -41,7 +41,7 @@ def made_up_document():
 
 
 @pytest.fixture(scope="module", params=["race", "endure", "paper"])
-def folder(request, tmp_path_factory):
+def folder(request, tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
         made = race.document([made_up_race()])

@@ -27,14 +27,14 @@ PATIENCE = 30_000  # milliseconds, on a machine with other work
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp("report")
     write(document(made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run")))), target)
     return target
 
 
 @pytest.fixture(scope="module")
-def large(tmp_path_factory):
+def large(tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp("large")
     texts = [f"pendulum(p={1 + number / 10})" for number in range(2)]
     write(document(made_up_run.write(Store(tmp_path_factory.mktemp("run")), texts, 200, missing=3)), target)

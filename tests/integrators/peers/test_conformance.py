@@ -1,8 +1,16 @@
+import functools
+
 import pytest
 import rebound
 
 import integrators.testing as testing
-from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.diffrax.methods import (
+    DiffraxMethod,
+    Dopri8,
+    LeapfrogMidpoint,
+    ReversibleHeun,
+    SemiImplicitEuler,
+)
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
 from integrators.peers.scipy import DOP853, Radau
@@ -34,9 +42,22 @@ def _name(case):
     return repr(getattr(case, "values", case)[0])
 
 
+@functools.cache
+def made(problem):
+    return problem()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled_once():
+    """diffrax's methods compile for a second or two: not anew for each check."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DiffraxMethod, "compile", functools.cache(DiffraxMethod.compile))
+        yield
+
+
 @pytest.mark.parametrize("check", testing.CHECKS, ids=testing.name_of)
 @pytest.mark.parametrize(("method", "problem"), CASES, ids=map(_name, CASES))
 def test_conforms(method, problem, check):
     if isinstance(method, WHFast512) and check is testing.samples_leave_the_steps_alone:
         pytest.xfail("REBOUND synchronises WHFast512 at a sample, which rounds: measured 1.1e-13")
-    check(method, problem())
+    check(method, made(problem))
