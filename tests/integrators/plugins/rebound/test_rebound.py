@@ -17,7 +17,7 @@ STEPS, H = 3000, 6.0
 
 
 def install(simulation: Any, method: Any) -> Any:
-    """Install a method; to import the plugin may take ten seconds, which is not for the collection of tests."""
+    """Install a method; the import compiles for ten seconds once, which is not for collecting tests."""
     from integrators.plugins.rebound import install
 
     return install(simulation, method)
