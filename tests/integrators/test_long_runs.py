@@ -1,6 +1,5 @@
 """Progress, Ctrl-C, checkpoints in files, and going on from them with the same bits."""
 
-import functools
 import os
 import signal
 import subprocess
@@ -73,12 +72,6 @@ CASES += [
 CASES += [("pendulum", Euler(h=0.01)), ("charged_particle", HBVM())]
 
 
-@functools.cache
-def load(name):
-    """Return a problem, the same one each time: some peers compile for each."""
-    return problems.load(name)
-
-
 class Breaks:
     """Ctrl-C at the n-th look."""
 
@@ -122,7 +115,7 @@ class TestResume:
     @pytest.mark.parametrize(("name", "method"), CASES, ids=lambda case: repr(case))
     @pytest.mark.parametrize("many", [True, False], ids=["many samples", "only the end"])
     def test_the_same_bits_as_without_a_break(self, name, method, many, path):
-        problem = load(name)
+        problem = problems.load(name)
         times = np.sort(np.random.default_rng(3).uniform(0.1, 4.0, 60)) if many else [4.0]
         whole = integrate(problem, method, times=times)
         assert whole.status is Status.FINISHED

@@ -1,16 +1,8 @@
-import functools
-
 import pytest
 import rebound
 
 import integrators.testing as testing
-from integrators.peers.diffrax.methods import (
-    DiffraxMethod,
-    Dopri8,
-    LeapfrogMidpoint,
-    ReversibleHeun,
-    SemiImplicitEuler,
-)
+from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
 from integrators.peers.scipy import DOP853, Radau
@@ -30,8 +22,8 @@ CASES = [
     (Leapfrog(h=0.02, order=4), testing.pendulum),
     (SemiImplicitEuler(h=0.001), testing.two_bodies),
     (LeapfrogMidpoint(h=0.01), testing.pendulum),
-    (ReversibleHeun(h=0.01), testing.pendulum),
-    (Dopri8(h=0.05), testing.pendulum),
+    pytest.param(ReversibleHeun(h=0.01), testing.pendulum, marks=pytest.mark.slow),  # compiles
+    pytest.param(Dopri8(h=0.05), testing.pendulum, marks=pytest.mark.slow),
     (Dopri8(rtol=1e-9, atol=1e-11), testing.pendulum),
     (DOP853(rtol=1e-9, atol=1e-12), testing.two_bodies),
     (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),
@@ -42,22 +34,9 @@ def _name(case):
     return repr(getattr(case, "values", case)[0])
 
 
-@functools.cache
-def made(problem):
-    return problem()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _compiled_once():
-    """diffrax's methods compile for a second or two: not anew for each check."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(DiffraxMethod, "compile", functools.cache(DiffraxMethod.compile))
-        yield
-
-
 @pytest.mark.parametrize("check", testing.CHECKS, ids=testing.name_of)
 @pytest.mark.parametrize(("method", "problem"), CASES, ids=map(_name, CASES))
 def test_conforms(method, problem, check):
     if isinstance(method, WHFast512) and check is testing.samples_leave_the_steps_alone:
         pytest.xfail("REBOUND synchronises WHFast512 at a sample, which rounds: measured 1.1e-13")
-    check(method, made(problem))
+    check(method, problem())
