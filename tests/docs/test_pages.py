@@ -10,7 +10,7 @@ import pytest
 from tests.docs import pages
 
 EXECUTED = [path for path in pages.sources() if pages.cells(path)]
-SLOW = ("own_campaign.md",)  # a study run whole
+SLOW = ("own_campaign.md", "hosts.md")  # a study run whole; the plugins compile for long
 TUTORIALS = pages.listed(pages.DOCS / "tutorials" / "index.md")
 PEERS = ("heyoka", "rebound", "diffrax", "jax")
 
