@@ -1,15 +1,19 @@
 """What all figures on the paper share: colours, sizes, the numbers that a page reads off them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Concatenate, ParamSpec
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.read_off import read_off
 from hbvm_bench.report.figures.style import TRUTH, looks
+from integrators.protocol import Array
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
@@ -68,3 +72,19 @@ def drawn(
         return made
 
     return decorate
+
+
+def heat(
+    axes: Axes, x: Sequence[float] | Array, y: Sequence[float], values: Array, low: float, high: float
+) -> QuadMesh:
+    """Colour cells by the logarithm of their value, from ``low`` to ``high``; blank are those without."""
+    return axes.pcolormesh(
+        x,
+        y,
+        np.ma.masked_invalid(np.log10(values)),
+        cmap=SEQUENTIAL.reversed(),
+        vmin=low,
+        vmax=high,
+        shading="nearest",
+        rasterized=True,
+    )

@@ -11,7 +11,7 @@ from matplotlib.ticker import FixedLocator
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, SEQUENTIAL, WIDTH, Said, drawn, number
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn, heat, number
 from hbvm_bench.studies.paper.henon_heiles import DIRECTIONS, GAP, GAPS, MAP_END, T_END, H, Orbit, potential
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
@@ -145,17 +145,7 @@ def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     for axes, times, name in zip(
         panels, (gauss, hbvm), ("Gauss(s=2, h=1.0)", "HBVM(k=4, s=2, h=1.0)"), strict=True
     ):
-        shown = np.ma.masked_invalid(np.log10(np.maximum(times, 1.0)))
-        mesh = axes.pcolormesh(
-            degrees,
-            gaps,
-            shown,
-            cmap=SEQUENTIAL.reversed(),
-            vmin=2,
-            vmax=math.log10(t_end),
-            shading="nearest",
-            rasterized=True,
-        )
+        mesh = heat(axes, degrees, gaps, np.maximum(times, 1.0), 2, math.log10(t_end))
         axes.set(yscale="log", xlabel="direction of the start, degrees")
         axes.set_xticks(range(0, 361, 60))
         axes.grid(visible=False)

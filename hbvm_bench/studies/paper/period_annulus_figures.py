@@ -9,7 +9,7 @@ from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn
 from hbvm_bench.studies.paper.period_annulus import SPAN, energy
-from integrators.protocol import Array
+from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import H_STAR, P1
 
 LEVELS = (0.005, 0.02, 0.04, 0.06, 0.08, H_STAR, 0.1, 0.12, 0.15)
@@ -39,8 +39,10 @@ def level_curves(figure: Figure) -> Said:
 
 
 @drawn("period-annulus-2", "Figure 2 · the two orbits from the points found", WIDTH, 3.7)
-def closeup(figure: Figure, gauss: Path, hbvm: Path, names: tuple[str, str]) -> Said:
+def closeup(figure: Figure, orbits: Mapping[str, Path], methods: Mapping[str, MethodBase]) -> Said:
     """poinc_fig2: the error of H along both orbits from the points found, and the orbits near the saddle."""
+    gauss, hbvm = orbits["gauss"], orbits["hbvm"]
+    names = [repr(methods["gauss"]), repr(methods["hbvm"])]
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1])
     for (t, y), colour, name in zip((gauss, hbvm), (GAUSS, HBVM), names, strict=True):
         h = energy(y)
