@@ -8,6 +8,7 @@ field, and its accuracy is what a second run with another tolerance leaves of it
 import ast
 import hashlib
 import platform
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from functools import cached_property, lru_cache
@@ -210,6 +211,30 @@ def compute(problem: Problem, *, intervals: int = INTERVALS) -> ReferenceFile:
         },
         t=hexadecimal(times),
         y=[[str(value) for value in row] for row in states],
+    )
+
+
+def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:
+    """Return the reference of a problem of which only the end is known.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If ``end`` is no state of the problem.
+    """
+    if len(end) != problem.system.dim or not np.isfinite(end).all():
+        raise InputError(f"end={list(end)!r} of {problem!r} must be {problem.system.dim} finite numbers.")
+    return ReferenceFile(
+        problem=repr(problem),
+        start=start(problem),
+        parameters=hexadecimal(problem.par),
+        provenance={
+            "method": "the end state that the campaign gives",
+            "field": emit.fingerprint(problem.system),
+            "t_end": repr(float(problem.t_end)),
+        },
+        t=hexadecimal(np.array([problem.t_end])),
+        y=[[repr(float(value)) for value in end]],
     )
 
 

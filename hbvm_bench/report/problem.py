@@ -262,7 +262,9 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
     if known is None:
         return None
     made = known.provenance
-    said = [f"Reference: {made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"]
+    version = f", version {made['heyoka']}" if "heyoka" in made else ""
+    check = f"; {made['check']}" if "check" in made else ""
+    said = [f"Reference: {made.get('method', '')}{version}{check}"]
     if "agreement" in made:
         said.append(f"The two agree to {made['agreement']}")
     floor = problem.errors(known.high, known.t)
