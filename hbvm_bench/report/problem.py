@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words

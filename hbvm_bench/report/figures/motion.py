@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.report.figures.canvas import Picture, new, picture
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, family_panels, panel_legend, trace
