@@ -20,6 +20,7 @@ from problems.errors import InputError
 
 
 def automatic(
+    context: typer.Context,
     problems: Annotated[list[str] | None, typer.Argument(help="Problems; all by default.")] = None,
     rounds: Annotated[int | None, typer.Option(help="Interleaved timing samples, against heyoka.")] = None,
     general: Annotated[
@@ -59,9 +60,7 @@ def automatic(
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     if out is not None:
         ensure_writable(out)
-    words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
-    command = as_typed([*words, *(["--avx2"] if avx2 else [])], out)
-    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
+    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), as_typed(context))
     run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))
     console.print(machine.sentence(run.machine), highlight=False)
