@@ -11,6 +11,8 @@ from pathlib import Path
 from statistics import median, quantiles
 from typing import Literal
 
+import psutil
+
 import integrators.registry
 from hbvm_bench.campaign.identity import version_of_library
 from hbvm_bench.measure import machine
@@ -208,11 +210,11 @@ def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
     """
     with machine.staying_on_a_core():
         measure()  # compiled now
-        stolen, wall, busy = _stolen(), time.perf_counter(), time.process_time()
+        stolen, wall, busy = psutil.cpu_times().steal, time.perf_counter(), time.process_time()
         taken = [measure() for _ in range(CALIBRATIONS)]
         wall, busy = time.perf_counter() - wall, time.process_time() - busy
-        stolen = None if stolen is None else (_stolen() or 0.0) - stolen
-    return [scatter(taken), share(busy / wall), *([] if stolen is None else [steal(stolen / wall)])]
+        stolen = psutil.cpu_times().steal - stolen
+    return [scatter(taken), share(busy / wall), steal(stolen / wall)]
 
 
 def scatter(taken: Sequence[float]) -> Finding:
@@ -256,12 +258,6 @@ def _running() -> int:
         if line.startswith("procs_running"):
             return int(line.split()[1])
     return 1
-
-
-def _stolen() -> float | None:
-    """Return the seconds that the host took from all cores since the start."""
-    fields = (_read(Path("/proc/stat")).splitlines() or [""])[0].split()
-    return int(fields[8]) / os.sysconf("SC_CLK_TCK") if len(fields) > 8 else None
 
 
 def _read(path: Path) -> str:

@@ -10,6 +10,7 @@ from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.solve import solve
 from hbvm_bench.measure.starts import PERTURBATION, cloud, members, scaled
+from hbvm_bench.measure.timing import time_alone
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
 from integrators.protocol import Status
@@ -92,7 +93,8 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     assert metrics["throughput"].why == "not timed"
-    timed = ensemble.time_round(problem, Gauss(s=8, h=0.5), asked, TimingPlan(samples=2, budget=1))
+    run = ensemble.EnsembleRun.of(problem, Gauss(s=8, h=0.5), program, asked)
+    timed = time_alone(run, TimingPlan(samples=2, budget=1))
     assert len(timed.samples) == 2
     # a method without a batch path takes one after the other, to the same end
     other, _, _ = ensemble.measure(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)
