@@ -6,7 +6,6 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-import msgspec
 from rich import box
 from rich.table import Table
 from rich.text import Text
@@ -18,7 +17,7 @@ from hbvm_bench.campaign.identity import version_of_library
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
-from hbvm_bench.summaries import goals
+from hbvm_bench.summaries import export, goals
 from integrators.protocol import MethodBase
 from problems.errors import unknown
 
@@ -64,28 +63,8 @@ def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
         "command": index.command,
         "version": index.version,
         "cases_planned": len(index.ids),
-        "metrics": {
-            key: {"label": m.label, "unit": m.unit, "better": m.better, "description": m.description}
-            for key, m in METRICS.items()
-        },
         "goals": goals.as_data(goals.verdicts(index.campaign, records)),
-        "cases": [_case(record) for record in records],
-    }
-
-
-def _case(record: Record) -> dict[str, Any]:
-    fields = msgspec.to_builtins(record)
-    result = fields.pop("result")
-    fields.pop("case")
-    timing = record.timing
-    return {
-        "problem": record.case.problem,
-        "method": record.case.method,
-        "settings": record.case.settings,
-        "note": record.case.note,
-        **result,
-        **fields,
-        "timing": None if timing is None else {**timing.summary, **msgspec.to_builtins(timing)},
+        **export.as_json(records),
     }
 
 

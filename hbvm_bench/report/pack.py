@@ -60,7 +60,7 @@ def data(document: Document) -> str:
         if picture.plot is not None:
             table = numbers(picture.plot)
             plots[picture.key] = as_json(picture.plot) | {
-                "numbers": {"head": table.head, "rows": table.rows, "words": table.words}
+                "numbers": {"head": table.head, "rows": table.rows, "words": len(table.words)}
             }
         if picture.motion is not None:
             motions[picture.key] = picture.motion

@@ -15,7 +15,6 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -165,16 +164,10 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         return Result(outcome="crashed", reason=wrong, status=solution.status.value)
     measured = measure(solution, solutions.find(resolved.problem))
     try:
-        checked = check(measured, resolved.method, program, resolved.case.checks)
+        measured = check(measured, resolved.method, program, resolved.case.checks)
     except Exception as error:
         traceback.print_exc()
         return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    measured = replace(
-        measured,
-        laws=checked.laws,
-        drift={"t": checked.t, **checked.errors} if checked.errors else {},
-        reversal=checked.reversal,
-    )
     return _stored(measured, solution.status, solution.reason, directory, fork, solution.warnings)
 
 

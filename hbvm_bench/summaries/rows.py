@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from hbvm_bench.campaign.entries import Ensemble
 from hbvm_bench.measure.metrics import METRICS, Metric, find
@@ -52,6 +53,11 @@ class Cell:
     void: bool
     why: str
     sort: float
+
+    @property
+    def shown(self) -> str:
+        """The text, in brackets where it is void."""
+        return f"({self.text})" if self.void else self.text
 
 
 @dataclass(frozen=True)
@@ -131,7 +137,7 @@ def numbers(records: Sequence[Record]) -> dict[str, int]:
     return {record.id: methods.setdefault(record.case.method, len(methods) + 1) for record in records}
 
 
-def group_of(record: Record) -> str:
+def group_of(record: Record) -> Literal["on", "off", "ended"]:
     """Return the key in `GROUPS` of a case."""
     result = record.result
     if result.outcome != "ok" or result.status != "finished":
@@ -169,10 +175,7 @@ def format_value(metric: Metric, value: Value) -> Cell:
 
 def format_metric(record: Record, key: str) -> str:
     """Format a metric of a case; in brackets where it is void, a dash where there is none."""
-    if key not in record.result.metrics:
-        return "–"
-    cell = format_value(METRICS[key], record.result.metrics[key])
-    return f"({cell.text})" if cell.void else cell.text
+    return format_value(METRICS[key], record.result.metrics.get(key, Value())).shown
 
 
 def seconds(number: float) -> str:

@@ -47,9 +47,7 @@ def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture |
             law = laws[case.record.id]
             at, fitted = _law(law, t)
             axes.plot(t, error, case.look.marker, color=case.look.light, markersize=2.4, linestyle="")
-            (line,) = axes.plot(at, fitted, color=case.look.light, linewidth=1.1)
-            if case.look.dash:
-                line.set_dashes(case.look.dash)
+            axes.plot(at, fitted, color=case.look.light, linewidth=1.1, dashes=case.look.dash)
             traces += [
                 trace(case, t, error),
                 Trace(case.look.number, case.record.case.method, at, fitted, "law", text(law)),

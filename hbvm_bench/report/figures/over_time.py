@@ -1,5 +1,6 @@
 """Errors over time, and what the figures of cases share: their panels and legends."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -15,7 +16,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, Look, options, panels
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import family_of, number
 from hbvm_bench.summaries.rows import group_of
 
 Array = NDArray[np.float64]
@@ -35,6 +36,12 @@ class Drawn:
     record: Record
     look: Look
     series: dict[str, Array]
+
+    @property
+    def position_error(self) -> float:
+        """Its position error at the end; infinite where there is none that may be compared."""
+        error = number(self.record, "position_end")
+        return math.inf if error is None else error
 
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
@@ -181,7 +188,7 @@ def panel_legend(
             [],
             [],
             color=case.look.light,
-            dashes=case.look.dash or (None, None),
+            dashes=case.look.dash,
             marker=case.look.marker if markers else "",
             markersize=4,
             label=shortened(case.legend(named=named), notes.get(case.record.id, "")),
@@ -228,14 +235,9 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
     bottom = 10.0**what.low
     clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
     drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
-    (line,) = axes.plot(t, drawn, color=case.look.light, clip_on=False)
-    if case.look.dash:
-        line.set_dashes(case.look.dash)
+    (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False)
     if not what.joined:
-        line.set_linewidth(0.7)
-        line.set_marker(case.look.marker)
-        line.set_markersize(2.6)
-        line.set_markevery(max(1, t.size // 10))
+        line.set(linewidth=0.7, marker=case.look.marker, markersize=2.6, markevery=max(1, t.size // 10))
 
 
 def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:

@@ -52,8 +52,8 @@ def test_the_law_of_a_symplectic_method_is_a_bound_and_its_phase_drifts():
     law = checked.laws["energy"]
     assert law.law == "bounded"
     assert law.starts == 3
-    assert checked.errors["energy"].shape == (3, checked.t.size)
-    assert (checked.errors["energy"] < 0).any() != (checked.errors["energy"] > 0).all()
+    assert checked.drift["energy"].shape == (3, checked.drift["t"].size)
+    assert (checked.drift["energy"] < 0).any() != (checked.drift["energy"] > 0).all()
     assert checked.reversal < 1e-10  # 6.6e-13 measured
     metrics = evaluate(measured)
     assert 1e-6 < metrics["phase_max"].value < 1e-2  # 1.9e-3 measured
