@@ -191,8 +191,6 @@ def main(asked: socket.socket) -> None:
     """Be a warm process: what returns from `_fork` is the process of a case, which may become one itself."""
     cores, size, first = os.sched_getaffinity(0), _size(), True
     while True:
-        gc.collect()
-        gc.freeze()  # a collection in a fork would copy the memory that it looks at
         parent, path, runner = _fork(asked)
         code = _code(path, parent, first)
         sys.stdout.flush()
@@ -202,6 +200,7 @@ def main(asked: socket.socket) -> None:
         os.sched_setaffinity(0, cores)
         for stream in (1, 2):  # its output has ended
             os.dup2(0, stream)
+        gc.collect()
         runner.send(DONE)
         asked, first = runner, False
 
