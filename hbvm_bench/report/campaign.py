@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -31,7 +31,7 @@ from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store, again, damage, progress
+from hbvm_bench.store.store import Index, Store, again, damage, progress
 from hbvm_bench.summaries import export, fairness, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import columns, tasks
@@ -50,30 +50,19 @@ LISTED = 12  # cases without a rank that are listed at once; more are folded awa
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 
 
-@dataclass(frozen=True)
-class Run:
-    """One of the runs that a report is made of.
+class Run(NamedTuple):
+    """One of the runs that a report is made of: what was asked for, and the cases that have no result yet."""
 
-    Attributes
-    ----------
-    title, description, command, version
-        Of its campaign.
-    planned : int
-        How many cases it has.
-    missing : list of Case
-        Those that have no result yet.
-    """
-
-    title: str
-    description: str
-    command: str
-    version: str
-    planned: int
+    index: Index
     missing: list[Case]
 
+    @property
+    def title(self) -> str:
+        """For readers."""
+        return self.index.campaign.title or self.index.campaign.name
 
-@dataclass(frozen=True)
-class Gathered:
+
+class Gathered(NamedTuple):
     """What the stores of one or more runs hold: the runs, and every case with its series."""
 
     runs: list[Run]
@@ -108,15 +97,7 @@ def gather(stores: Sequence[Store]) -> Gathered:
             f"{str(stores[0].directory)!r} has finished; {again(indices[0], stores[0].directory)}."
         )
     runs = [
-        Run(
-            title=index.campaign.title or index.campaign.name,
-            description=" ".join(index.campaign.description.split()),
-            command=index.command,
-            version=index.version,
-            planned=len(index.ids),
-            missing=[case for number, case in index.listed() if number not in furthest],
-        )
-        for index in indices
+        Run(index, [case for number, case in index.listed() if number not in furthest]) for index in indices
     ]
     found = [
         _read(record, store) if number < DRAWN_CASES else (record, {})
@@ -159,7 +140,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
     overall = _overall(records, several=len(parts) > 1)
     return Document(
         title,
-        [runs[0].description] if one else [],
+        [runs[0].index.campaign.description] if one else [],
         [
             *attempt(("the goals", partial(_goals, stores, records))),
             *(overall if len(parts) > 1 else []),
@@ -226,8 +207,8 @@ def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequenc
     """Return what came out: the sentences where there are few, and every case as a row."""
     blocks: list[Block] = [
         Notice(
-            f"{len(run.missing)} of {run.planned} cases have no result yet",
-            f"({run.title}). To run them: `{run.command}`",
+            f"{len(run.missing)} of {len(run.index.ids)} cases have no result yet",
+            f"({run.title}). To run them: `{run.index.command}`",
         )
         for run in runs
         if run.missing
@@ -275,7 +256,7 @@ def _fairness(records: Sequence[Record]) -> Section:
         "How many settings each method has",
         ("method", "library", "settings", *KINDS),
         [
-            (name, library, str(sum(kinds.values())), *(str(kinds.get(kind, 0)) for kind in KINDS))
+            (name, library, str(kinds.total()), *(str(kinds[kind]) for kind in KINDS))
             for name, library, kinds in words.settings_count(records)
         ],
         words=(0, 1),
@@ -299,8 +280,8 @@ def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
     return Section(
         "Run it again",
         [
-            Commands("\n".join(run.command for run in runs)),
-            f"Measured{f' on {days}' if days else ''} with hbvm-bench {runs[0].version}. "
+            Commands("\n".join(run.index.command for run in runs)),
+            f"Measured{f' on {days}' if days else ''} with hbvm-bench {runs[0].index.version}. "
             "`hbvm-bench show DIRECTORY --json` prints every number with all timing samples; "
             "`hbvm-bench report DIRECTORY` draws this report again without running anything.",
             *provenance.facts(provenance.machines(records), provenance.versions(records)),
@@ -316,7 +297,8 @@ def _sources(parts: Sequence[ProblemPart]) -> list[str]:
 
 
 def _files(title: str, runs: Sequence[Run], records: Sequence[Record]) -> Files:
-    made_by = {"title": title, "runs": [{"command": run.command, "version": run.version} for run in runs]}
+    commands = [{"command": run.index.command, "version": run.index.version} for run in runs]
+    made_by = {"title": title, "runs": commands}
     return Files(
         "Every case with every metric, every reason and every timing sample",
         {

@@ -1,5 +1,6 @@
 """What the report says in sentences; every number in them is read from the records."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from hbvm_bench.measure.measured import POSITION
@@ -7,7 +8,7 @@ from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import fairness
 from hbvm_bench.summaries.points import accurate, family_of, number
-from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, status_of
+from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, status_of
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 """The errors in the summary's question "who is fastest among those that are right?\""""
@@ -125,26 +126,21 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
     return shown
 
 
-def settings_count(records: Sequence[Record]) -> list[tuple[str, str, dict[str, int]]]:
+def settings_count(records: Sequence[Record]) -> list[tuple[str, str, Counter[str]]]:
     """Return method, library and how many settings it has of each kind."""
-    counted: dict[tuple[str, str], dict[str, int]] = {}
+    counted: dict[tuple[str, str], Counter[str]] = {}
     for record in records:
-        kinds = counted.setdefault((family_of(record), record.library), {})
-        kinds[record.case.settings] = kinds.get(record.case.settings, 0) + 1
+        counted.setdefault((family_of(record), record.library), Counter())[record.case.settings] += 1
     return [(name, library, kinds) for (name, library), kinds in counted.items()]
 
 
 def excluded(records: Sequence[Record]) -> list[str]:
     """Return which cases take no part in any ranking, and why."""
-    said = []
-    for record in records:
-        group = group_of(record)
-        if group == "on":
-            continue
-        why = record.result.violation if group == "off" else status_of(record)
-        reason = f": {record.result.reason}" if group == "ended" and record.result.reason else ""
-        said.append(f"{record.case.method} on {record.case.problem}: {why}{reason}".rstrip(". ") + ".")
-    return said
+    return [
+        f"{record.case.method} on {record.case.problem}: {reason_of(record)}".rstrip(". ") + "."
+        for record in records
+        if group_of(record) != "on"
+    ]
 
 
 def _ranked(records: Sequence[Record], key: str) -> list[Record]:

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import by_family, by_problem
-from hbvm_bench.summaries.rows import group_of, status_of
+from hbvm_bench.summaries.rows import group_of, reason_of
 from hbvm_bench.summaries.table import Table
 
 State = Literal["on", "off", "ended", "refused", "absent"]
@@ -76,19 +76,11 @@ def _outcome(records: Sequence[Record]) -> Outcome:
     said: dict[str, list[str]] = {}
     for record, state in zip(records, states, strict=True):
         if state != "on":
-            said.setdefault(_reason(record), []).append(record.case.method)
-    same = len({_reason(record) for record in records}) == 1
+            said.setdefault(reason_of(record), []).append(record.case.method)
+    same = len({reason_of(record) for record in records}) == 1
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
     best: State = min(states, key=list(SIGNS).index, default="absent")
     return Outcome(best, states.count("on"), len(states), reasons)
-
-
-def _reason(record: Record) -> str:
-    """Return why a case did not reach the end on its trajectory; empty if it did."""
-    result, group = record.result, group_of(record)
-    if group == "ended":
-        return f"{status_of(record)}: {result.reason}" if result.reason else status_of(record)
-    return result.violation
 
 
 def _state(record: Record) -> State:

@@ -157,6 +157,14 @@ def status_of(record: Record) -> str:
     return words if result.t_stop is None else f"{words} at t = {result.t_stop:.4g}"
 
 
+def reason_of(record: Record) -> str:
+    """Return why a case did not reach the end on its trajectory; empty if it did."""
+    if group_of(record) != "ended":
+        return record.result.violation
+    head, reason = status_of(record), record.result.reason
+    return f"{head}: {reason}" if reason else head
+
+
 def format_value(metric: Metric, value: Value) -> Cell:
     """Format one metric."""
     if value.value is None:
@@ -199,11 +207,8 @@ def _row(record: Record) -> Row:
 def _remark(record: Record) -> str:
     result = record.result
     parts: list[str] = []
-    if result.outcome != "ok" or result.status != "finished":
-        head = status_of(record)
-        parts.append(f"{head}: {result.reason}" if result.reason else head)
-    elif result.violation:
-        parts.append(result.violation)
+    if reason := reason_of(record):
+        parts.append(reason)
     elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
         parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
     parts += result.warnings

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import by_family
 
 # Base colour of each method: light theme, dark theme.
 FAMILIES = {
@@ -150,9 +150,7 @@ def panels(records: Sequence[Record], most: int = 6) -> list[tuple[str, list[Rec
         libraries.setdefault("ours" if record.role == "ours" else record.library, []).append(record)
     made: list[tuple[str, list[Record]]] = []
     for library, members in libraries.items():
-        names: dict[str, list[Record]] = {}
-        for record in members:
-            names.setdefault(family_of(record), []).append(record)
+        names = by_family(members)
         if len(members) <= most:
             made.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
         else:
