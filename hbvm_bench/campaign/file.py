@@ -70,10 +70,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )
 
-        if not self.ensembles and not (self.problems and self.methods):
-            missing = "methods" if self.problems else "problems"
-            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
-        if bool(self.problems) != bool(self.methods):
+        if bool(self.problems) != bool(self.methods) or not (self.problems or self.ensembles):
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
         known = {name_of(entry) for entry in self.entries()}
@@ -225,10 +222,6 @@ def load(name_or_path: str) -> Campaign:
     ----------
     name_or_path : str
         The name of a shipped campaign, or the path of a TOML file.
-
-    Returns
-    -------
-    Campaign
 
     Raises
     ------

@@ -9,7 +9,7 @@ from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.solve import solve
-from hbvm_bench.measure.starts import PERTURBATION, cloud, members, scaled
+from hbvm_bench.measure.starts import PERTURBATION, members, scaled
 from hbvm_bench.measure.timing import time_alone
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
@@ -38,7 +38,7 @@ def test_scaled_starts_keep_a_symmetric_start_symmetric():
 
 def test_a_cloud_begins_with_the_problem_and_fills_its_box():
     problem = problems.load("henon_heiles", q1=0.1)
-    starts = cloud(problem, 4000, 0.01)
+    starts, _ = members(problem, Ensemble(count=4000, spread=0.01))
     assert np.array_equal(starts[0], problem.y0)
     x = (starts / problem.y0 - 1) / 0.01
     assert np.abs(x).max() <= 1 + 1e-12
