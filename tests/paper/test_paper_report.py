@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hbvm_bench.cli import main
-from hbvm_bench.report.figures.png import small
+from hbvm_bench.report.figures.canvas import small
 from hbvm_bench.studies.paper import others, report, results
 from hbvm_bench.studies.paper.departure import departure
 from hbvm_bench.studies.paper.drawn import number, sheet
