@@ -172,6 +172,8 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     reference : bool
         Whether a reference is computed before the run, by two methods, where none comes with the
         package; see `hbvm_bench.run.references`.
+    end : list of float
+        The state at the end, where it is known, as from a publication: the reference is then that.
     """
 
     use: str
@@ -180,6 +182,7 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     note: str = ""
     within: Accuracy = {}
     reference: bool = False
+    end: list[float] = []
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None

@@ -215,6 +215,24 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def file_of(name_or_path: str) -> Path:
+    """Return where a campaign's file lies: that of a shipped one, or of a path that ends in ``.toml``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise InputError(f"there is no campaign file {name_or_path!r}.")
+        return path
+    if name_or_path not in shipped():
+        raise unknown("campaign", name_or_path, shipped())
+    return shipped()[name_or_path]
+
+
 def load(name_or_path: str) -> Campaign:
     """Read a campaign.
 
@@ -228,16 +246,8 @@ def load(name_or_path: str) -> Campaign:
     problems.errors.InputError
         If there is no such campaign, or its file is not a campaign.
     """
-    path = Path(name_or_path)
-    if path.suffix == ".toml":
-        if not path.is_file():
-            raise InputError(f"there is no campaign file {name_or_path!r}.")
-    elif name_or_path in shipped():
-        path = shipped()[name_or_path]
-    else:
-        raise unknown("campaign", name_or_path, shipped())
     try:
-        text = path.read_text(encoding="utf-8")
+        text = file_of(name_or_path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the campaign file {name_or_path!r}: {error}.") from None
     return parse(text, name_or_path)
@@ -296,6 +306,7 @@ __all__ = [
     "Role",
     "Settings",
     "TimingPlan",
+    "file_of",
     "load",
     "parse",
     "shipped",

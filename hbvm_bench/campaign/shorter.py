@@ -6,7 +6,8 @@ from typing import TypeVar
 import numpy as np
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Campaign, Goal, MethodEntry, ProblemEntry, name_of
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.file import Campaign, Goal, MethodEntry, ProblemEntry, name_of, text_of
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.campaign.sweep import fill
@@ -60,11 +61,18 @@ def quick_run(campaign: Campaign, rounds: int) -> Campaign:
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:
-    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state."""
+    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state.
+
+    A problem in a Python file keeps its span: its function need not take another.
+    """
+    if own.is_file(text_of(entry)):
+        return entry
     text = fill(entry.use, entry.values)
     problem, spec = make_problem(text), parse_spec(text)
     end = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
     known = solutions.find(problem)
     if known is not None:
         end = float(known.t[1 + np.argmin(np.abs(known.t[1:] - end))])
-    return replace(entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry))
+    return replace(
+        entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry), end=[]
+    )

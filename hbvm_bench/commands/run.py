@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, load
+from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
 from hbvm_bench.commands.live import Live
@@ -67,20 +67,30 @@ def run(
     """
     campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
-    campaign = own.opened(campaign, None if name is None else Path(name).parent, partial(_say_run, name))
+    campaign = opened(campaign, name)
     if report_to is not None:
         ensure_writable(report_to, keep=False)
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
     store = carry_out(campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing)
-    records = reading.records(store)
-    if len(records) <= PRINTED:
-        terminal.print_results(records)
-    terminal.print_goals(campaign, records)
+    show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import publish
         from hbvm_bench.report.campaign import document
 
         publish(document(store), report_to, stderr=False)
+
+
+def opened(campaign: Campaign, name: str | None) -> Campaign:
+    """Run the Python files beside a campaign's, or those that a command line names; see `own.opened`."""
+    return own.opened(campaign, None if name is None else file_of(name).parent, partial(_say_run, name))
+
+
+def show(campaign: Campaign, store: Store) -> None:
+    """Print the results of a run and the verdicts on its goals."""
+    records = reading.records(store)
+    if len(records) <= PRINTED:
+        terminal.print_results(records)
+    terminal.print_goals(campaign, records)
 
 
 def as_typed(context: typer.Context) -> str:
@@ -97,8 +107,8 @@ def as_typed(context: typer.Context) -> str:
             words.append((option.opts if given else option.secondary_opts)[-1])
         elif not (isinstance(given, Path) and given.is_absolute()):
             name = [] if option.param_type_name == "argument" else [option.opts[-1]]
-            for one in given if isinstance(given, list) else [given]:
-                words += [*name, str(one).removesuffix(".0")]
+            for one in given if isinstance(given, list | tuple) else [given]:
+                words += [*name, str(one).removesuffix(".0") if isinstance(one, float) else str(one)]
     return shlex.join(words)
 
 
@@ -242,4 +252,4 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     live.visited()
 
 
-__all__ = ["carry_out", "run"]
+__all__ = ["as_typed", "carry_out", "opened", "run", "show"]

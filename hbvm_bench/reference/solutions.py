@@ -6,6 +6,7 @@ it, from the same traced vector field as everything else, by two methods that sh
 
 import ast
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from functools import cached_property, lru_cache
@@ -162,6 +163,30 @@ def _stored(problem: Problem) -> _Stored | None:
 @lru_cache(maxsize=64)
 def _read(path: Path) -> _Stored:
     return _Stored(read(path))
+
+
+def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:
+    """Return the reference of a problem of which only the end is known.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If ``end`` is no state of the problem.
+    """
+    if len(end) != problem.system.dim or not np.isfinite(end).all():
+        raise InputError(f"end={list(end)!r} of {problem!r} must be {problem.system.dim} finite numbers.")
+    return ReferenceFile(
+        problem=repr(problem),
+        start=start(problem),
+        parameters=hexadecimal(problem.par),
+        provenance={
+            "method": "the end state that the campaign gives",
+            "field": emit.fingerprint(problem.system),
+            "t_end": repr(float(problem.t_end)),
+        },
+        t=hexadecimal(np.array([problem.t_end])),
+        y=[[repr(float(value)) for value in end]],
+    )
 
 
 def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:

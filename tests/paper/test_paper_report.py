@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from hbvm_bench.cli import main
-from hbvm_bench.report.figures.canvas import small
+from hbvm_bench.report.figures.canvas import new, small
 from hbvm_bench.studies.paper import others, report, results
 from hbvm_bench.studies.paper.departure import departure
-from hbvm_bench.studies.paper.drawn import number, sheet
+from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.henon_heiles_figures import fates
 from integrators.gauss import Gauss
 from integrators.protocol import Array, Samples, Status
@@ -140,7 +140,7 @@ def test_the_same_figure_gives_the_same_bytes():
 def test_pictures_are_kept_small_without_a_visible_difference():
     from PIL import Image
 
-    stream, sheet_of_paper = io.BytesIO(), sheet(5.0, 3.0)
+    stream, sheet_of_paper = io.BytesIO(), new(5.0, 3.0)
     sheet_of_paper.subplots().plot(np.sin(np.linspace(0.0, 20.0, 400)))
     sheet_of_paper.savefig(stream, format="png", dpi=160)
     drawn = stream.getvalue()

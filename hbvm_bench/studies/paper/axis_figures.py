@@ -4,20 +4,20 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
+from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.studies.paper.axis_motion import START, Growth
-from hbvm_bench.studies.paper.drawn import MOTION, SEQUENTIAL, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import MOTION, SEQUENTIAL, WIDTH, Said, drawn
 from integrators.protocol import Array
 
 
-@styled
+@drawn("sitnikov-chaos", "Beyond the paper · is it chaos?", WIDTH, 4.4)
 def chaos(
-    rows: Sequence[Growth], points: Sequence[tuple[float, Array]], e: float, critical: float
-) -> Picture:
+    figure: Figure, rows: Sequence[Growth], points: Sequence[tuple[float, Array]], e: float, critical: float
+) -> Said:
     """Growth rates against e for the paper's start; the stroboscopic section at the paper's e."""
-    figure = sheet(WIDTH, 4.4)
     left, right = figure.subplots(1, 2)
     spans = sorted({turn for row in rows for turn, _ in row.along if row.left is None})
     es = [row.e for row in rows]
@@ -60,10 +60,7 @@ def chaos(
     )
     right.legend(loc="upper right", markerscale=3)
     at = min(rows, key=lambda row: abs(row.e - e))
-    return picture(
-        figure,
-        "sitnikov-chaos",
-        "Beyond the paper · is it chaos?",
+    return (
         "Left: the rate at which a small offset grows. Along the axis it falls with the length of the "
         "run, as the logarithm of time over time, up to e ≈ 0.8: the orbit of this start is regular "
         "there. Beyond, it no longer falls, and the orbit is chaotic. Off the axis it is large at every "
@@ -76,12 +73,11 @@ def chaos(
     )
 
 
-@styled
+@drawn("sitnikov-territory", "Beyond the paper · who stays on the axis", WIDTH * 0.72, 4.0, values=True)
 def territory(
-    es: Sequence[float], speeds: Sequence[float], left_after: Array, turns: int, e: float
-) -> Picture:
+    figure: Figure, es: Sequence[float], speeds: Sequence[float], left_after: Array, turns: int, e: float
+) -> Said:
     """Where planetoids stay: revolutions until they leave, over eccentricity and speed."""
-    figure = sheet(WIDTH * 0.72, 4.0)
     axes = figure.subplots()
     shown = np.ma.masked_invalid(np.log10(left_after))
     mesh = axes.pcolormesh(
@@ -106,13 +102,9 @@ def territory(
     nearest = int(np.argmin(np.abs(np.asarray(es) - e)))
     gone = np.flatnonzero(~stays[nearest])
     edge = speeds[int(gone[0])] if gone.size else math.nan
-    return picture(
-        figure,
-        "sitnikov-territory",
-        "Beyond the paper · who stays on the axis",
+    return (
         "For each eccentricity of the primaries and each speed at the start: how long the planetoid "
         "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
         "end of regular motion; the paper's run lies inside it.",
         f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
-        values=True,
     )

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
+from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, number, picture, sheet
+from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, Said, drawn, number
 from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
@@ -16,10 +17,11 @@ from integrators.protocol import Array
 FRACTIONS = {1 / 32: "1/32", 1 / 16: "1/16", 1 / 12: "1/12", 1 / 8: "1/8", 1 / 4: "1/4", 1 / 2: "1/2"}
 
 
-@styled
-def by_nodes(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> Picture:
+@drawn(
+    "sitnikov-nodes", "Beyond the paper · how many nodes make the conservation practical", WIDTH * 0.62, 3.4
+)
+def by_nodes(figure: Figure, scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> Said:
     """Draw the energy error of HBVM(k, 2) against k: practical conservation."""
-    figure = sheet(WIDTH * 0.62, 3.4)
     axes = figure.subplots()
     for (h, rows), marker, shade in zip(sorted(scans.items(), reverse=True), "os", (1.0, 0.5), strict=True):
         k = [row[0] for row in rows]
@@ -43,10 +45,7 @@ def by_nodes(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -
         Line2D([], [], marker="o", mfc="none", mec=INK, linestyle="", markersize=8, label="planetoid lost")
     )
     axes.legend(handles=handles, loc="upper right")
-    return picture(
-        figure,
-        "sitnikov-nodes",
-        "Beyond the paper · how many nodes make the conservation practical",
+    return (
         f"HBVM(k,{DEGREE}) on Sitnikov's problem over [0, {T_END:g}]. The error falls by a constant "
         f"factor per node down to round-off; k = 2 is the Gauss method. {_enough(scans)}",
         "; ".join(
@@ -65,10 +64,9 @@ def _enough(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) ->
     return f"The first to keep the energy to 1e-13: {words}; the paper takes k = 18 with h = 0.5."
 
 
-@styled
-def by_step(rows: Sequence[StepRow]) -> Picture:
+@drawn("sitnikov-steps", "Beyond the paper · what the step costs", WIDTH, 3.7)
+def by_step(figure: Figure, rows: Sequence[StepRow]) -> Said:
     """Draw the sham rotation against h, and the time at which the planetoid is lost."""
-    figure = sheet(WIDTH, 3.7)
     left, right = figure.subplots(1, 2)
     for s, dash, marker in ((2, "-", "o"), (3, (0, (5, 2)), "s")):
         for family in ("gauss", "hbvm"):
@@ -106,10 +104,7 @@ def by_step(rows: Sequence[StepRow]) -> Picture:
     def rate(h: float) -> float:
         return next(r.turn for r in rows if (r.family, r.s, r.h) == ("hbvm", 2, h))
 
-    return picture(
-        figure,
-        "sitnikov-steps",
-        "Beyond the paper · what the step costs",
+    return (
         "Left: the rate at which the ellipses turn in the numerical solution. It is a property of the "
         "order, not of the energy: Gauss and HBVM turn alike. Right: how long the planetoid stays, h by "
         "h. Crosses: neither the fixed-point nor the Newton iteration found a solution of a step.",
@@ -118,10 +113,9 @@ def by_step(rows: Sequence[StepRow]) -> Picture:
     )
 
 
-@styled
-def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
+@drawn("sitnikov-truth", "Beyond the paper · against the true trajectory", WIDTH, 3.4)
+def truth_compared(figure: Figure, runs: Sequence[tuple[str, str, Array, Array]]) -> Said:
     """Draw |z - true z| over time for several runs: (label, family, t, error)."""
-    figure = sheet(WIDTH, 3.4)
     axes = figure.subplots()
     dashes = ["-", (0, (6, 2)), (0, (2, 1.6)), (0, (8, 2, 2, 2))]
     seen: dict[str, int] = {}
@@ -141,10 +135,7 @@ def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
     log_axis(axes, "y", -13, 1, most=7)
     axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − true z|")
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    return picture(
-        figure,
-        "sitnikov-truth",
-        "Beyond the paper · against the true trajectory",
+    return (
         "Conserving the energy is not accuracy: all HBVM runs here keep the energy to 1e-13. The error "
         "of the height at the times of the stored 128-bit reference.",
         "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
