@@ -46,11 +46,15 @@ def print_json(value: Any) -> None:
     print(json_of(value).decode(), end="")
 
 
+def empty(title: str) -> RichTable:
+    """Return a table without columns, in the style of all."""
+    return RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+
+
 def print_table(table: Table) -> None:
     """Print a table of text."""
-    made = RichTable(
-        title=Text(table.title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, caption=table.note
-    )
+    made = empty(table.title)
+    made.caption = table.note
     for index, head in enumerate(table.head):
         made.add_column(
             Text(head), justify="left" if index in table.words else "right", overflow="fold", min_width=6
@@ -107,7 +111,7 @@ def _results(
     lines = rows(records, sort)
     hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
-    made = RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = empty(title)
     made.add_column("#", justify="right", no_wrap=True)
     made.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:
