@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -50,7 +50,8 @@ LISTED = 12  # cases without a rank that are listed at once; more are folded awa
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 
 
-class Run(NamedTuple):
+@dataclass(frozen=True)
+class Run:
     """One of the runs that a report is made of: what was asked for, and the cases that have no result yet."""
 
     index: Index
@@ -62,7 +63,8 @@ class Run(NamedTuple):
         return self.index.campaign.title or self.index.campaign.name
 
 
-class Gathered(NamedTuple):
+@dataclass(frozen=True)
+class Gathered:
     """What the stores of one or more runs hold: the runs, and every case with its series."""
 
     runs: list[Run]

@@ -217,7 +217,9 @@ def _mapped(pid: int) -> int:
 def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
     runs = [_run(one) for one in _resolved(request)]
     (directory / COMPILED).touch()
-    return timing.time_together(runs, plan) if plan.interleaved else [timing.time_alone(*runs, plan)]
+    if plan.interleaved:
+        return timing.time_together(runs, plan)
+    return [timing.time_alone(run, plan) for run in runs]
 
 
 def _run(resolved: Resolved) -> Timeable:
