@@ -154,15 +154,17 @@ def _stored(problem: Problem) -> _Stored | None:
     if _made_here and (found := _made_here.get(_key(problem))) is not None:
         return found
     wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
-    places = (folder(), folder() / LONG) if (problem.name or "").isidentifier() else ()
-    paths = [path for place in places for path in sorted(place.glob(f"{problem.name}*.json"))]
-    fitting = [one for one in map(_read, paths) if (one.file.start, one.file.parameters) == wanted]
+    name = problem.name or ""
+    stored = _of_name(name) if name.isidentifier() else []
+    fitting = [one for one in stored if (one.file.start, one.file.parameters) == wanted]
     return next((one for one in fitting if end in one.file.t), fitting[0] if fitting else None)
 
 
 @lru_cache(maxsize=64)
-def _read(path: Path) -> _Stored:
-    return _Stored(read(path))
+def _of_name(name: str) -> list[_Stored]:
+    """Return the references that come with the package for problems of a name."""
+    places = (folder(), folder() / LONG)
+    return [_Stored(read(path)) for place in places for path in sorted(place.glob(f"{name}*.json"))]
 
 
 def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:

@@ -79,8 +79,8 @@ def _outcome(records: Sequence[Record]) -> Outcome:
             said.setdefault(reason_of(record), []).append(record.case.method)
     same = len({reason_of(record) for record in records}) == 1
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
-    best: State = next((state for state in SIGNS if state in states), "absent")
-    return Outcome(best, states.count("on"), len(states), reasons)
+    found: list[State] = [state for state in SIGNS if state in states]
+    return Outcome(found[0] if found else "absent", states.count("on"), len(states), reasons)
 
 
 def _state(record: Record) -> State:
