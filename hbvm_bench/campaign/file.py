@@ -19,7 +19,6 @@ from hbvm_bench.campaign.entries import (
     Limits,
     MethodEntry,
     ProblemEntry,
-    Role,
     Settings,
     TimingPlan,
 )
@@ -291,23 +290,3 @@ NESTED: dict[str, type[msgspec.Struct]] = {
     "ensembles": EnsembleEntry,
     "goals": Goal,
 }
-
-__all__ = [
-    "Campaign",
-    "Case",
-    "Checks",
-    "Ensemble",
-    "EnsembleEntry",
-    "Goal",
-    "Grid",
-    "Limits",
-    "MethodEntry",
-    "ProblemEntry",
-    "Role",
-    "Settings",
-    "TimingPlan",
-    "file_of",
-    "load",
-    "parse",
-    "shipped",
-]

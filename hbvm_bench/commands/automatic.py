@@ -86,6 +86,3 @@ def _general(context: typer.Context, names: list[str], limit: float) -> None:
     limits = replace(declared.limits, wall_seconds=limit)
     campaign = opened(chosen(replace(declared, limits=limits), names), GENERAL)
     show(campaign, carry_out(campaign, Path("runs") / GENERAL, as_typed(context)))
-
-
-__all__ = ["automatic"]

@@ -250,6 +250,3 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()
-
-
-__all__ = ["as_typed", "carry_out", "opened", "run", "show"]

@@ -71,6 +71,3 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             tell(f"the two agree to {found.provenance['agreement']}")
             made = True
     return made
-
-
-__all__ = ["make_missing"]
