@@ -56,28 +56,13 @@ class Run:
     sample: str | None
 
     @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        method: MethodBase,
-        program: Program | None = None,
-        *,
-        t_end: float | None = None,
-    ) -> "Run":
+    def of(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
         """Return the run of a method on a problem, which meets its end as the method's library does.
 
-        Parameters
-        ----------
-        problem, method
-            What to integrate, and how.
-        program : Program, optional
-            What ``method.compile(problem.system)`` returned; made anew by default.
-        t_end : float, optional
-            The problem's own by default.
+        ``program`` is what ``method.compile(problem.system)`` returned; it is made anew by default.
         """
         program = method.compile(problem.system) if program is None else program
-        end = problem.t_end if t_end is None else t_end
-        return cls(program, problem.y0, problem.par, problem.t0, end, method.to_end)
+        return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
 
     def seconds(
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter

@@ -19,11 +19,11 @@ SHORT = {
 """Every law in a few signs, by the keys of `hbvm_bench.measure.drift.LAWS`."""
 
 
-def counts(records: Sequence[Record], invariant: str = "energy") -> dict[str, Counter[str]]:
-    """Return for each family how many of its cases follow each law; ``"none"`` where none is clear."""
+def counts(records: Sequence[Record]) -> dict[str, Counter[str]]:
+    """Return for each family how many cases have which law of the energy; ``"none"`` where none is clear."""
     counted: dict[str, Counter[str]] = {}
     for record in records:
-        law = record.result.laws.get(invariant)
+        law = record.result.laws.get("energy")
         if law is not None and group_of(record) == "on":
             counted.setdefault(family_of(record), Counter())[law.law or "none"] += 1
     return counted

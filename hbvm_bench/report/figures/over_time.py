@@ -26,7 +26,7 @@ FINE_BINS = 120  # and in so many in the page's interactive figures
 COLUMNS = 4
 # Inches: the panels of all figures over time have one size and stand under each other.
 WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
-TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
+HEIGHT, TOP, BOTTOM, LEGEND_LINE = 1.75, 0.28, 0.52, 0.153
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,7 @@ def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
     return t[finite], np.abs(values[finite])
 
 
-def family_panels(
-    cases: Sequence[Drawn], label: str, *, height: float = 1.75
-) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
+def family_panels(cases: Sequence[Drawn], label: str) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
     """Return a figure with a panel per family, all of one size, with room for a legend under each.
 
     Parameters
@@ -146,21 +144,19 @@ def family_panels(
         Divided as `style.panels` does.
     label : str
         Of the vertical axes.
-    height : float
-        Of a panel, in inches.
     """
     by_id = {case.record.id: case for case in cases}
     groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
     rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
-    heights = [TOP + height + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
+    heights = [TOP + HEIGHT + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
     figure = new(WIDTH, sum(heights))
     panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
     made: list[tuple[Axes, list[Drawn]]] = []
     ceiling = sum(heights)
     for row, used in zip(rows, heights, strict=True):
         for column, (name, members) in enumerate(row):
-            x, y = LEFT + column * (panel + GAP), ceiling - TOP - height
-            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, height / sum(heights)))
+            x, y = LEFT + column * (panel + GAP), ceiling - TOP - HEIGHT
+            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, HEIGHT / sum(heights)))
             axes.set_title(name, color=INK)
             axes.text(1.0, -0.2, "time", transform=axes.transAxes, ha="right", fontsize=8, color=MUTED)
             axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
