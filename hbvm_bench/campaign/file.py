@@ -19,7 +19,6 @@ from hbvm_bench.campaign.entries import (
     Limits,
     MethodEntry,
     ProblemEntry,
-    Role,
     Settings,
     TimingPlan,
 )
@@ -70,10 +69,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )
 
-        if not self.ensembles and not (self.problems and self.methods):
-            missing = "methods" if self.problems else "problems"
-            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
-        if bool(self.problems) != bool(self.methods):
+        if bool(self.problems) != bool(self.methods) or not (self.problems or self.ensembles):
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
         known = {name_of(entry) for entry in self.entries()}
@@ -244,10 +240,6 @@ def load(name_or_path: str) -> Campaign:
     name_or_path : str
         The name of a shipped campaign, or the path of a TOML file.
 
-    Returns
-    -------
-    Campaign
-
     Raises
     ------
     problems.errors.InputError
@@ -298,23 +290,3 @@ NESTED: dict[str, type[msgspec.Struct]] = {
     "ensembles": EnsembleEntry,
     "goals": Goal,
 }
-
-__all__ = [
-    "Campaign",
-    "Case",
-    "Checks",
-    "Ensemble",
-    "EnsembleEntry",
-    "Goal",
-    "Grid",
-    "Limits",
-    "MethodEntry",
-    "ProblemEntry",
-    "Role",
-    "Settings",
-    "TimingPlan",
-    "file_of",
-    "load",
-    "parse",
-    "shipped",
-]

@@ -21,6 +21,7 @@ GENERAL = "general"
 
 
 def automatic(
+    context: typer.Context,
     problems: Annotated[list[str] | None, typer.Argument(help="Problems; all by default.")] = None,
     rounds: Annotated[int | None, typer.Option(help="Interleaved timing samples, against heyoka.")] = None,
     general: Annotated[
@@ -48,7 +49,7 @@ def automatic(
     if general and (avx2 or out is not None):
         raise InputError("--avx2 and --out do not go with --general; leave them out.")
     if general:
-        _general(problems or [], limit)
+        _general(context, problems or [], limit)
         return
     from hbvm_bench.studies.automatic import report
 
@@ -59,9 +60,7 @@ def automatic(
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     if out is not None:
         ensure_writable(out)
-    words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
-    command = as_typed([*words, *(["--avx2"] if avx2 else [])], out)
-    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
+    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), as_typed(context))
     run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))
     terminal.console().print(machine.sentence(run.machine), highlight=False)
@@ -80,19 +79,10 @@ def _publish(directory: Path) -> None:
     publish(report.document(found), directory)
 
 
-def _general(names: list[str], limit: float) -> None:
+def _general(context: typer.Context, names: list[str], limit: float) -> None:
     if not limit > 0.0:
         raise InputError(f"limit must be positive, not {limit}.")
     declared = load(GENERAL)
     limits = replace(declared.limits, wall_seconds=limit)
     campaign = opened(chosen(replace(declared, limits=limits), names), GENERAL)
-    words = [
-        "automatic",
-        "--general",
-        *names,
-        *([] if limits == declared.limits else ["--limit", f"{limit:g}"]),
-    ]
-    show(campaign, carry_out(campaign, Path("runs") / GENERAL, as_typed(words, None)))
-
-
-__all__ = ["automatic"]
+    show(campaign, carry_out(campaign, Path("runs") / GENERAL, as_typed(context)))

@@ -7,7 +7,7 @@ import numpy as np
 from hbvm_bench.campaign.file import Campaign, chosen
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.sweep import fill
-from hbvm_bench.reference import solutions, trusted
+from hbvm_bench.reference import solutions
 from hbvm_bench.store.store import Store
 from problems.errors import InputError, MissingLibraryError
 
@@ -56,6 +56,8 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             known = solutions.find(problem)
             if known is not None and known.t.size > 1 and np.isin(known.t, samples).all():
                 continue
+            from hbvm_bench.reference import trusted  # it brings numba, for the few campaigns that ask
+
             tell(f"computing a reference of {text} by two methods ...")
             try:
                 found = trusted.make(problem, at=trusted.some(problem, samples))
@@ -69,6 +71,3 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             tell(f"the two agree to {found.provenance['agreement']}")
             made = True
     return made
-
-
-__all__ = ["make_missing"]

@@ -11,8 +11,7 @@ import pytest
 
 from hbvm_bench.cli import main
 from hbvm_bench.commands.paper import PARTS
-from hbvm_bench.report.figures.canvas import new
-from hbvm_bench.report.figures.png import small
+from hbvm_bench.report.figures.canvas import new, small
 from hbvm_bench.studies.paper import others, report, results
 from hbvm_bench.studies.paper.departure import departure
 from hbvm_bench.studies.paper.drawn import number
