@@ -30,6 +30,10 @@ WIDE, THROUGH = 0, 1
 # it helps. Steps of varying length are long, and what they leave out is larger than that.
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
+PER_OCTAVE = 16
+RATIOS = np.append(0.5 + np.arange(PER_OCTAVE) / (2 * PER_OCTAVE), 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE)
+"""Steps of varying length are one of these times as long as the step before, for which there are tables."""
+
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 
 NAMES = (
@@ -248,6 +252,22 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
         "projection": packed(projection),
         **more,
     }
+
+
+def onward(constants: Constants) -> Array:
+    """Return the tables for first stages of a step of length 1, one for each of `RATIOS`."""
+    import integrators.legendre as legendre
+
+    a = constants.arrays
+    return joined(
+        [
+            packed(
+                a["matrix"] @ legendre.legendre(1.0 + ratio * a["nodes"].reshape(-1), constants.modes) @ a["into_modes"],
+                columns=constants.route, repeat=True,
+            )
+            for ratio in RATIOS
+        ]
+    )  # fmt: skip
 
 
 def fixed(constants: Constants) -> dict[str, Array]:

@@ -18,7 +18,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log, two_sum
-from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, set_step
+from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, nearest, set_step
 from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
@@ -35,7 +35,7 @@ from integrators.kernel.step.control import (
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
+from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
@@ -110,7 +110,7 @@ def iterate(ctx):
         if ctx.outcome == RUNNING:
             if strict <= TRUSTED:
                 polish(ctx, strict)
-            elif tries >= TRIAL and tries + (LOG_REST - change) / rate > most:
+            elif tries >= TRIAL and tries + (ctx.rest - change) / rate > most:
                 ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 ctx.rate = known
     return close(ctx)
@@ -267,7 +267,7 @@ def accepts(ctx, outcome, iterations, implicit):
             factor = 1.0
         elif implicit == 0 and ctx.strategy != FIXED_POINT:
             watch(ctx, factor)
-        ctx.length_after = h * factor
+        ctx.length_after = h * (factor if implicit else nearest(factor))
         return True
     if implicit:
         ctx.implicit_steps -= 1
