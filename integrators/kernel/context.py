@@ -196,7 +196,7 @@ class Context(Memory):
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
     tolerance = Real()
-    rest = Real()  # binary logarithm of what may be left of a change when the step is solved
+    log_rest = Real()  # binary logarithm of what may be left of a change when the step is solved
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
     made = Integer()  # samples

@@ -285,7 +285,7 @@ class HBVMProgram(Compiled):
             tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
-            made.rest = LOG_REST
+            made.log_rest = LOG_REST
             made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
@@ -370,7 +370,7 @@ class AdaptiveProgram(HBVMProgram):
             raw = tables.keep_moments(a["matrix"], a["matrix_low"], a["basis"])
             columns = c.route if c.route > 1 else None
             self._fixed["raw_matrix"] = tables.packed(raw, columns=columns, repeat=True)
-        self._onward = tables.onward(c) if c.route > 1 else aligned(0)
+        self._onward = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
         # P_s vanishes at the nodes of the rule with s nodes.
         self.degree = s if k > s else s - 1
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
@@ -412,7 +412,7 @@ class AdaptiveProgram(HBVMProgram):
         context = super()._context(side=True)  # with a matrix of its own
         context.point({"estimators": self._estimators, "extrapolation": self._onward})
         context.varying = 1
-        context.rest = LOG_REST_VARYING
+        context.log_rest = LOG_REST_VARYING
         context.error_degree = self.degree
         context.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None

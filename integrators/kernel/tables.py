@@ -31,8 +31,10 @@ WIDE, THROUGH = 0, 1
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
 PER_OCTAVE = 16
-RATIOS = np.append(0.5 + np.arange(PER_OCTAVE) / (2 * PER_OCTAVE), 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE)
-"""Steps of varying length are one of these times as long as the step before, for which there are tables."""
+_UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
+RATIOS = np.append(0.5 * _UP[:-1], _UP)
+"""Steps of varying length are so many times as long as the step before, where nothing else asks for more or
+less: there are tables for these ratios."""
 
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 
@@ -255,19 +257,14 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
 
 
 def onward(constants: Constants) -> Array:
-    """Return the tables for first stages of a step of length 1, one for each of `RATIOS`."""
+    """Return the tables for first stages where steps vary: for a step of 1, for all `RATIOS`."""
     import integrators.legendre as legendre
 
     a = constants.arrays
-    return joined(
-        [
-            packed(
-                a["matrix"] @ legendre.legendre(1.0 + ratio * a["nodes"].reshape(-1), constants.modes) @ a["into_modes"],
-                columns=constants.route, repeat=True,
-            )
-            for ratio in RATIOS
-        ]
-    )  # fmt: skip
+    nodes, modes, columns = a["nodes"].reshape(-1), constants.modes, constants.route
+    beyond = [legendre.legendre(1.0 + ratio * nodes, modes) for ratio in RATIOS]
+    matrices = [a["matrix"] @ there @ a["into_modes"] for there in beyond]
+    return joined([packed(matrix, columns=columns, repeat=True) for matrix in matrices])
 
 
 def fixed(constants: Constants) -> dict[str, Array]:

@@ -139,7 +139,10 @@ def start_elsewhere(ctx, source, first, ratio):
 
 @compiled
 def place(ratio):
-    """Return which of the `tables.RATIOS` is nearest to a ratio from 1/2 to 2."""
+    """Return which of the `tables.RATIOS` is nearest to a ratio from 1/2 to 2.
+
+    They are those that `binary_log` makes equidistant.
+    """
     return int(PER_OCTAVE * (binary_log(ratio) + 1.0) + 0.5)
 
 
@@ -151,16 +154,18 @@ def ratio_at(place):
 
 
 @compiled
-def nearest(ratio):
-    """Return the one of the `tables.RATIOS` that is nearest to a ratio; the ratio itself beyond them."""
-    return ratio_at(place(ratio)) if 0.5 <= ratio <= 2.0 else ratio
+def on_table(ctx, ratio):
+    """Return the nearest ratio of lengths that there is a table for; the ratio itself where there is none."""
+    return ratio_at(place(ratio)) if ctx.route > THROUGH and 0.5 <= ratio <= 2.0 else ratio
 
 
 @compiled
 def start_onward(ctx):
-    """First stages from the values of the previous step, if there is a table for the ratio of lengths."""
+    """First stages from the values of the step before by a table, if there is one; return whether."""
+    if ctx.length == 0.0 or ctx.rejected or ctx.route <= THROUGH:
+        return False
     ratio = ctx.h / ctx.length
-    if not (ctx.route > 1 and 0.5 <= ratio <= 2.0):
+    if not 0.5 <= ratio <= 2.0:
         return False
     found = place(ratio)
     if ctx.length * ratio_at(found) != ctx.h:
@@ -206,7 +211,7 @@ def begin(ctx):
         start_extrapolated(ctx)
         ctx.older_length = ctx.h
         ctx.values, ctx.older_values = ctx.older_values, ctx.values
-    elif ctx.length == 0.0 or ctx.rejected or not ctx.varying or not start_onward(ctx):
+    elif not (ctx.varying and start_onward(ctx)):
         ctx.older_length = 0.0
         predict(ctx, ctx, ctx.length, 0.0 if ctx.rejected else 1.0)
     ctx.age -= 1

@@ -65,7 +65,7 @@ def polish(ctx, change):
     The last evaluation is at the newest stages: the field's values have the error of the
     stages that they were taken at. What is left there acts on the energy in the same direction in every step.
     """
-    more = int((ctx.rest - binary_log(change)) / ctx.rate)
+    more = int((ctx.log_rest - binary_log(change)) / ctx.rate)
     sweep_to_the_end(ctx, min(max(more, 0), MOST_EXTRA))
     ctx.outcome = DONE
 

@@ -18,7 +18,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log, two_sum
-from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, nearest, set_step
+from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
@@ -110,7 +110,7 @@ def iterate(ctx):
         if ctx.outcome == RUNNING:
             if strict <= TRUSTED:
                 polish(ctx, strict)
-            elif tries >= TRIAL and tries + (ctx.rest - change) / rate > most:
+            elif tries >= TRIAL and tries + (ctx.log_rest - change) / rate > most:
                 ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 ctx.rate = known
     return close(ctx)
@@ -267,7 +267,7 @@ def accepts(ctx, outcome, iterations, implicit):
             factor = 1.0
         elif implicit == 0 and ctx.strategy != FIXED_POINT:
             watch(ctx, factor)
-        ctx.length_after = h * (factor if implicit else nearest(factor))
+        ctx.length_after = h * (factor if implicit else on_table(ctx, factor))
         return True
     if implicit:
         ctx.implicit_steps -= 1
