@@ -41,11 +41,11 @@ from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
-# Iterations to aim at, at most, in second-order form and in first-order form: with contractions (h w)^2
-# and h w, a unit of time costs least at h w = 1/e, which takes 18 and 36 to 1e-16. With 24 it costs a tenth
-# more; with 36 and a large J of one sign, rounding is multiplied like the terms of exp(-h J): an error of
-# 1e-14 in one step of a diffusion.
-BUSY, BUSY_FIRST = 18.0, 24.0
+# Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which takes
+# 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the terms of
+# exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame, with three
+# times the error; 36 err by 1e-14 in one step of a diffusion.
+BUSY = 18.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
 MOST_UNTESTED = 12
@@ -53,7 +53,7 @@ MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it loo
 FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
-# errors would allow so much longer ones. Its steps cost one or two of 24 sweeps through memory, and ten of
+# errors would allow so much longer ones. Its steps cost one or two of 18 sweeps through memory, and ten of
 # those of few rows or of the second-order form; the more rows, the more. Beyond MOST_ROWS they are too dear
 # to be tried where only low coefficients tell how much longer.
 HELD_BACK_STEPS = 8
@@ -93,7 +93,7 @@ def iterate(ctx):
         return settle(ctx)
     first, known = binary_log(ctx.last), ctx.rate
     rate = known
-    change, most = first, MOST * (BUSY if ctx.second else BUSY_FIRST)
+    change, most = first, MOST * BUSY
     while ctx.outcome == RUNNING:
         untested = min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED)
         strict = sweep_measured(ctx, max(untested, 0))
@@ -260,7 +260,7 @@ def accepts(ctx, outcome, iterations, implicit):
             ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
         limit = ctx.length_limit * APPROACH
         ctx.length_limit = limit
-        busy = ctx.busy_implicit if implicit else BUSY if ctx.second else BUSY_FIRST
+        busy = ctx.busy_implicit if implicit else BUSY
         factor = min(factor, max(busy / iterations, 0.5))
         factor = min(factor, limit / abs(h))
         if implicit and 1.0 < factor < STEADY:

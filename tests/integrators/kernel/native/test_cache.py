@@ -131,7 +131,8 @@ def test_tables_from_the_store_make_the_bits_of_those_just_made(tmp_path, monkey
     made = []
     for _ in range(2):
         tables.constants.cache_clear()
-        made.append(tables.scaled(tables.constants(10, 1, True, 16), 1.0, squared=True))
+        constants = tables.constants(10, 1, True, 16)
+        made.append(tables.scaled(constants, 1.0, squared=True) | tables.fixed(constants))
     tables.constants.cache_clear()
     for name, table in made[0].items():
         assert table.tobytes() == made[1][name].tobytes(), name
