@@ -30,7 +30,7 @@ WIDE, THROUGH = 0, 1
 # it helps. Steps of varying length are long, and what they leave out is larger than that.
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
-PER_OCTAVE = 16
+PER_OCTAVE = 32
 _UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
 RATIOS = np.append(0.5 * _UP[:-1], _UP)
 """Steps of varying length are so many times as long as the step before, where nothing else asks for more or

@@ -138,12 +138,9 @@ def start_elsewhere(ctx, source, first, ratio):
 
 
 @compiled
-def place(ratio):
-    """Return which of the `tables.RATIOS` is nearest to a ratio from 1/2 to 2.
-
-    They are those that `binary_log` makes equidistant.
-    """
-    return int(PER_OCTAVE * (binary_log(ratio) + 1.0) + 0.5)
+def octaves(ratio):
+    """Return how far above 1/2 a ratio is; the `tables.RATIOS` are those that this makes equidistant."""
+    return PER_OCTAVE * (binary_log(ratio) + 1.0)
 
 
 @compiled
@@ -155,8 +152,11 @@ def ratio_at(place):
 
 @compiled
 def on_table(ctx, ratio):
-    """Return the nearest ratio of lengths that there is a table for; the ratio itself where there is none."""
-    return ratio_at(place(ratio)) if ctx.route > THROUGH and 0.5 <= ratio <= 2.0 else ratio
+    """Return the next smaller ratio of lengths that there is a table for; the ratio itself without tables.
+
+    A larger one would make a third more of an error of order 29, and steps be rejected.
+    """
+    return ratio_at(int(octaves(ratio))) if ctx.route > THROUGH and 0.5 <= ratio <= 2.0 else ratio
 
 
 @compiled
@@ -167,7 +167,7 @@ def start_onward(ctx):
     ratio = ctx.h / ctx.length
     if not 0.5 <= ratio <= 2.0:
         return False
-    found = place(ratio)
+    found = int(octaves(ratio) + 0.5)
     if ctx.length * ratio_at(found) != ctx.h:
         return False
     product_for_one(ctx, ctx.extrapolation + 8 * ctx.matrix_size * found)

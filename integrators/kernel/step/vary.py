@@ -41,10 +41,10 @@ from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
-# Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which takes
-# 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the terms of
-# exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame, with three
-# times the error; 36 err by 1e-14 in one step of a diffusion.
+# Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which
+# takes 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the
+# terms of exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame,
+# with three times the error; 36 err by 1e-14 in one step of a diffusion.
 BUSY = 18.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
