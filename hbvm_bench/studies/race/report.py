@@ -82,7 +82,10 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
         [
             *map(Note, machine.sentences(race.machine for race in in_order)),
             *attempt(*top),
-            *(section(race, look) for race in races),
+            *(
+                section(race, look, nav)
+                for race, nav in zip(races, short([race.title for race in races]), strict=True)
+            ),
             Section(
                 "The rules",
                 [
@@ -116,8 +119,17 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
     )
 
 
-def section(race: Race, look: Mapping[str, Look]) -> Section:
-    """Return what the report says about one contest."""
+def short(titles: Sequence[str]) -> list[str]:
+    """Return as much of every title as tells it from the others: what is before its first or second comma."""
+    begun = [title.split(",")[0] for title in titles]
+    return [
+        one if begun.count(one) == 1 else ",".join(title.split(",")[:2])
+        for one, title in zip(begun, titles, strict=True)
+    ]
+
+
+def section(race: Race, look: Mapping[str, Look], nav: str) -> Section:
+    """Return what the report says about one contest, under a short name for the page's head."""
     title = race.title
     shown = (tables.fastest, tables.levels, tables.defaults, tables.compiling)
     return Section(
@@ -136,7 +148,7 @@ def section(race: Race, look: Mapping[str, Look]) -> Section:
         ],
         race.key,
         code=race.records[0].case.problem,
-        nav=title.split(",")[0],
+        nav=nav,
     )
 
 
