@@ -17,7 +17,15 @@ COEFFICIENTS = 8  # that a step is judged by; see `Context.estimators`
 
 
 class Control:
-    """Writes the end of a step, for a writer `w` of steps."""
+    """Writes the end of a step.
+
+    Judging and aiming follow `estimate`, `longer` and `accepts` there line by line, but for the last bits.
+
+    Parameters
+    ----------
+    w : Steps
+        Writes the step itself, of `integrators.kernel.ensemble.steps`.
+    """
 
     def __init__(self, w: Any):
         self.w, self.h = w, w.h.absolute()
@@ -28,9 +36,8 @@ class Control:
 
     def number(self, name: str) -> Value:
         """Return a number of the group in all lanes."""
-        return Value(
-            self.w.b, splat(self.w.b, self.w.b.load(self.w.word(Group.slots[name], DOUBLE)), self.w.lanes)
-        )
+        b = self.w.b
+        return Value(b, splat(b, b.load(self.w.word(Group.slots[name], DOUBLE)), self.w.lanes))
 
     def all(self, *conditions: Any) -> Any:
         """Return where all conditions hold."""
@@ -57,9 +64,9 @@ class Control:
         for first, blocks, width in w.form.groups:
             largest, steepest = (w.variable(w.kind, w.zero.value) for _ in range(2))
 
-            def measure(
-                block: Any, first: int = first, width: int = width, tops: Any = (largest, steepest)
-            ) -> None:
+            tops = largest, steepest
+
+            def measure(block: Any, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = w.at(block, width, first)
                 extent = slope = missing = unseen = w.zero
                 for i in range(width):
@@ -72,13 +79,9 @@ class Control:
                     extent, slope = extent.larger(changing + self.h * own), slope.larger(own)
                     missing = missing.larger(f[5].larger(self.number("error_decay") * f[4]))
                     unseen = unseen.larger(f[7].larger(self.number("defect_decay") * f[6]))
-                for value, rows in (
-                    (extent, w.size),
-                    (slope, w.moved),
-                    (missing, w.strict),
-                    (unseen, w.floored),
-                ):
-                    w.put(value, rows, start)
+                rows = w.size, w.moved, w.strict, w.floored
+                for value, room in zip((extent, slope, missing, unseen), rows, strict=True):
+                    w.put(value, room, start)
                 raise_to(tops[0], extent)
                 raise_to(tops[1], slope)
 

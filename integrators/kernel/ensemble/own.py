@@ -1,9 +1,10 @@
 """Trajectories in lanes, each with steps of its own length, and the next one where one has ended.
 
-Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`. Whether a
-step is good enough and how long the next one is follows, lane by lane, as it does for a single
-trajectory (`integrators.kernel.step.vary`): each lane has a `Context` of its own. A step does not pass
-the time of the next sample, but ends there.
+Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`, and most of them
+are judged and followed there too (`integrators.kernel.ensemble.control`). Elsewhere, whether a step is
+good enough and how long the next one is follows as it does for a single trajectory
+(`integrators.kernel.step.vary`): each lane has a `Context` of its own, which catches up then. A step does
+not pass the time of the next sample, but ends there.
 """
 
 from math import log
