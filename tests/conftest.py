@@ -14,6 +14,18 @@ settings.load_profile("ci" if os.environ.get("CI") else "home")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+# Begun first, so that at the end no core waits for one of them: a file is the work of one process.
+LONG = (
+    *("test_report_browser.py", "test_diffrax.py", "test_runner.py", "test_pages.py", "test_conformance.py"),
+    *("test_pages_browser.py", "test_scripts.py", "test_peer_check.py", "test_general.py"),
+)
+
+
+def pytest_collection_modifyitems(items):
+    """Sort the long files to the front."""
+    items.sort(key=lambda item: item.path.name not in LONG)
+
+
 def pytest_terminal_summary(terminalreporter):
     """Say loudly that nobody looked at the pages."""
     skipped = [one for one in terminalreporter.stats.get("skipped", []) if "no chromium" in str(one.longrepr)]

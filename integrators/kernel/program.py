@@ -131,7 +131,6 @@ class HBVMProgram(Compiled):
             system.n_par, block, group, self.constants,
         )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
-        self._scaled: dict[float, dict[str, Array]] = {}
         self._fresh: dict[bool, Context] = {}
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
         self.from_cache = all(made.from_cache for made in parts if made is not None)
@@ -267,10 +266,7 @@ class HBVMProgram(Compiled):
 
     def scaled(self, h: float) -> dict[str, Array]:
         """Return the tables for steps of h, which may be negative."""
-        if h not in self._scaled:
-            squared = self.second and self.shape.unit
-            self._scaled[h] = tables.scaled(self.constants, h, squared=squared)
-        return self._scaled[h]
+        return tables.scaled(self.constants, h, squared=self.second and self.shape.unit)
 
     def contexts(self) -> tuple[Context, Context]:
         """Return fresh memory for a trajectory, and for its partial steps."""
@@ -281,8 +277,7 @@ class HBVMProgram(Compiled):
 
     def _context(self, *, side: bool) -> Context:
         if side not in self._fresh:
-            scaled = self.scaled(self.h)
-            tables = {**self._fixed, **({"projection": scaled["projection"]} if side else scaled)}
+            tables = {**self._fixed, **({} if side else self.scaled(self.h))}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
             made.rate = FIRST_RATE
@@ -364,11 +359,7 @@ class AdaptiveProgram(HBVMProgram):
         self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps
         c = self.constants
         if c.route != tables.THROUGH:
-            # What rounding does to a row acts in every step; see `integrators.kernel.tables`.
-            a = c.arrays
-            raw = tables.keep_moments(a["matrix"], a["matrix_low"], a["basis"])
-            columns = c.route if c.route > 1 else None
-            self._fixed["raw_matrix"] = tables.packed(raw, columns=columns, repeat=True)
+            self._fixed["raw_matrix"] = tables.rounded(c)
         # P_s vanishes at the nodes of the rule with s nodes.
         self.degree = s if k > s else s - 1
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]

@@ -207,8 +207,9 @@ def unit(constants: Constants, velocity: Array) -> bool:
     return not constants.second or (constants.route > 1 and bool((velocity == 1.0).all()))
 
 
+@lru_cache(maxsize=32)  # they take milliseconds
 def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]:
-    """Return the tables for the step h, as `Context` has them.
+    """Return the tables for the step h, as `Context` has them; they are shared, not to be written to.
 
     Parameters
     ----------
@@ -224,15 +225,14 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
     high, low = times(a["matrix"], a["matrix_low"], h)
     if squared:
         high, low = times(high, low, h)
-    projection, modes = a["projection"], slice(MODES)
+    modes = slice(MODES)
     beyond = a["beyond"][:, modes]
     if constants.route == THROUGH:
         # What rounding takes from the first columns goes into columns of its own, before
         # the others, so that a chain of products holds it before it is rounded.
         first = constants.first
         matrix = np.hstack([low[:, :first], high])
-        extrapolation = high @ projection @ beyond
-        projection = np.vstack([projection[:first], projection])
+        extrapolation = high @ a["projection"] @ beyond
     else:
         matrix = keep_moments(high, low, a["basis"])
         extrapolation = high @ beyond @ a["into_modes"][modes]
@@ -245,20 +245,33 @@ def scaled(constants: Constants, h: float, *, squared: bool) -> dict[str, Array]
     return {
         "matrix": packed(matrix, columns=columns, repeat=True),
         "extrapolation": packed(extrapolation, columns=columns, repeat=True),
-        "projection": packed(projection),
         **more,
     }
+
+
+@lru_cache(maxsize=32)
+def rounded(constants: Constants) -> Array:
+    """Return the matrix for a step of 1 with the moments of its rows kept, as `Context` has it.
+
+    What rounding does to a row acts in every step of varying length. Not on the route THROUGH.
+    """
+    a = constants.arrays
+    columns = constants.route if constants.route > 1 else None
+    kept = keep_moments(a["matrix"], a["matrix_low"], a["basis"])
+    return packed(kept, columns=columns, repeat=True)
 
 
 def fixed(constants: Constants) -> dict[str, Array]:
     """Return the tables that do not depend on the step, as `Context` has them."""
     a = constants.arrays
     columns = constants.route if constants.route > 1 else None
-    raw = a["matrix"]
+    raw, projection = a["matrix"], a["projection"]
     if constants.route == THROUGH:
         raw = np.hstack([np.zeros((constants.k, constants.first)), raw])
+        projection = np.vstack([projection[: constants.first], projection])
     return {
         "raw_matrix": packed(raw, columns=columns, repeat=True),
+        "projection": packed(projection),
         "mode_projection": packed(a["into_modes"]),
         "nodes": _vector(a["nodes"], repeat=True),
         "nodes_low": _vector(a["nodes_low"], repeat=True),

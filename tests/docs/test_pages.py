@@ -10,6 +10,7 @@ import pytest
 from tests.docs import pages
 
 EXECUTED = [path for path in pages.sources() if pages.cells(path)]
+SLOW = ("own_campaign.md", "hosts.md")  # a study run whole; the plugins compile for long
 TUTORIALS = pages.listed(pages.DOCS / "tutorials" / "index.md")
 PEERS = ("heyoka", "rebound", "diffrax", "jax")
 
@@ -46,7 +47,11 @@ def test_every_picture_is_described_in_words(page):
     assert page.read_text(encoding="utf-8").count("\n    alt: ") == drawn
 
 
-@pytest.mark.parametrize("page", EXECUTED, ids=_name)
+@pytest.mark.parametrize(
+    "page",
+    [pytest.param(page, marks=[pytest.mark.slow] if page.name in SLOW else []) for page in EXECUTED],
+    ids=map(_name, EXECUTED),
+)
 def test_the_cells_of_a_page_run(page, monkeypatch, tmp_path):
     monkeypatch.setattr(plt, "show", lambda: plt.close("all"))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))

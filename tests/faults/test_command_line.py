@@ -103,6 +103,10 @@ run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): h=-1 
 run -p "kepler()" -m "sys.exit()"                          | cannot read 'sys.exit()': the name must be one
 run -p "expression(H='p^2/2 +')" -m "IAS15()"              | cannot read the formula 'p^2/2 +': this is not
 run -p "expression(H='q^10000000000')" -m "HBVM(k=4,s=2,h=0.1)" | cannot read the formula 'q^10000000000':
+run -p "kepler()"                                          | -m
+run -m "IAS15()"                                           | -p
+run -p "kepler(ee=0.6)" -m "IAS15()"                       | did you mean 'e'
+run -p "kepler()" -m "HBVM(k=2,s=3,h=0.1)"                 | k=2
 show                                                       | Missing argument 'directory'
 show nowhere                                               | the directory 'nowhere' does not exist; make
 show .                                                     | the directory '.' has no results; make some

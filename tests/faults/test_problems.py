@@ -76,6 +76,7 @@ load('sine_gordon', gamma=1e-320)                            | p0 must be finite
 load('sine_gordon', length=-1)                               | length=-1 of sine_gordon must be a positive
 load('sine_gordon', length=1e-320)                           | parameter 'stiffness' is inf; give one finite
 load('nonlinear_wave', n=10**9)                              | HBVM_BENCH_MAX_COMPONENTS
+load('nonlinear_wave', n=2)                                  | n=2 of nonlinear_wave
 load('nonlinear_wave', mass='a')                             | mass='a' of nonlinear_wave must be a finite
 load('nonlinear_wave', kappa=nan)                            | kappa=nan of nonlinear_wave must be a finite
 load('nonlinear_wave', amplitude=huge)                       | amplitude=about 1e400 of nonlinear_wave must
@@ -141,6 +142,7 @@ load('figure_eight', t_end='a')                              | t_end='a' of figu
 load('figure_eight', t_end=0)                                | t_end=0 must differ from t0=0.0
 load('pythagorean', t_end=nan)                               | t_end=nan of pythagorean must be a finite
 load('outer_solar_system', unit='month')                     | unknown unit of outer_solar_system 'month';
+load('outer_solar_system', unit='days')                      | did you mean 'day'
 load('outer_solar_system', unit=3)                           | unknown unit of outer_solar_system 3; known:
 load('outer_solar_system', frame='sun')                      | unknown frame of outer_solar_system 'sun';
 load('outer_solar_system', frame=None)                       | unknown frame of outer_solar_system None;

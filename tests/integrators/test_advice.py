@@ -50,7 +50,7 @@ def test_chaos_is_told() -> None:
 
 
 def test_out_of_reach_is_told() -> None:
-    advice = advise(_orbits(0.5, 1000), 1e-15)
+    advice = advise(_orbits(0.5, 200), 1e-15)
     assert not advice.reached
     assert len(advice.proposals) == 1
     assert "out of reach" in advice.why

@@ -1,6 +1,6 @@
-"""Systems of every shape, and a folder of generated code of the tests' own."""
+"""Systems of every shape."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,13 +10,6 @@ import pytest
 import problems
 from problems import Hamiltonian, System, VectorField
 from problems.catalogue import sitnikov
-
-
-@pytest.fixture(scope="session", autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("HBVM_BENCH_CACHE", str(tmp_path_factory.mktemp("generated")))
-        yield
 
 
 @dataclass(frozen=True)

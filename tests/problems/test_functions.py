@@ -126,12 +126,12 @@ class TestEveryEngine:
 
     def test_in_a_declared_sum(self, name):
         formula, plain = FORMULAS[name]
-        system = Hamiltonian(lambda q, m: m.sum(lambda i: formula(q[i], q[i + 1], m), range(40)), dof=41)
-        y = np.random.default_rng(3).uniform(-0.95, 0.95, 82)
+        system = Hamiltonian(lambda q, m: m.sum(lambda i: formula(q[i], q[i + 1], m), range(200)), dof=201)
+        y = np.random.default_rng(3).uniform(-0.95, 0.95, 402)
         assert emit.numpy(system, "hamiltonian")(0.0, y, np.empty(0))[0] == pytest.approx(
-            plain(y[:40], y[1:41]).sum(), rel=1e-13
+            plain(y[:200], y[1:201]).sum(), rel=1e-13
         )
-        out, wanted = np.empty(82), emit.numpy(system, "field")(0.0, y, np.empty(0))
+        out, wanted = np.empty(402), emit.numpy(system, "field")(0.0, y, np.empty(0))
         emit.numba(system, "field")(0.0, y, np.empty(0), out)
         assert np.abs(out - wanted).max() < 1e-14 * np.abs(wanted).max()
 

@@ -21,7 +21,7 @@ def test_every_shipped_campaign_resolves():
         assert len({case.id for case in cases}) == len(cases) > 0
 
 
-def test_the_sitnikov_campaign_has_every_family_the_issue_names():
+def test_the_sitnikov_campaign_has_every_family():
     names = {parse_spec(entry.use).name for entry in campaign.load("sitnikov").methods}
     assert names == {
         *("HBVM", "Gauss", "Taylor", "IAS15", "WHFast", "Leapfrog"),
@@ -41,18 +41,10 @@ def test_every_step_of_the_sitnikov_campaign_divides_its_grid():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x = [", "not valid TOML"),
         (GOOD.replace("name", "nme") + METHOD, "did you mean 'name'"),
         (GOOD + METHOD.replace("use", "uze"), "did you mean 'use'"),
         (GOOD + METHOD + 'settings = "recomended"\n', "did you mean 'recommended'"),
         (GOOD + "grid = {stepp = 1}" + METHOD, "did you mean 'step'"),
-        (GOOD + "grid = {step = 0.0}" + METHOD, "grid.step"),
-        (GOOD + "grid = {step = 1.0, count = 3}" + METHOD, "not both"),
-        (GOOD + "limits = {wall_seconds = -1}" + METHOD, "limits.wall_seconds"),
-        (GOOD.replace('"x"', '"../x"') + METHOD, "file name"),
-        (GOOD, "methods"),
-        ('name = "x"\nproblems = []\n' + METHOD, "problems"),
-        ("grid = 3\n" + GOOD + METHOD, "grid"),
     ],
 )
 def test_a_wrong_campaign_is_one_sentence(text, message):

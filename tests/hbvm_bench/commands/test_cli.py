@@ -1,4 +1,4 @@
-"""Every way to misuse the command line: one sentence, exit code 2, nothing half-written."""
+"""What the command line prints, keeps and repeats; how it is misused: `tests/faults`."""
 
 import json
 import os
@@ -31,55 +31,6 @@ def fails(capsys, *arguments, says):
     assert printed.err.count("\n") == 1
     for words in says if isinstance(says, tuple) else (says,):
         assert words in printed.err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["run"], "-p"),
-        (["run", "sitnikof"], ("sitnikof", "did you mean 'sitnikov'")),
-        (["run", "missing.toml"], "missing.toml"),
-        (["run", "sitnikov", "-m", "IAS15()"], "not both"),
-        (["run", "-p", "sitnikov()"], "-m"),
-        (["run", "-m", "IAS15()"], "-p"),
-        (["run", "-p", "sitnikof()", "-m", "IAS15()"], "did you mean 'sitnikov'"),
-        (["run", "-p", "sitnikov(ee=0.6)", "-m", "IAS15()"], ("'ee'", "did you mean 'e'")),
-        (["run", "-p", "sitnikov(e=1.5)", "-m", "IAS15()"], "1.5"),
-        (["run", "-p", "sitnikov(z3=1e999)", "-m", "IAS15()"], "too large"),
-        (["run", "-p", "sitnikov(", "-m", "IAS15()"], "column"),
-        (["run", "-p", "sitnikov()", "-m", "IAS51()"], "did you mean 'IAS15'"),
-        (["run", "-p", "sitnikov()", "-m", "IAS15(epsilom=1)"], "did you mean 'epsilon'"),
-        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=3, h=0.1)"], "k"),
-        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=0, h=0.1)"], "s"),
-        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=2, h=0)"], "h"),
-        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2, s=2, h=-0.1)"], "-0.1"),
-        (["run", "-p", "sitnikov()", "-m", "HBVM(k=2)"], "needs"),
-        (["run", "-p", "sitnikov()", "-m", "IAS15()", "-m", "IAS15"], "twice"),
-        (["run", "-p", "sitnikov()", "-m", "IAS15()", "--step", "-1"], "--step"),
-        (["run", "-p", "sitnikov()", "-m", "IAS15()", "--step", "nan"], "--step"),
-        (["run", "sitnikov", "--jobs", "0"], "jobs"),
-        (["run", "sitnikov", "--job", "1"], "--job"),
-        (["run", "sitnikov", "extra"], "extra"),
-        (["rum"], "rum"),
-        (["list", "metods"], "did you mean 'methods'"),
-        (["report", "nowhere"], ("nowhere", "does not exist")),
-        (["report", "."], "has no results"),
-        (["show", "nowhere"], "does not exist"),
-        (["show", "."], "has no results"),
-        (["show", ".", "--metric", "energi"], "did you mean 'energy"),
-        (["show", ".", "--sort", "stepz"], "did you mean 'steps'"),
-        (["cite", "IAS51"], "did you mean 'IAS15'"),
-        (["reference", "sitnikof()"], "did you mean 'sitnikov'"),
-        (["run", "sitnikov", "--out", "file/below"], "file/below"),
-        (["run", "sitnikov", "--report", "file/below"], "file/below"),
-        (["run", "sitnikov", "--out", "/proc/nothing"], "/proc/nothing"),
-    ],
-)
-def test_a_mistake_is_one_sentence_and_exit_code_2(here, capsys, arguments, says):
-    (here / "file").write_text("x")
-    fails(capsys, *arguments, says=says)
-    left = [path for path in here.rglob("*") if path.is_file()]
-    assert left == [here / "file"]
 
 
 def test_a_directory_of_files_that_are_no_run_is_refused(here, capsys):

@@ -1,3 +1,4 @@
+import functools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from problems.errors import InputError
 T = np.unique(np.rint(np.geomspace(10, 1e6, 120)))
 
 
+@functools.cache
 def walks(seed, starts=8, every=10.0):
     """Return random walks of unit steps, looked at the times `T`."""
     steps = np.random.default_rng(seed).standard_normal((starts, int(T[-1] / every)))

@@ -6,7 +6,6 @@ import pytest
 
 pytest.importorskip("playwright.sync_api")
 
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
 from hbvm_bench.report.document import Claim, Claims, Document, Section
@@ -20,7 +19,7 @@ from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench.studies import test_endure
 from tests.hbvm_bench.studies.race.conftest import made_up as made_up_race
 
-from .test_report_browser import CHROMIUM, browser, opened, wait_for_change
+from .test_report_browser import CHROMIUM, browser, opened, serious, too_wide, wait_for_change
 
 __all__ = ["browser"]  # a fixture
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium on this machine")
@@ -42,7 +41,7 @@ def made_up_document():
 
 
 @pytest.fixture(scope="module", params=["race", "endure", "paper"])
-def folder(request, tmp_path_factory):
+def folder(request, tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
         made = race.document([made_up_race()])
@@ -54,30 +53,44 @@ def folder(request, tmp_path_factory):
     return target
 
 
-def test_figures_are_explored_saved_and_read_as_a_table(browser, folder):
+@pytest.fixture(scope="module")
+def page(browser, folder):
+    with opened(browser, folder, reduced_motion="reduce", bypass_csp=True) as page:
+        yield page
+
+
+def test_no_page_is_wider_than_its_window(page):
+    assert too_wide(page) == []
+
+
+def test_figures_are_explored_saved_and_read_as_a_table(page, folder):
     assert (folder / "index.html").stat().st_size <= 3_000_000
-    with opened(browser, folder, accept_downloads=True) as page:
-        figure = page.locator("figure[data-plot]").first
-        figure.locator("details.numbers summary").click()
-        expect(figure.locator("details.numbers tbody tr")).not_to_have_count(0)
-        figure.locator("[data-view=explore]").click()
-        expect(figure.locator(".area[data-drawn]")).to_be_visible()
-        curves = figure.locator(".scatterlayer .trace")
-        full = curves.count()
-        figure.locator("input[data-case]").first.uncheck()
-        expect(curves).not_to_have_count(full)
-        for ending, start in (("svg", b"<svg"), ("png", b"\x89PNG"), ("numbers", b"panel,case,name")):
-            with page.expect_download() as saved:
-                figure.locator(f"[data-save={ending}]").click()
-            assert saved.value.path().read_bytes().startswith(start)
+    figure = page.locator("figure[data-plot]").first
+    figure.locator("details.numbers summary").click()
+    expect(figure.locator("details.numbers tbody tr")).not_to_have_count(0)
+    figure.locator("[data-view=explore]").click()
+    expect(figure.locator(".area[data-drawn]")).to_be_visible()
+    curves = figure.locator(".scatterlayer .trace")
+    full = curves.count()
+    figure.locator("input[data-case]").first.uncheck()
+    expect(curves).not_to_have_count(full)
+    for ending, start in (("svg", b"<svg"), ("png", b"\x89PNG"), ("numbers", b"panel,case,name")):
+        with page.expect_download() as saved:
+            figure.locator(f"[data-save={ending}]").click()
+        assert saved.value.path().read_bytes().startswith(start)
 
 
-def test_the_theme_changes(browser, folder):
-    with opened(browser, folder) as page:
-        ground = "getComputedStyle(document.body).backgroundColor"
-        before = page.evaluate(ground)
-        page.click("#theme")
-        wait_for_change(page, ground, before)
+def test_nothing_serious_is_found_by_axe(page):
+    page.locator("figure[data-plot] [data-view=explore]").first.click()
+    expect(page.locator(".area[data-drawn]").first).to_be_visible()
+    assert serious(page) == []
+
+
+def test_the_theme_changes(page):
+    ground = "getComputedStyle(document.body).backgroundColor"
+    before = page.evaluate(ground)
+    page.click("#theme")
+    wait_for_change(page, ground, before)
 
 
 def test_the_files_that_the_page_names_are_there(folder):
@@ -85,19 +98,3 @@ def test_the_files_that_the_page_names_are_there(folder):
     named = set(re.findall(r'href="((?:figures|data)/[^"]+)"', text))
     assert len(named) >= 3
     assert [name for name in named if not (folder / name).is_file()] == []
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_serious_is_found_by_axe(browser, folder, scheme):
-    with opened(browser, folder, color_scheme=scheme, reduced_motion="reduce", bypass_csp=True) as page:
-        page.locator("figure[data-plot] [data-view=explore]").first.click()
-        expect(page.locator(".area[data-drawn]").first).to_be_visible()
-        found = Axe().run(page).response["violations"]
-        serious = [v for v in found if v["impact"] in ("serious", "critical")]
-        assert [(v["id"], v["nodes"][0]["html"][:200]) for v in serious] == []
-
-
-@pytest.mark.parametrize("width", [360, 1280, 1920])
-def test_no_page_is_wider_than_its_window(browser, folder, width):
-    with opened(browser, folder, viewport={"width": width, "height": 800}) as page:
-        assert page.evaluate("document.documentElement.scrollWidth") <= width

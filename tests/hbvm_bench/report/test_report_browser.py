@@ -27,14 +27,14 @@ PATIENCE = 30_000  # milliseconds, on a machine with other work
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp("report")
     write(document(made_up_run.sitnikov(Store(tmp_path_factory.mktemp("run")))), target)
     return target
 
 
 @pytest.fixture(scope="module")
-def large(tmp_path_factory):
+def large(tmp_path_factory, no_images):
     target = tmp_path_factory.mktemp("large")
     texts = [f"pendulum(p={1 + number / 10})" for number in range(2)]
     write(document(made_up_run.write(Store(tmp_path_factory.mktemp("run")), texts, 200, missing=3)), target)
@@ -51,13 +51,14 @@ def browser():
 
 @contextmanager
 def opened(browser, folder, **options) -> Iterator[Page]:
-    """Open a report; what it logs as an error or asks of anybody fails the test."""
+    """Open a report; what it logs as an error, says in a window or asks of anybody fails the test."""
     context = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options})
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
     said: list[str] = []
     page.on("console", lambda message: said.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("dialog", lambda dialog: said.append(dialog.message))
     page.on("request", lambda request: said.append(f"asked for {request.url[:80]}"))
     url = (folder / "index.html").as_uri()
     page.goto(url)
@@ -69,16 +70,15 @@ def opened(browser, folder, **options) -> Iterator[Page]:
     context.close()
 
 
+@pytest.fixture(scope="module")
+def page(browser, folder):
+    """Open the report once for the tests that each set what they look at: a page takes seconds to load."""
+    with opened(browser, folder, reduced_motion="reduce") as page:
+        yield page
+
+
 def visible_rows(page):
     return page.locator("table.results tbody tr:not(.group):visible")
-
-
-def test_the_page_is_small_and_the_plots_come_behind_it(browser, folder, large):
-    assert (folder / "index.html").stat().st_size <= 3_000_000
-    assert (large / "index.html").stat().st_size <= 5_000_000
-    with opened(browser, folder) as page:
-        expect(page.locator("#energy .picture svg")).to_be_attached()
-        page.wait_for_selector("html[data-plots=ready]", state="attached")
 
 
 def wait_for_change(page, expression, before):
@@ -86,70 +86,115 @@ def wait_for_change(page, expression, before):
     page.wait_for_function(f"before => ({expression}) !== before", arg=before)
 
 
-def test_hostile_names_do_nothing_in_a_browser(browser, folder):
-    with opened(browser, folder) as page:
-        said: list[str] = []
-        page.on("dialog", lambda dialog: said.append(dialog.message))
-        page.click("#energy [data-view=explore]")
-        page.wait_for_selector("#energy .area[data-drawn]")
-        assert said == []
-        assert page.locator("script").count() == 4  # with the plotting library, unpacked
+def too_wide(page):
+    """Return the windows that the page does not fit."""
+    found = []
+    for width in (360, 1280, 1920):
+        page.set_viewport_size({"width": width, "height": 800})
+        if page.evaluate("document.documentElement.scrollWidth") > width:
+            found.append(width)
+    page.set_viewport_size({"width": 1280, "height": 900})
+    return found
 
 
-def test_sorting_and_filtering(browser, folder):
-    with opened(browser, folder) as page:
-        assert visible_rows(page).count() == len(made_up_run.METHODS)
-        page.get_by_role("button", name="energy", exact=True).click()
-        head = page.locator("table.results th[aria-sort]")
-        assert head.get_attribute("aria-sort") == "ascending"
-        first = page.locator("tbody[data-group=on] tr:not(.group) td:nth-child(3)")
-        up = [float(text.split()[0]) for text in first.all_inner_texts()]
-        assert up == sorted(up)
-        head.get_by_role("button").click()
-        assert head.get_attribute("aria-sort") == "descending"
-        down = [float(text.split()[0]) for text in first.all_inner_texts()]
-        assert down == sorted(up, reverse=True)
-
-        page.fill("[name=words]", "hbvm k=18")
-        expect(page.locator("#filter output")).to_have_text(f"1 of {len(made_up_run.METHODS)} cases")
-        page.get_by_role("button", name="Clear").click()
-        expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS))
-        page.uncheck("[name=group][value=ended]")
-        expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS) - 1)
-        page.select_option("[name=library]", "scipy")
-        expect(visible_rows(page)).to_have_count(1)
+def serious(page):
+    """Return what axe finds in the light and in the dark."""
+    found = []
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+        found += [
+            one for one in Axe().run(page).response["violations"] if one["impact"] in ("serious", "critical")
+        ]
+    return [(one["id"], one["nodes"][0]["html"][:200]) for one in found]
 
 
-def test_the_theme_changes_pages_and_plots(browser, folder):
-    with opened(browser, folder) as page:
-        page.click("#energy [data-view=explore]")
-        page.wait_for_selector("#energy .area[data-drawn]")
-        ink = "document.querySelector('#energy .xtitle').style.fill"
-        ground = "getComputedStyle(document.body).backgroundColor"
-        before = page.evaluate(ground), page.evaluate(ink)
-        page.click("#theme")
-        wait_for_change(page, ground, before[0])
-        wait_for_change(page, ink, before[1])
+def explore_energy(page):
+    page.click("#energy [data-view=explore]")
+    page.wait_for_selector("#energy .area[data-drawn]")
 
 
-def test_cases_are_switched_off_and_the_numbers_are_in_a_table(browser, folder):
-    with opened(browser, folder) as page:
-        page.click("#energy [data-view=explore]")
-        page.wait_for_selector("#energy .area[data-drawn]")
-        curves = page.locator("#energy .scatterlayer .trace")
-        full = curves.count()
-        page.locator("#energy input[data-case]").first.uncheck()
-        expect(curves).to_have_count(full - 1)
-        page.locator("#energy").get_by_role("button", name="None").click()
-        expect(curves).to_have_count(0)
-        page.locator("#energy").get_by_role("button", name="All").click()
-        expect(curves).to_have_count(full)
-        page.locator("#energy details.numbers summary").click()
-        # The table is made when `toggle` arrives, a task after the click.
-        expect(page.locator("#energy details.numbers tbody tr")).to_have_count(len(made_up_run.METHODS))
-        page.click("#energy [data-view=picture]")
-        expect(page.locator("#energy .picture")).to_be_visible()
-        expect(page.locator("#energy .plot")).to_be_hidden()
+def test_the_page_is_small_and_no_wider_than_its_window_and_the_plots_come_behind_it(page, folder, large):
+    assert (folder / "index.html").stat().st_size <= 3_000_000
+    assert (large / "index.html").stat().st_size <= 5_000_000
+    assert too_wide(page) == []
+    expect(page.locator("#energy .picture svg")).to_be_attached()
+    page.wait_for_selector("html[data-plots=ready]", state="attached")
+
+
+def test_nothing_moves_where_motion_is_unwelcome(page):
+    page.locator("#motion").scroll_into_view_if_needed()
+    page.wait_for_timeout(300)
+    expect(page.locator("#motion .picture")).to_be_visible()
+    expect(page.locator("#motion .moving")).to_be_hidden()
+    page.click("#motion [data-view=move]")
+    expect(page.locator("#motion .play")).to_have_text("Play")
+
+
+def test_hostile_names_do_nothing_in_a_browser(page):
+    explore_energy(page)
+    assert page.locator("script").count() == 4  # with the plotting library, unpacked
+
+
+def test_sorting_and_filtering(page):
+    assert visible_rows(page).count() == len(made_up_run.METHODS)
+    page.get_by_role("button", name="energy", exact=True).click()
+    head = page.locator("table.results th[aria-sort]")
+    assert head.get_attribute("aria-sort") == "ascending"
+    first = page.locator("tbody[data-group=on] tr:not(.group) td:nth-child(3)")
+    up = [float(text.split()[0]) for text in first.all_inner_texts()]
+    assert up == sorted(up)
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "descending"
+    down = [float(text.split()[0]) for text in first.all_inner_texts()]
+    assert down == sorted(up, reverse=True)
+
+    page.fill("[name=words]", "hbvm k=18")
+    expect(page.locator("#filter output")).to_have_text(f"1 of {len(made_up_run.METHODS)} cases")
+    page.get_by_role("button", name="Clear").click()
+    expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS))
+    page.uncheck("[name=group][value=ended]")
+    expect(visible_rows(page)).to_have_count(len(made_up_run.METHODS) - 1)
+    page.select_option("[name=library]", "scipy")
+    expect(visible_rows(page)).to_have_count(1)
+    page.get_by_role("button", name="Clear").click()
+
+
+def test_the_results_fit_a_laptop_and_the_lesser_columns_come_on_demand(page):
+    lesser = page.locator("table.results .minor:visible")
+    expect(lesser).to_have_count(0)
+    assert page.locator(".scroll.table").evaluate("e => e.scrollWidth - e.clientWidth") == 0
+    page.check("[name=all]")
+    expect(lesser).not_to_have_count(0)
+    page.get_by_role("button", name="Clear").click()
+    expect(lesser).to_have_count(0)
+
+
+def test_the_theme_changes_pages_and_plots(page):
+    explore_energy(page)
+    ink = "document.querySelector('#energy .xtitle').style.fill"
+    ground = "getComputedStyle(document.body).backgroundColor"
+    before = page.evaluate(ground), page.evaluate(ink)
+    page.click("#theme")
+    wait_for_change(page, ground, before[0])
+    wait_for_change(page, ink, before[1])
+
+
+def test_cases_are_switched_off_and_the_numbers_are_in_a_table(page):
+    explore_energy(page)
+    curves = page.locator("#energy .scatterlayer .trace")
+    full = curves.count()
+    page.locator("#energy input[data-case]").first.uncheck()
+    expect(curves).to_have_count(full - 1)
+    page.locator("#energy").get_by_role("button", name="None").click()
+    expect(curves).to_have_count(0)
+    page.locator("#energy").get_by_role("button", name="All").click()
+    expect(curves).to_have_count(full)
+    page.locator("#energy details.numbers summary").click()
+    # The table is made when `toggle` arrives, a task after the click.
+    expect(page.locator("#energy details.numbers tbody tr")).to_have_count(len(made_up_run.METHODS))
+    page.click("#energy [data-view=picture]")
+    expect(page.locator("#energy .picture")).to_be_visible()
+    expect(page.locator("#energy .plot")).to_be_hidden()
 
 
 def points(text):
@@ -157,22 +202,22 @@ def points(text):
     return [[*row[:4], *(float(cell) if cell else None for cell in row[4:])] for row in rows[1:]]
 
 
-def test_everything_is_saved_from_the_page_itself(browser, folder):
-    with opened(browser, folder) as page:
+def test_everything_is_saved_from_the_page_itself(page, folder):
+    page.click("#energy [data-view=picture]")
 
-        def saved(selector):
-            with page.expect_download() as download:
-                page.locator(selector).click()
-            return download.value.path().read_bytes()
+    def saved(selector):
+        with page.expect_download() as download:
+            page.locator(selector).click()
+        return download.value.path().read_bytes()
 
-        assert b"var(" not in (svg := saved("#energy [data-save=svg]"))
-        assert svg.startswith(b"<svg")
-        assert saved("#energy [data-save=png]").startswith(b"\x89PNG")
-        assert saved("[data-save=csv]") == (folder / "data" / "results.csv").read_bytes()
-        assert b'"cases"' in saved("[data-save=json]")
-        here = points(saved("#energy [data-save=numbers]").decode())
-        beside = points((folder / "data" / "energy.csv").read_text(encoding="utf-8"))
-        assert here == beside
+    assert b"var(" not in (svg := saved("#energy [data-save=svg]"))
+    assert svg.startswith(b"<svg")
+    assert saved("#energy [data-save=png]").startswith(b"\x89PNG")
+    assert saved("[data-save=csv]") == (folder / "data" / "results.csv").read_bytes()
+    assert b'"cases"' in saved("[data-save=json]")
+    here = points(saved("#energy [data-save=numbers]").decode())
+    beside = points((folder / "data" / "energy.csv").read_text(encoding="utf-8"))
+    assert here == beside
 
 
 def test_the_system_moves_pauses_and_goes_where_it_is_told(browser, folder):
@@ -198,77 +243,40 @@ def test_the_system_moves_pauses_and_goes_where_it_is_told(browser, folder):
         wait_for_change(page, picture, turned)
 
 
-def test_nothing_moves_where_motion_is_unwelcome(browser, folder):
-    with opened(browser, folder, reduced_motion="reduce") as page:
-        page.locator("#motion").scroll_into_view_if_needed()
-        page.wait_for_timeout(300)
-        expect(page.locator("#motion .picture")).to_be_visible()
-        expect(page.locator("#motion .moving")).to_be_hidden()
-        page.click("#motion [data-view=move]")
-        expect(page.locator("#motion .play")).to_have_text("Play")
+def test_the_keyboard_reaches_every_control(page):
+    explore_energy(page)
+    page.click("#motion [data-view=move]")
+    shown = (
+        "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
+        ".filter((e) => e.checkVisibility())"
+    )
+    wanted = page.evaluate(f"{shown}.length")
+    page.evaluate("document.addEventListener('focusin', (e) => { e.target.dataset.reached = 'yes'; })")
+    page.locator(".skip").focus()
+    for _ in range(3 * wanted):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement === document.body"):
+            break
+    unreached = f"{shown}.filter((e) => !e.dataset.reached).map((e) => e.outerHTML.slice(0, 80))"
+    assert page.evaluate(unreached) == []
+    page.locator("#energy .area").focus()
+    view = "document.querySelector('#energy .area')._fullLayout.yaxis.range.join()"
+    before = page.evaluate(view)
+    page.keyboard.press("+")
+    wait_for_change(page, view, before)
 
 
-def test_the_keyboard_reaches_every_control(browser, folder):
-    with opened(browser, folder, reduced_motion="reduce") as page:
-        page.click("#energy [data-view=explore]")
-        page.wait_for_selector("#energy .area[data-drawn]")
-        page.click("#motion [data-view=move]")
-        wanted = page.evaluate(
-            "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
-            ".filter((e) => e.checkVisibility()).length"
-        )
-        page.evaluate("document.addEventListener('focusin', (e) => { e.target.dataset.reached = 'yes'; })")
-        page.locator(".skip").focus()
-        for _ in range(3 * wanted):
-            page.keyboard.press("Tab")
-            if page.evaluate("document.activeElement === document.body"):
-                break
-        missed = page.evaluate(
-            "[...document.querySelectorAll('button, a[href], input, select, summary, canvas')]"
-            ".filter((e) => e.checkVisibility() && !e.dataset.reached).map((e) => e.outerHTML.slice(0, 80))"
-        )
-        assert missed == []
-        page.locator("#energy .area").focus()
-        view = "document.querySelector('#energy .area')._fullLayout.yaxis.range.join()"
-        before = page.evaluate(view)
-        page.keyboard.press("+")
-        wait_for_change(page, view, before)
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_serious_is_found_by_axe(browser, folder, scheme):
-    with opened(browser, folder, color_scheme=scheme, reduced_motion="reduce", bypass_csp=True) as page:
-        page.click("#energy [data-view=explore]")
-        page.wait_for_selector("#energy .area[data-drawn]")
+def test_nothing_serious_is_found_by_axe(browser, folder):
+    with opened(browser, folder, reduced_motion="reduce", bypass_csp=True) as page:
+        explore_energy(page)
         page.locator("#energy details.numbers summary").click()
         expect(page.locator("#energy details.numbers tbody tr")).not_to_have_count(0)
-        found = Axe().run(page).response["violations"]
-        serious = [v for v in found if v["impact"] in ("serious", "critical")]
-        assert [(v["id"], v["nodes"][0]["html"][:200]) for v in serious] == []
-
-
-def test_the_results_fit_a_laptop_and_the_lesser_columns_come_on_demand(browser, folder):
-    with opened(browser, folder) as page:
-        scroll = page.locator(".scroll.table")
-        wider = "e => e.scrollWidth - e.clientWidth"
-        lesser = page.locator("table.results .minor:visible")
-        expect(lesser).to_have_count(0)
-        assert scroll.evaluate(wider) == 0
-        page.check("[name=all]")
-        expect(lesser).not_to_have_count(0)
-        page.get_by_role("button", name="Clear").click()
-        expect(lesser).to_have_count(0)
-
-
-@pytest.mark.parametrize("width", [360, 1280, 1920])
-def test_no_page_is_wider_than_its_window(browser, folder, large, width):
-    for target in (folder, large):
-        with opened(browser, target, viewport={"width": width, "height": 800}) as page:
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert serious(page) == []
 
 
 def test_a_large_campaign_stays_usable(browser, large):
     with opened(browser, large) as page:
+        assert too_wide(page) == []
         rows = page.locator("table.results tbody tr:not(.group)")
         assert rows.count() == 400 - 3
         expect(page.locator(".missing").first).to_contain_text("3 of 400 cases have no result yet")

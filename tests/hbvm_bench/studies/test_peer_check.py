@@ -40,7 +40,15 @@ def test_every_peer_that_is_registered_is_checked():
     assert registered == {pair.method.partition("(")[0] for pair in PAIRS}
 
 
-@pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: f"{pair.method} on {pair.problem}")
+# Of diffrax's methods with a fixed step, which share their code and compile for seconds, one is enough.
+SLOW = ("LeapfrogMidpoint", "ReversibleHeun", "Dopri8(h=")
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [pytest.param(pair, marks=[pytest.mark.slow] if pair.method.startswith(SLOW) else []) for pair in PAIRS],
+    ids=[f"{pair.method} on {pair.problem}" for pair in PAIRS],
+)
 def test_the_harness_takes_the_library_s_own_steps_to_its_own_end(pair):
     result = check.check([pair], rounds=2, short=True, tell=lambda what: None)
     if result.refused and pair.method.startswith("WHFast512"):

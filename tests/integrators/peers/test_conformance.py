@@ -22,8 +22,8 @@ CASES = [
     (Leapfrog(h=0.02, order=4), testing.pendulum),
     (SemiImplicitEuler(h=0.001), testing.two_bodies),
     (LeapfrogMidpoint(h=0.01), testing.pendulum),
-    (ReversibleHeun(h=0.01), testing.pendulum),
-    (Dopri8(h=0.05), testing.pendulum),
+    pytest.param(ReversibleHeun(h=0.01), testing.pendulum, marks=pytest.mark.slow),  # compiles
+    pytest.param(Dopri8(h=0.05), testing.pendulum, marks=pytest.mark.slow),
     (Dopri8(rtol=1e-9, atol=1e-11), testing.pendulum),
     (DOP853(rtol=1e-9, atol=1e-12), testing.two_bodies),
     (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),

@@ -66,17 +66,17 @@ WORDS = "q1 p2 k pi sin sqrt( cos( log ** 0.5 1e3 1e400 3/2 == and if else lambd
 MORE = "__class__ import // 0x1F f'{q}' := await yield *q"
 SIGNS = "qpt2 +-*/^()[]{}'\",.:=<@\\#%|&~!j²é\x00_\n"
 PIECES = st.sampled_from([*WORDS.split(), *MORE.split(), *SIGNS])
-# 10,500 examples in all; measured: 14 s.
+# 1,100 examples in all; measured: 1.5 s.
 FUZZ = settings(deadline=None, suppress_health_check=list(HealthCheck), database=None)
 
 
-@settings(FUZZ, max_examples=4500)
+@settings(FUZZ, max_examples=500)
 @given(st.lists(PIECES, max_size=14).map("".join))
 def test_any_mixture_of_pieces_is_read_or_refused_with_its_column(text):
     _outcome(text)
 
 
-@settings(FUZZ, max_examples=3000)
+@settings(FUZZ, max_examples=300)
 @given(st.text(max_size=60))
 def test_any_text_is_read_or_refused_with_its_column(text):
     _outcome(text)
@@ -120,7 +120,7 @@ LEAVES = st.sampled_from(
 )
 
 
-@settings(FUZZ, max_examples=3000)
+@settings(FUZZ, max_examples=300)
 @given(st.recursive(LEAVES, _grown, max_leaves=8))
 def test_a_formula_means_what_it_says(pair):
     text, value = pair

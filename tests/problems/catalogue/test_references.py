@@ -142,7 +142,7 @@ def test_references_are_the_exact_solutions_where_there_are_any(stem, exact):
 
 def test_the_collocation_is_as_exact_as_its_arithmetic():
     problem = problems.load("kepler")
-    at = np.array([0.0, 1.0, 10.0])
+    at = np.array([0.0, 1.0])
     found = collocation.decimals(collocation.integrate(problem, at))
     with mpmath.workdps(50):
         for t, row in zip(at.tolist(), found, strict=True):

@@ -13,6 +13,13 @@ from problems.emit import cache
 SOURCE = "ANSWER = 42\n"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _own_folder(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("HBVM_BENCH_CACHE", str(tmp_path_factory.mktemp("generated")))
+        yield
+
+
 def test_the_same_text_is_the_same_module():
     first = cache.module(SOURCE, "answer")
     assert first.ANSWER == 42

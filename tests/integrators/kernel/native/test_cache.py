@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -9,7 +10,8 @@ import textwrap
 import pytest
 
 from integrators.kernel import tables
-from integrators.kernel.native import store
+from integrators.kernel.native import binary, store
+from integrators.kernel.step.engine import steps
 
 # A system of its own for each constant; prints whether numba was needed, and a result.
 SCRIPT = textwrap.dedent(
@@ -52,8 +54,13 @@ def finish(process):
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
-    """A cache folder in which the kernel and the field of constant 0.25 are."""
+    """A cache folder in which the kernel, from this process's cache, and the field of constant 0.25 are."""
     folder = tmp_path_factory.mktemp("cache")
+    address = steps.code().address
+    (name,) = [name for name, code in binary._loaded.items() if code.address == address]
+    kernel = store._path(store.key(name, binary.platform()))
+    (folder / "native" / kernel.parent.name).mkdir(parents=True)
+    shutil.copy(kernel, folder / "native" / kernel.parent.name)
     first = finish(start(folder, 0.25))
     assert not first["cached"]
     assert "numba" in first["imports"]
@@ -131,7 +138,8 @@ def test_tables_from_the_store_make_the_bits_of_those_just_made(tmp_path, monkey
     made = []
     for _ in range(2):
         tables.constants.cache_clear()
-        made.append(tables.scaled(tables.constants(10, 1, True, 16), 1.0, squared=True))
+        constants = tables.constants(10, 1, True, 16)
+        made.append(tables.scaled(constants, 1.0, squared=True) | tables.fixed(constants))
     tables.constants.cache_clear()
     for name, table in made[0].items():
         assert table.tobytes() == made[1][name].tobytes(), name

@@ -18,7 +18,7 @@ from problems import Foreign, InputError, Problem, VectorField, emit
 MU = 5.0
 METHODS = [
     HBVM(k=6, s=4, h=0.05),
-    HBVM(k=6, s=4, tol=1e-9),
+    HBVM(k=6, s=4, tol=1e-9, solver="fixed_point"),
     Gauss(s=4, h=0.05, solver="newton"),
     Gauss(s=3, h=0.05, solver="blended"),
 ]

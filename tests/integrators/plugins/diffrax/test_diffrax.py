@@ -29,12 +29,12 @@ def field(t: Any, y: Any, args: Any) -> Any:
     return jnp.stack([y[1], -args * jnp.sin(y[0])])
 
 
-@functools.partial(jax.jit, static_argnames=("solver", "steps", "direct"))
+@functools.partial(jax.jit, static_argnames=("solver", "direct"))
 def ends(solver: Any, steps: int, y0: Any, g: Any, span: float = 3.0, direct: bool = False) -> Any:
-    """The pendulum at the end of ``steps`` equal steps."""
+    """The pendulum at the end of ``steps`` equal steps, at most 100; compiled once for any number of them."""
     adjoint = dx.DirectAdjoint() if direct else dx.RecursiveCheckpointAdjoint()
     solution = dx.diffeqsolve(
-        dx.ODETerm(field), solver, 0.0, span, span / steps, y0, args=g, max_steps=steps + 1, adjoint=adjoint
+        dx.ODETerm(field), solver, 0.0, span, span / steps, y0, args=g, max_steps=100, adjoint=adjoint
     )
     return solution.ys[-1]
 
@@ -52,43 +52,54 @@ def test_the_order_on_a_nonlinear_problem_is_2s(solver: Any) -> None:
 
 
 def test_dense_output_is_the_step_at_its_ends_and_of_order_s_plus_1_between() -> None:
-    def between(n: int) -> float:
+    @jax.jit
+    def solved(n: Any, t: Any) -> Any:
         solution = dx.diffeqsolve(
             dx.ODETerm(field), HBVM(k=5, s=2), 0.0, 3.0, 3.0 / n, jnp.array([0.0, 1.9]), args=1.0,
-            saveat=dx.SaveAt(dense=True, steps=True), max_steps=n + 1,
+            saveat=dx.SaveAt(dense=True, steps=True), max_steps=41,
         )  # fmt: skip
-        nodes, states = np.asarray(solution.ts)[:n], np.asarray(solution.ys)[:n]
-        at_nodes = np.asarray(jax.vmap(solution.evaluate)(jnp.asarray(nodes)))
-        assert np.abs(at_nodes - states).max() < 1e-14  # measured 4e-16
-        best = ends(Gauss(s=8), 30, jnp.array([0.0, 1.9]), 1.0, 3.0 * (n // 2 + 0.3) / n)
-        value = solution.evaluate(3.0 * (n // 2 + 0.3) / n)
-        slope = solution.derivative(3.0 * (n // 2 + 0.3) / n)
-        assert np.abs(np.asarray(slope - field(0.0, value, 1.0))).max() < 20.0 / n**2
-        return float(jnp.abs(value - best).max())
+        at_nodes = jax.vmap(solution.evaluate)(jnp.minimum(solution.ts, 3.0))  # inf after the last
+        return solution.ys, at_nodes, solution.evaluate(t), solution.derivative(t)
+
+    def between(n: int) -> float:
+        t = 3.0 * (n // 2 + 0.3) / n
+        states, at_nodes, value, slope = map(np.asarray, solved(n, t))
+        assert np.abs(at_nodes[:n] - states[:n]).max() < 1e-14  # measured 4e-16
+        assert np.abs(slope - field(0.0, value, 1.0)).max() < 20.0 / n**2
+        return float(np.abs(value - ends(Gauss(s=8), 30, jnp.array([0.0, 1.9]), 1.0, t)).max())
 
     assert np.log2(between(20) / between(40)) == pytest.approx(3.0, abs=0.5)
 
 
+def loss(solver: Any, y0: Any, g: Any, direct: bool = False) -> Any:
+    end = ends(solver, 20, y0, g, direct=True) if direct else ends(solver, 20, y0, g)
+    return end[0] * end[1] + end[1] ** 2
+
+
+slopes = jax.jit(jax.grad(loss, argnums=(1, 2)), static_argnames=("solver", "direct"))
+
+
+def start() -> Any:
+    return jnp.array([0.3, 1.5]), jnp.asarray(1.1)
+
+
 @pytest.mark.parametrize("solver", [HBVM(k=8, s=4), pytest.param(Gauss(s=3), marks=pytest.mark.slow)])
-def test_gradients_agree_with_finite_differences_and_between_the_adjoints(solver: Any) -> None:
-    y0, g = jnp.array([0.3, 1.5]), jnp.asarray(1.1)
-
-    def loss(y0: Any, g: Any, direct: bool = False) -> Any:
-        end = ends(solver, 20, y0, g, 3.0, direct)
-        return end[0] * end[1] + end[1] ** 2
-
-    gradient = np.concatenate([np.ravel(part) for part in jax.grad(loss, argnums=(0, 1))(y0, g)])
-    other = np.concatenate(
-        [np.ravel(part) for part in jax.grad(functools.partial(loss, direct=True), argnums=(0, 1))(y0, g)]
-    )
-    assert np.abs(gradient - other).max() <= 1e-12 * np.abs(gradient).max()  # measured 2e-16
-    eps = 1e-3
+def test_gradients_agree_with_finite_differences(solver: Any) -> None:
+    (y0, g), eps = start(), 1e-3
+    gradient = np.hstack(slopes(solver, y0, g))
     found = []
     for i in range(3):
         e = eps * np.eye(3)[i]
-        f = [float(loss(y0 + m * e[:2], g + m * e[2])) for m in (-2, -1, 1, 2)]
+        f = [float(loss(solver, y0 + m * e[:2], g + m * e[2])) for m in (-2, -1, 1, 2)]
         found.append((f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * eps))
     assert np.abs(gradient - found).max() <= 1e-6 * np.abs(gradient).max()  # measured 1e-11
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", [HBVM(k=8, s=4), Gauss(s=3)])
+def test_gradients_agree_between_the_adjoints(solver: Any) -> None:
+    gradient, other = (np.hstack(slopes(solver, *start(), direct=direct)) for direct in (False, True))
+    assert np.abs(gradient - other).max() <= 1e-12 * np.abs(gradient).max()  # measured 2e-16
 
 
 @pytest.mark.slow
@@ -109,10 +120,11 @@ def test_gradients_agree_with_the_backsolve_adjoint() -> None:
 def test_a_batch_of_ten_thousand_pendulums_equals_the_loop() -> None:
     solver, n = HBVM(k=8, s=4), 10_000
     y0 = jnp.stack([jnp.linspace(-1.0, 1.0, n), jnp.linspace(0.1, 1.6, n)], axis=1)
-    batch = np.asarray(jax.vmap(lambda y: ends(solver, 10, y, 1.0))(y0))
+    g = jnp.asarray(1.0)
+    batch = np.asarray(jax.vmap(lambda y: ends(solver, 10, y, g))(y0))
     assert np.abs(energy(batch) - energy(np.asarray(y0))).max() < 1e-13  # measured 2e-15
     for i in np.linspace(0, n - 1, 25).astype(int):
-        alone = np.asarray(ends(solver, 10, y0[i], 1.0))
+        alone = np.asarray(ends(solver, 10, y0[i], g))
         assert np.abs(batch[i] - alone).max() < 1e-13  # measured 1e-15: XLA rounds batches otherwise
 
 
