@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from hbvm_bench.campaign.grid import Grid
+from hbvm_bench.campaign.grid import Count, Grid, Positive
 from hbvm_bench.campaign.sweep import Scalar
 from problems import limits
 from problems.errors import InputError, shown
@@ -14,8 +14,6 @@ from problems.errors import InputError, shown
 Settings = Literal["chosen", "default", "recommended", "as published", "outside its domain"]
 Role = Literal["ours", "peer"]
 
-Positive = Annotated[float, Meta(gt=0, le=1e300)]  # finite
-Count = Annotated[int, Meta(ge=1)]
 Accuracy = dict[str, Positive]
 FILE_NAME = r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}"
 
@@ -174,6 +172,8 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     reference : bool
         Whether a reference is computed before the run, by two methods, where none comes with the
         package; see `hbvm_bench.run.references`.
+    end : list of float
+        The state at the end, where it is known, as from a publication: the reference is then that.
     """
 
     use: str
@@ -182,6 +182,7 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     note: str = ""
     within: Accuracy = {}
     reference: bool = False
+    end: list[float] = []
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None

@@ -19,7 +19,6 @@ from hbvm_bench.campaign.entries import (
     Limits,
     MethodEntry,
     ProblemEntry,
-    Role,
     Settings,
     TimingPlan,
 )
@@ -70,10 +69,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
                 f"campaign name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )
 
-        if not self.ensembles and not (self.problems and self.methods):
-            missing = "methods" if self.problems else "problems"
-            raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
-        if bool(self.problems) != bool(self.methods):
+        if bool(self.problems) != bool(self.methods) or not (self.problems or self.ensembles):
             missing = "methods" if self.problems else "problems"
             raise InputError(f"campaign {self.name!r} has no {missing}; give at least one.")
         known = {name_of(entry) for entry in self.entries()}
@@ -218,6 +214,24 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
+def file_of(name_or_path: str) -> Path:
+    """Return where a campaign's file lies: that of a shipped one, or of a path that ends in ``.toml``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none.
+    """
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise InputError(f"there is no campaign file {name_or_path!r}.")
+        return path
+    if name_or_path not in shipped():
+        raise unknown("campaign", name_or_path, shipped())
+    return shipped()[name_or_path]
+
+
 def load(name_or_path: str) -> Campaign:
     """Read a campaign.
 
@@ -226,25 +240,13 @@ def load(name_or_path: str) -> Campaign:
     name_or_path : str
         The name of a shipped campaign, or the path of a TOML file.
 
-    Returns
-    -------
-    Campaign
-
     Raises
     ------
     problems.errors.InputError
         If there is no such campaign, or its file is not a campaign.
     """
-    path = Path(name_or_path)
-    if path.suffix == ".toml":
-        if not path.is_file():
-            raise InputError(f"there is no campaign file {name_or_path!r}.")
-    elif name_or_path in shipped():
-        path = shipped()[name_or_path]
-    else:
-        raise unknown("campaign", name_or_path, shipped())
     try:
-        text = path.read_text(encoding="utf-8")
+        text = file_of(name_or_path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the campaign file {name_or_path!r}: {error}.") from None
     return parse(text, name_or_path)
@@ -288,22 +290,3 @@ NESTED: dict[str, type[msgspec.Struct]] = {
     "ensembles": EnsembleEntry,
     "goals": Goal,
 }
-
-__all__ = [
-    "Campaign",
-    "Case",
-    "Checks",
-    "Ensemble",
-    "EnsembleEntry",
-    "Goal",
-    "Grid",
-    "Limits",
-    "MethodEntry",
-    "ProblemEntry",
-    "Role",
-    "Settings",
-    "TimingPlan",
-    "load",
-    "parse",
-    "shipped",
-]

@@ -357,6 +357,3 @@ def _know(text: str) -> None:
     if _Place.of(parse_spec(repr(problem))).digest != _digest(problem):
         raise ValueError("a problem is not the one that its name says")
     _formulas[repr(problem)] = text
-
-
-__all__ = ["Beside", "beside", "find", "formula", "is_file", "learn", "opened", "read"]

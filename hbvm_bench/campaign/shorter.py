@@ -1,14 +1,20 @@
 """Parts of a campaign: some of its problems, or a quick run of it."""
 
+from collections.abc import Sequence
+from typing import TypeVar
+
 import numpy as np
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.file import Campaign, Goal, MethodEntry, ProblemEntry, name_of, text_of
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.reference import solutions
 from problems.errors import unknown
+
+T = TypeVar("T", MethodEntry, Goal)
 
 QUICK_SHARE = 0.1
 """Of the span, or of an ensemble's trajectories, in a quick run."""
@@ -30,19 +36,13 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
             raise unknown(f"problem of {campaign.name}", name, known)
     kept = [entry for entry in campaign.entries() if not names or name_of(entry) in names]
     here = {name_of(entry) for entry in kept}
+
+    def of_these(entries: Sequence[T]) -> list[T]:
+        found = ((one, [name for name in one.only if name in here]) for one in entries)
+        return [replace(one, only=only) for one, only in found if only or not one.only]
+
     return replace(
-        campaign,
-        problems=kept,
-        methods=[
-            replace(one, only=[name for name in one.only if name in here])
-            for one in campaign.methods
-            if not one.only or here & {*one.only}
-        ],
-        goals=[
-            replace(one, only=[name for name in one.only if name in here])
-            for one in campaign.goals
-            if not one.only or here & {*one.only}
-        ],
+        campaign, problems=kept, methods=of_these(campaign.methods), goals=of_these(campaign.goals)
     )
 
 
@@ -61,11 +61,18 @@ def quick_run(campaign: Campaign, rounds: int) -> Campaign:
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:
-    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state."""
+    """Return an entry without a sweep that ends near a tenth of the span, where its reference has a state.
+
+    A problem in a Python file keeps its span: its function need not take another.
+    """
+    if own.is_file(text_of(entry)):
+        return entry
     text = fill(entry.use, entry.values)
     problem, spec = make_problem(text), parse_spec(text)
     end = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
     known = solutions.find(problem)
     if known is not None:
         end = float(known.t[1 + np.argmin(np.abs(known.t[1:] - end))])
-    return replace(entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry))
+    return replace(
+        entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry), end=[]
+    )

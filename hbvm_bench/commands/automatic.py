@@ -1,32 +1,34 @@
 """The command ``hbvm-bench automatic``."""
 
-import math
 import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
+from msgspec.structs import replace
 
-from hbvm_bench.commands.run import as_typed, carry_out
+from hbvm_bench.campaign.file import load
+from hbvm_bench.campaign.shorter import chosen
+from hbvm_bench.commands.run import as_typed, carry_out, opened, show
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.studies.automatic import runs as automatic_
-from hbvm_bench.studies.general import runs as general_
-from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
+
+GENERAL = "general"
 
 
 def automatic(
+    context: typer.Context,
     problems: Annotated[list[str] | None, typer.Argument(help="Problems; all by default.")] = None,
     rounds: Annotated[int | None, typer.Option(help="Interleaved timing samples, against heyoka.")] = None,
     general: Annotated[
         bool, typer.Option("--general", help="General and stiff systems instead, beside SciPy's methods.")
     ] = False,
     limit: Annotated[
-        float, typer.Option(help="With --general: seconds after which a run is given up.")
+        float, typer.Option(help="With --general: seconds after which a case is given up.")
     ] = 30.0,
     avx2: Annotated[bool, typer.Option("--avx2", help=machine.AVX2)] = False,
     out: Annotated[
@@ -40,15 +42,14 @@ def automatic(
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
     The cases are kept in runs/automatic, and a rerun does only what is missing there.
-    With --general: van der Pol's equation, Robertson's chemistry, a driven pendulum and Arenstorf's
-    orbit against their known end values, HBVM() beside Radau and DOP853; and a stiff chain
-    at a step a hundred times as long as one at which the fixed-point iteration fails.
+    With --general: the campaign general, or a part of it: van der Pol's equation, Robertson's chemistry,
+    a driven pendulum and Arenstorf's orbit against their known ends, HBVM() beside Radau and DOP853; and
+    a stiff chain at a step a hundred times as long as one at which the fixed-point iteration fails.
     """
-    console = terminal.console()
     if general and (avx2 or out is not None):
         raise InputError("--avx2 and --out do not go with --general; leave them out.")
     if general:
-        _general(console, problems or [], limit)
+        _general(context, problems or [], limit)
         return
     from hbvm_bench.studies.automatic import report
 
@@ -59,12 +60,10 @@ def automatic(
     os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
     if out is not None:
         ensure_writable(out)
-    words = ["automatic", *(problems or []), *(["--rounds", str(rounds)] if rounds else [])]
-    command = as_typed([*words, *(["--avx2"] if avx2 else [])], out)
-    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), command)
+    store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), as_typed(context))
     run = kept.of(store, automatic_.NAME, reading.records(store))
     terminal.print_table(report.sides(automatic_.duels(run)))
-    console.print(machine.sentence(run.machine), highlight=False)
+    terminal.console().print(machine.sentence(run.machine), highlight=False)
     if out is not None:
         automatic_.keep(run, out)
         _publish(out)
@@ -80,28 +79,10 @@ def _publish(directory: Path) -> None:
     publish(report.document(found), directory)
 
 
-def _general(console: Console, names: list[str], limit: float) -> None:
-    with console.status("compiling") as status:
-        found = general_.outcomes(names, limit, lambda text: status.update(f"running {text}"))
-    rows = [
-        (
-            "" if before is not None and run.problem == before.problem else run.problem,
-            run.method,
-            "" if math.isnan(run.error) else f"{run.error:.1e}",
-            "" if math.isnan(run.energy) else f"{run.energy:.1e}",
-            str(run.steps),
-            str(run.evaluations),
-            f"{1e3 * run.seconds:.3g}",
-            run.ending or run.solver,
-        )
-        for before, run in zip((None, *found), found, strict=False)
-    ]
-    head = ("problem", "method", "end", "energy", "steps", "evaluations", "ms", "solver")
-    note = (
-        "end: error of the end, of van der Pol and Robertson relative; energy: largest error on the way. "
-        "An evaluation is one of the field at one state; ours evaluates 8 or 16 at a time."
-    )
-    terminal.print_table(Table("", head, rows, note, words=(0, 1, 7)))
-
-
-__all__ = ["automatic"]
+def _general(context: typer.Context, names: list[str], limit: float) -> None:
+    if not limit > 0.0:
+        raise InputError(f"limit must be positive, not {limit}.")
+    declared = load(GENERAL)
+    limits = replace(declared.limits, wall_seconds=limit)
+    campaign = opened(chosen(replace(declared, limits=limits), names), GENERAL)
+    show(campaign, carry_out(campaign, Path("runs") / GENERAL, as_typed(context)))

@@ -20,6 +20,7 @@ MOST_YEARS = 1e9
 
 
 def endure(
+    context: typer.Context,
     years: Annotated[float | None, typer.Option(help="The span; default a million.")] = None,
     starts: Annotated[
         int | None,
@@ -48,7 +49,7 @@ def endure(
                 f"--years must be a whole number from {LEAST_YEARS:g} to {MOST_YEARS:g}, not {span!r}."
             )
         asked = runs.campaign(span, starts or (runs.QUICK_STARTS if quick else None), method)
-        carry_out(asked, directory, _command(years, starts, method, quick, directory))
+        carry_out(asked, directory, as_typed(context))
     result = runs.read(directory)
     from hbvm_bench.commands.publishing import publish
     from hbvm_bench.studies.endure import report
@@ -74,14 +75,3 @@ def as_data(result: Endurance) -> dict[str, Any]:
 def _line(line: law.Line) -> dict[str, Any]:
     rms = {f"{year:g}": value for year, value in line.rms.items()}
     return msgspec.to_builtins(line) | {"rms": rms}
-
-
-def _command(
-    years: float | None, starts: int | None, method: list[str] | None, quick: bool, out: Path
-) -> str:
-    words = ["endure"]
-    words += ["--years", f"{years:g}"] if years is not None else []
-    words += ["--starts", str(starts)] if starts is not None else []
-    words += [word for text in method or [] for word in ("--method", text)]
-    words += ["--quick"] if quick else []
-    return as_typed(words, out)

@@ -3,11 +3,9 @@
 import dataclasses
 import inspect
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-import msgspec
-from rich import box
 from rich.table import Table
 from rich.text import Text
 
@@ -16,9 +14,11 @@ import problems
 from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.campaign.identity import version_of_library
 from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.report import terminal
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
-from hbvm_bench.summaries import goals
+from hbvm_bench.summaries import export, goals
+from hbvm_bench.summaries.table import NONE
 from integrators.protocol import MethodBase
 from problems.errors import unknown
 
@@ -64,81 +64,58 @@ def as_json(index: Index, records: Sequence[Record]) -> dict[str, Any]:
         "command": index.command,
         "version": index.version,
         "cases_planned": len(index.ids),
-        "metrics": {
-            key: {"label": m.label, "unit": m.unit, "better": m.better, "description": m.description}
-            for key, m in METRICS.items()
-        },
         "goals": goals.as_data(goals.verdicts(index.campaign, records)),
-        "cases": [_case(record) for record in records],
+        **export.as_json(records),
     }
 
 
-def _case(record: Record) -> dict[str, Any]:
-    fields = msgspec.to_builtins(record)
-    result = fields.pop("result")
-    fields.pop("case")
-    timing = record.timing
-    return {
-        "problem": record.case.problem,
-        "method": record.case.method,
-        "settings": record.case.settings,
-        "note": record.case.note,
-        **result,
-        **fields,
-        "timing": None if timing is None else {**timing.summary, **msgspec.to_builtins(timing)},
-    }
-
-
-def _table(title: str, *heads: str) -> Table:
-    made = Table(*heads, title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    made.columns[0].no_wrap = True
+def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    made = terminal.empty(title)
+    for i, head in enumerate(heads):
+        made.add_column(head, no_wrap=i == 0)
+    for row in rows:
+        made.add_row(*map(Text, row))
     return made
 
 
 def _problems() -> Table:
-    made = _table("problems", "problem", "dimension", "invariants", "what")
-    for name in problems.names():
-        problem = problems.load(name)
-        system = problem.system
-        made.add_row(
-            Text(_signature(name, problem.arguments)),
-            Text(str(system.dim)),
-            Text(", ".join(system.invariant_names)),
-            Text(problem.title or ""),
+    loaded = [(name, problems.load(name)) for name in problems.names()]
+    rows = [
+        (
+            _signature(name, one.arguments),
+            str(one.system.dim),
+            ", ".join(one.system.invariant_names),
+            one.title or "",
         )
-    return made
+        for name, one in loaded
+    ]
+    return _table("problems", ("problem", "dimension", "invariants", "what"), rows)
 
 
 def _methods() -> Table:
-    made = _table("methods", "method", "library", "version", "what")
-    for name in integrators.registry.names():
-        try:
-            cls = integrators.registry.get(name)
-        except ImportError as error:
-            made.add_row(Text(name), "–", "–", Text(f"cannot be imported: {error}"))
-            continue
-        made.add_row(
-            Text(_options(cls)),
-            Text(cls.library),
-            Text(version_of_library(cls.library)),
-            Text((inspect.getdoc(cls) or "").partition("\n")[0]),
-        )
-    return made
+    return _table(
+        "methods", ("method", "library", "version", "what"), map(_method, integrators.registry.names())
+    )
+
+
+def _method(name: str) -> tuple[str, ...]:
+    try:
+        cls = integrators.registry.get(name)
+    except ImportError as error:
+        return name, NONE, NONE, f"cannot be imported: {error}"
+    said = (inspect.getdoc(cls) or "").partition("\n")[0]
+    return _options(cls), cls.library, version_of_library(cls.library), said
 
 
 def _metrics() -> Table:
-    made = _table("metrics", "metric", "unit", "better", "what")
-    for metric in METRICS.values():
-        made.add_row(metric.key, metric.unit or "–", metric.better or "–", Text(metric.description))
-    return made
+    rows = [(m.key, m.unit or NONE, m.better or NONE, m.description) for m in METRICS.values()]
+    return _table("metrics", ("metric", "unit", "better", "what"), rows)
 
 
 def _campaigns() -> Table:
-    made = _table("campaigns", "campaign", "cases", "what")
-    for name in shipped():
-        campaign = load(name)
-        made.add_row(name, str(len(campaign.cases())), Text(campaign.title))
-    return made
+    loaded = [(name, load(name)) for name in shipped()]
+    rows = [(name, str(len(campaign.cases())), campaign.title) for name, campaign in loaded]
+    return _table("campaigns", ("campaign", "cases", "what"), rows)
 
 
 def _options(cls: type[MethodBase]) -> str:

@@ -34,6 +34,3 @@ def plugins(
     print(printed(costs.table(costs.measure(host, rounds))))
     print(f"\n{POSITION} Here those are its start and its end.")
     print(f"\n{machine.sentence(machine.describe(measure=True))}")
-
-
-__all__ = ["plugins"]

@@ -27,6 +27,7 @@ from hbvm_bench.summaries import goals
 
 
 def race(
+    context: typer.Context,
     problem: Annotated[
         list[str] | None, typer.Option("-p", "--problem", help="Only this problem; may be repeated.")
     ] = None,
@@ -62,8 +63,7 @@ def race(
         os.environ |= machine.restricted_to_avx2() if avx2 else {}  # of the processes that measure
         ensure_writable(directory)
         _declare(campaign, error=True)
-        command = _command(problem, quick, rounds, compile_times, avx2, directory)
-        store = carry_out(campaign, directory, command)
+        store = carry_out(campaign, directory, as_typed(context))
         kept.keep(
             kept.of(store, results.NAME, reading.records(store)), directory / results.FILE, results.NAME
         )
@@ -139,20 +139,3 @@ def _show(races: Sequence[Race]) -> None:
             terminal.print_table(table)
     for said in machine.sentences(race.machine for race in races):
         terminal.console().print(said, highlight=False)
-
-
-def _command(
-    problem: list[str] | None,
-    quick: bool,
-    rounds: int | None,
-    compile_times: bool | None,
-    avx2: bool,
-    out: Path,
-) -> str:
-    words = ["race"]
-    words += [word for key in problem or [] for word in ("--problem", key)]
-    words += ["--quick"] if quick else []
-    words += ["--rounds", str(rounds)] if rounds else []
-    words += [] if compile_times is None else ["--compile" if compile_times else "--no-compile"]
-    words += ["--avx2"] if avx2 else []
-    return as_typed(words, out)

@@ -2,7 +2,6 @@
 
 import shlex
 import sys
-from collections.abc import Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, load
+from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
 from hbvm_bench.commands.live import Live
@@ -27,10 +26,12 @@ from problems.errors import InputError
 
 UNFINISHED = 1
 INTERRUPTED = 130
+ANYHOW = ("as_json", "executor", "jobs", "redraw", "report_to", "timing")  # options that change no number
 PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 
 
 def run(
+    context: typer.Context,
     name: Annotated[str | None, typer.Argument(help="A campaign's name, or a TOML file.")] = None,
     problem: Annotated[
         list[str] | None,
@@ -66,16 +67,12 @@ def run(
     """
     campaign = _campaign(name, problem, method, step, reference)
     campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
-    campaign = own.opened(campaign, None if name is None else Path(name).parent, partial(_say_run, name))
+    campaign = opened(campaign, name)
     if report_to is not None:
         ensure_writable(report_to, keep=False)
-    command = _command(name, problem, method, step, reference) + " --quick" * quick
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
-    store = carry_out(campaign, out, command, executor=executor, jobs=jobs, timing=timing)
-    records = reading.records(store)
-    if len(records) <= PRINTED:
-        terminal.print_results(records)
-    terminal.print_goals(campaign, records)
+    store = carry_out(campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing)
+    show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import publish
         from hbvm_bench.report.campaign import document
@@ -83,10 +80,36 @@ def run(
         publish(document(store), report_to, stderr=False)
 
 
-def as_typed(words: Sequence[str], out: Path | None) -> str:
-    """Return how to run a command again; a path of this machine, which is nobody else's, is left out."""
-    place = [] if out is None or out.is_absolute() else ["--out", str(out)]
-    return shlex.join(["hbvm-bench", *words, *place])
+def opened(campaign: Campaign, name: str | None) -> Campaign:
+    """Run the Python files beside a campaign's, or those that a command line names; see `own.opened`."""
+    return own.opened(campaign, None if name is None else file_of(name).parent, partial(_say_run, name))
+
+
+def show(campaign: Campaign, store: Store) -> None:
+    """Print the results of a run and the verdicts on its goals."""
+    records = reading.records(store)
+    if len(records) <= PRINTED:
+        terminal.print_results(records)
+    terminal.print_goals(campaign, records)
+
+
+def as_typed(context: typer.Context) -> str:
+    """Return how to run a command again, without the options that change no number.
+
+    A path of this machine, which is nobody else's, is left out too.
+    """
+    words = ["hbvm-bench", str(context.info_name)]
+    for option in context.command.params:
+        given = context.params.get(str(option.name))
+        if option.name in ANYHOW or given in (None, (), option.default):
+            continue
+        if isinstance(given, bool):
+            words.append((option.opts if given else option.secondary_opts)[-1])
+        elif not (isinstance(given, Path) and given.is_absolute()):
+            name = [] if option.param_type_name == "argument" else [option.opts[-1]]
+            for one in given if isinstance(given, list | tuple) else [given]:
+                words += [*name, str(one).removesuffix(".0") if isinstance(one, float) else str(one)]
+    return shlex.join(words)
 
 
 def carry_out(
@@ -190,21 +213,6 @@ def _campaign(
     )
 
 
-def _command(
-    name: str | None,
-    problems: list[str] | None,
-    methods: list[str] | None,
-    step: float | None,
-    reference: bool,
-) -> str:
-    words = ["hbvm-bench", "run", *([name] if name else [])]
-    words += [word for text in problems or [] for word in ("-p", text)]
-    words += [word for text in methods or [] for word in ("-m", text)]
-    words += ["--step", repr(step)] if step is not None else []
-    words += ["--reference"] if reference else []
-    return shlex.join(words)
-
-
 def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool) -> None:
     supervise.allow()
     missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
@@ -242,6 +250,3 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()
-
-
-__all__ = ["carry_out", "run"]

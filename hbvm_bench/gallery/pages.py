@@ -1,4 +1,4 @@
-"""docs/problems.md, written from the problems' own words, formulas and data."""
+"""What docs/problems.md and docs/engines.md say of every problem, from its own words, formulas and data."""
 
 import inspect
 import re
@@ -15,135 +15,15 @@ from hbvm_bench.summaries import engines
 from problems import registry
 from problems.analysis import structure
 from problems.analysis.latex import latex
+from problems.errors import InputError
 from problems.problem import Problem
 
-HEAD = """<!-- made by: hbvm-bench gallery docs -->
-# Problems
-
-Each problem is a function that returns a `problems.Problem`: a system written once, a start, parameters and
-a span. On the command line and in campaigns it is written as it prints, `kepler(e=0.9)`. This page is made by
-code (`hbvm-bench gallery docs`) from the problems themselves; formulas are printed from the traced
-expressions, with indices that count from 1. Which engine takes which problem: [engines](engines.md); how long
-large systems take to compile: [compile times](compile_times.md).
-
-"""
-
-OWN = """## A system of your own
-
-![a quartic oscillator, given as text](problems/expression.svg)
-
-As text, on the command line or in a campaign file. It is parsed by a whitelist and never evaluated:
-
-```sh
-hbvm-bench inspect "p^2/2 - cos(q)"
-hbvm-bench inspect "(p1^2 + p2^2)/(2*m) + k*q1^2*q2" --par "k=2, m=0.5"
-hbvm-bench run -p 'expression(H="p^2/2 + k*q^4/4", q0=[1.0], p0=[0.0], parameters="k=2")' \\
-    -m "HBVM(k=4, s=2, h=0.1)"
-```
-
-Names are `q, p` for one degree of freedom, `q1, p1, q2, ...` for more, `t`, `pi`, and parameters; `^` or `**`
-with an integer or half-integer exponent; sqrt, sin, cos, tan, exp, log, abs.
-
-In Python, where sums over many bodies or neighbours are declared with `m.sum` and become loops:
-
-```python
-import integrators
-import problems
-
-n = 1000
-
-
-def H(q, p, par, m):
-    kinetic = m.sum(lambda i: p[i] ** 2 / 2, range(n))
-    springs = m.sum(lambda i, j: (q[j] - q[i]) ** 2 / 2 + par.beta * (q[j] - q[i]) ** 4 / 4,
-                    [(i, (i + 1) % n) for i in range(n)])
-    return kinetic + springs
-
-
-ring = problems.Hamiltonian(H, dof=n, parameters={"beta": 1.0})
-problem = problems.Problem(ring, q0=[0.0] * n, p0=[1.0, -1.0] * (n // 2), t_end=10.0)
-solution = integrators.integrate(problem, integrators.HBVM(k=4, s=2, h=0.1))
-```
-
-`problems.VectorField(f, dim=...)` takes any first-order system, `problems.Poisson(H, B, dim=...)` a system
-y' = B(y) grad H(y).
-
-## A problem with a name
-
-A decorated function is a problem as those above are: its arguments are checked by their annotations, it
-prints as the call that makes it, and reports and the gallery have their words and their picture from the
-decorator.
-
-```python
-from problems import Hamiltonian, Problem
-from problems.checks import Positive
-from problems.entry import entry
-from problems.picture import Phase
-
-
-def _energy(q, p, par):
-    return p[0] ** 2 / 2 + par.k * q[0] ** 4 / 4
-
-
-@entry(
-    title="a quartic oscillator",
-    references=("your paper",),
-    notes="What to know about it.",
-    shows=("k",),  # printed even at its default: quartic(k=1.0)
-    picture=Phase(span=12.0),
-)
-def quartic(*, k: Positive = 1.0, q: float = 1.0, t_end: float = 100.0) -> Problem:
-    system = Hamiltonian(_energy, dof=1, parameters={"k": k}, name="quartic")
-    return Problem(system, q0=[q], p0=[0.0], t_end=t_end)
-```
-
-In a file `mine.py` it can be used at once, with the decorator or without, as `mine.py:quartic(k=2.0)` on the
-command line and in a campaign file beside it (see [campaigns](campaigns.md)).
-A package names it under the entry point group `hbvm_bench.problems`, as `examples/integrator` does
-(`quartic = "package.module:quartic"`); in this repository it is the file `problems/catalogue/quartic.py` and
-nothing else, with `expected=` for the tests.
-
-"""
-
-REFERENCES = """## References
-
-Position errors are measured against solutions that two independent computations agree on: heyoka's Taylor
-method in 128-bit arithmetic and Gauss collocation in double-double arithmetic (for large systems the
-collocation and the Taylor method in long double). Each is a text file in `hbvm_bench/reference/data/`, with
-its provenance; a chaotic problem has a reference as far as the two agree. `hbvm-bench reference "PROBLEM"`
-recomputes and compares; `reference = true` in a campaign makes one for any other problem.
-
-| problem | up to t = | the two differ by (relative) |
-|---|---|---|
-"""
-
-ENGINES = """<!-- made by: hbvm-bench gallery docs -->
-# Engines
-
-Which library takes the vector field, how REBOUND takes the problem, and which method takes it: ✓, or the
-number of the reason why not. The table is made by code (`hbvm-bench engines --markdown`) at each problem's
-default arguments, with methods at some step or tolerance.
-
-- numpy, numba, jax, heyoka: the field is emitted to them from one traced graph, the same operations in the
-  same order. numpy and numba agree bit for bit where there are only + - * / square roots and integer powers,
-  and within 2 units in the last place of the terms where there are other functions; jax and heyoka, whose
-  compilers contract products and sums, within 8.
-- REBOUND's bodies: gravity is REBOUND's own, from masses, positions and velocities.
-- REBOUND's forces: q'' = -grad U(q) through `additional_forces`, a compiled callback; three coordinates a
-  particle, as many particles as it takes.
-
-"""
-
-
-def text(names: Sequence[str]) -> str:
-    """Return the page on the given problems as Markdown."""
-    loaded = {name: problems.load(name) for name in names}
-    parts = [HEAD, _overview(loaded), *(_section(name, problem) for name, problem in loaded.items())]
-    return "".join([*parts, OWN, REFERENCES, _references()])
+BEGIN, END = "<!-- made by: hbvm-bench gallery docs -->", "<!-- end of what is made -->"
+"""Between them stands what is made; all else on a page is written by hand and stays."""
 
 
 def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
-    """Write ``problems.md``, ``engines.md`` and a picture of each problem into a directory.
+    """Write into a directory the pictures, and what is made of ``problems.md`` and ``engines.md``.
 
     Parameters
     ----------
@@ -156,6 +36,11 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     -------
     list of Path
         What was written.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a page there has not the places for what is made.
     """
     drawn = {
         name: entry.picture
@@ -164,8 +49,11 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     }
     names = [name for name, picture in drawn.items() if not picture.arguments]
     made = {
-        directory / "problems.md": text(names).encode(),
-        directory / "engines.md": _engines(names).encode(),
+        path: _filled(path, pieces).encode()
+        for path, pieces in (
+            (directory / "problems.md", [_gallery(names), _references()]),
+            (directory / "engines.md", [_engines(names)]),
+        )
     }
     for name in drawn if with_pictures else ():
         made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
@@ -173,10 +61,30 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     return list(made)
 
 
+def _filled(path: Path, pieces: Sequence[str]) -> str:
+    """Return a page with new pieces between its marks; one that is not there yet has nothing else."""
+    made = [f"{BEGIN}\n\n{piece.strip()}\n\n{END}" for piece in pieces]
+    if not path.is_file():
+        return "\n\n".join(made) + "\n"
+    kept = re.split(
+        f"{re.escape(BEGIN)}.*?{re.escape(END)}", path.read_text(encoding="utf-8"), flags=re.DOTALL
+    )
+    if len(kept) != len(pieces) + 1:
+        raise InputError(
+            f"{path} must have {BEGIN!r} and {END!r} around {len(pieces)} places, not {len(kept) - 1}."
+        )
+    return kept[0] + "".join(piece + after for piece, after in zip(made, kept[1:], strict=True))
+
+
+def _gallery(names: Sequence[str]) -> str:
+    loaded = {name: problems.load(name) for name in names}
+    return _overview(loaded) + "".join(_section(name, problem) for name, problem in loaded.items())
+
+
 def _engines(names: Sequence[str]) -> str:
     table, reasons = engines.table(names)
     listed = "\n".join(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1))
-    return f"{ENGINES}{printed(table)}\n\n{listed}\n"
+    return f"{printed(table)}\n\n{listed}"
 
 
 def _overview(loaded: dict[str, Problem]) -> str:
@@ -259,10 +167,10 @@ def _code(body: str) -> str:
 
 
 def _references() -> str:
-    lines = []
+    lines = ["| problem | up to t = | the two differ by (relative) |", "|---|---|---|"]
     for path in sorted(reference.folder().glob("*.json")):
         stored = reference.read(path)
         end = float.fromhex(stored.t[-1])
         said: Any = stored.provenance.get("agreement", "")
         lines.append(f"| `{stored.problem}` | {end:g} | {said.split(' ')[0]} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)

@@ -1,6 +1,6 @@
 """What is looked at beside the trajectory: the law of each invariant's drift, and time reversal."""
 
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,30 +18,8 @@ from problems.problem import Problem
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Checked:
-    """What came out.
-
-    Attributes
-    ----------
-    laws : dict of Law
-        By invariant.
-    t : ndarray, shape (n,)
-        Times since the start of the errors behind the laws.
-    errors : dict of ndarray, shape (starts, n)
-        Errors by invariant; the energy's with their sign.
-    reversal : float or str
-        Distance from the start after integrating there and back, or why there is none.
-    """
-
-    laws: dict[str, Law] = field(default_factory=dict)
-    t: Array = field(default_factory=lambda: np.empty(0))
-    errors: dict[str, Array] = field(default_factory=dict)
-    reversal: float | str = "not asked for"
-
-
-def check(measured: Measured, method: MethodBase, program: Program, asked: Checks) -> Checked:
-    """Run the further integrations that are asked for.
+def check(measured: Measured, method: MethodBase, program: Program, asked: Checks) -> Measured:
+    """Return what was measured with the laws of its drifts and the way back, as far as they are asked for.
 
     Parameters
     ----------
@@ -53,14 +31,13 @@ def check(measured: Measured, method: MethodBase, program: Program, asked: Check
         See there.
     """
     problem = measured.problem
-    back = _reversal(problem, method, program, asked.reversal) if asked.reversal else "not asked for"
+    if asked.reversal:
+        measured = replace(measured, reversal=_reversal(problem, method, program, asked.reversal))
     if not asked.starts:
-        return Checked(reversal=back)
+        return measured
     if not measured.complete:
-        why = f"the trajectory ends at t = {measured.t_stop:.4g}"
-        return Checked(
-            laws={name: Law(why=why, starts=1) for name in problem.system.invariant_names}, reversal=back
-        )
+        law = Law(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
+        return replace(measured, laws=dict.fromkeys(problem.system.invariant_names, law))
     t = np.abs(measured.t - problem.t0)
     later = t > 0.0
     series = [_errors(problem, problem.y0, measured.t, measured.y)]
@@ -73,7 +50,7 @@ def check(measured: Measured, method: MethodBase, program: Program, asked: Check
         name: drift.fit(t[later], rows, signed=name == "energy") if rows.shape[1] else Law(why="no samples")
         for name, rows in errors.items()
     }
-    return Checked(laws=found, t=t[later], errors=errors, reversal=back)
+    return replace(measured, laws=found, drift={"t": t[later], **errors} if errors else {})
 
 
 def _errors(problem: Problem, start: Array, t: Array, y: Array) -> dict[str, Array]:

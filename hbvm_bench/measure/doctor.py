@@ -11,6 +11,8 @@ from pathlib import Path
 from statistics import median, quantiles
 from typing import Literal
 
+import psutil
+
 import integrators.registry
 from hbvm_bench.campaign.identity import version_of_library
 from hbvm_bench.measure import machine
@@ -140,9 +142,8 @@ def cores() -> Finding:
     words = f"{mine} of {os.cpu_count() or mine}, {machine.describe()['processor']}"
     if quota is not None and quota < mine:
         words += f", limited to the time of {quota:g}"
-    if min(mine, quota or mine) < 2:
-        return Finding("cores", "bad", words, "give it two: one is for the case that is timed, alone")
-    return Finding("cores", "ok", words)
+    alone = min(mine, quota or mine) < 2
+    return _judged("cores", words, alone, "give it two: one is for the case that is timed, alone")
 
 
 def load() -> Finding:
@@ -153,9 +154,7 @@ def load() -> Finding:
         looks.append(max(_running() - 1, 0))
     others = int(median(looks))
     words = f"{others} other processes want to run, {os.getloadavg()[0]:.2f} in all over the last minute"
-    if others > 0:
-        return Finding("load", "bad", words, "wait for the end of what else runs")
-    return Finding("load", "ok", words)
+    return _judged("load", words, others > 0, "wait for the end of what else runs")
 
 
 def governor() -> Finding:
@@ -208,11 +207,11 @@ def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
     """
     with machine.staying_on_a_core():
         measure()  # compiled now
-        stolen, wall, busy = _stolen(), time.perf_counter(), time.process_time()
+        stolen, wall, busy = psutil.cpu_times().steal, time.perf_counter(), time.process_time()
         taken = [measure() for _ in range(CALIBRATIONS)]
         wall, busy = time.perf_counter() - wall, time.process_time() - busy
-        stolen = None if stolen is None else (_stolen() or 0.0) - stolen
-    return [scatter(taken), share(busy / wall), *([] if stolen is None else [steal(stolen / wall)])]
+        stolen = psutil.cpu_times().steal - stolen
+    return [scatter(taken), share(busy / wall), steal(stolen / wall)]
 
 
 def scatter(taken: Sequence[float]) -> Finding:
@@ -223,25 +222,24 @@ def scatter(taken: Sequence[float]) -> Finding:
         f"{median(taken) * 1e3:.2f} ms, varying by {spread:.1%} between deciles, "
         f"the slowest by {max(taken) / median(taken) - 1:.0%}"
     )
-    if spread > LARGEST_SCATTER:
-        return Finding("calibration", "bad", words, "fix the frequency and stop what else runs")
-    return Finding("calibration", "ok", words)
+    bad = spread > LARGEST_SCATTER
+    return _judged("calibration", words, bad, "fix the frequency and stop what else runs")
 
 
 def share(part: float) -> Finding:
     """Judge how much of a core a busy process gets."""
     words = f"{min(part, 1.0):.1%} of a core for a busy process"
-    if part < LEAST_SHARE:
-        return Finding("share", "bad", words, "stop what else runs on this machine")
-    return Finding("share", "ok", words)
+    return _judged("share", words, part < LEAST_SHARE, "stop what else runs on this machine")
 
 
 def steal(part: float) -> Finding:
     """Judge how much time the host took away from a virtual machine."""
     words = f"{part:.1%} of a core taken away by the host"
-    if part > LARGEST_STEAL:
-        return Finding("stolen time", "bad", words, "use a machine of its own")
-    return Finding("stolen time", "ok", words)
+    return _judged("stolen time", words, part > LARGEST_STEAL, "use a machine of its own")
+
+
+def _judged(what: str, words: str, bad: bool, advice: str) -> Finding:
+    return Finding(what, "bad" if bad else "ok", words, advice * bad)
 
 
 def _quota() -> float | None:
@@ -256,12 +254,6 @@ def _running() -> int:
         if line.startswith("procs_running"):
             return int(line.split()[1])
     return 1
-
-
-def _stolen() -> float | None:
-    """Return the seconds that the host took from all cores since the start."""
-    fields = (_read(Path("/proc/stat")).splitlines() or [""])[0].split()
-    return int(fields[8]) / os.sysconf("SC_CLK_TCK") if len(fields) > 8 else None
 
 
 def _read(path: Path) -> str:

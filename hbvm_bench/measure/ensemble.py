@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.campaign.file import Ensemble, TimingPlan
+from hbvm_bench.campaign.file import Ensemble
 from hbvm_bench.measure.measured import Measured, ahead, largest_distance, position_error, positions
 from hbvm_bench.measure.starts import members
-from hbvm_bench.measure.timing import no_collection, sampled
+from hbvm_bench.measure.timing import no_collection
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.reference.solutions import Reference
-from hbvm_bench.store.records import Compile, Counters, TimingRound
+from hbvm_bench.store.records import Compile, Counters
 from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.analysis.invariants import evaluate
 from problems.errors import InputError
@@ -206,10 +206,10 @@ class EnsembleRun:
     par: Array | None = None
 
     @classmethod
-    def of(cls, problem: Problem, method: MethodBase, asked: Ensemble) -> "EnsembleRun":
-        """Return the run of a method on an ensemble of a problem, compiled."""
+    def of(cls, problem: Problem, method: MethodBase, program: Program, asked: Ensemble) -> "EnsembleRun":
+        """Return the run of a method, and the program it compiled, on an ensemble of a problem."""
         starts, par = members(problem, asked)
-        return cls(method.compile(problem.system), starts, problem, method.to_end, par)
+        return cls(program, starts, problem, method.to_end, par)
 
     def until(self, share: float) -> "EnsembleRun":
         """Return the run of a few of the trajectories, over the first ``share`` of the span."""
@@ -231,15 +231,6 @@ class EnsembleRun:
         failed = [one for one in made.status if one is not Status.FINISHED]
         status = failed[0] if failed else Status.FINISHED
         return spent / repeats, Samples(np.array([self.problem.t_end]), made.y[:1], status)
-
-
-def time_round(
-    problem: Problem, method: MethodBase, ensemble: Ensemble, plan: TimingPlan
-) -> TimingRound | str:
-    """Take the samples of one round; see `hbvm_bench.measure.timing.time_round`."""
-    run = EnsembleRun.of(problem, method, ensemble)
-    run.until(1.0).seconds()
-    return sampled(run, run.program, plan)
 
 
 def _errors(problem: Problem, starts: Array, par: Array, y: Array) -> dict[str, Array]:

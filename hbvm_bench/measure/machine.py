@@ -4,6 +4,7 @@ import os
 import platform
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from problems.errors import InputError
@@ -42,10 +43,11 @@ def describe(*, measure: bool = False) -> dict[str, str | int]:
     """
     from llvmlite import binding
 
+    vendor = _cpu().get("vendor_id", "")
     described: dict[str, str | int] = {
         "processor": _processor(),
-        "family": f"{VENDORS.get(_cpuinfo('vendor_id'), _cpuinfo('vendor_id'))} family "
-        f"{_cpuinfo('cpu family') or '?'}, model {_cpuinfo('model') or '?'}",
+        "family": f"{VENDORS.get(vendor, vendor)} family {_cpu().get('cpu family', '?')}, "
+        f"model {_cpu().get('model', '?')}",
         "llvm_processor": binding.get_host_cpu_name(),
         "cores": len(cores()),
         "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
@@ -174,23 +176,22 @@ def staying_on_a_core() -> Iterator[None]:
 
 def flags() -> set[str]:
     """Return what the processor says that it can do, in the words of ``/proc/cpuinfo``."""
-    return set(_cpuinfo("flags").split())
+    return set(_cpu().get("flags", "").split())
 
 
-def _cpuinfo(field: str) -> str:
+@cache  # every record describes the machine, and of many cores the file is long
+def _cpu() -> dict[str, str]:
+    """Return what the system says of the first core."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return ""
-    for line in text.splitlines():
-        name, _, value = line.partition(":")
-        if name.strip() == field:
-            return value.strip()
-    return ""
+        return {}
+    lines = (line.partition(":") for line in text.partition("\n\n")[0].splitlines())
+    return {name.strip(): value.strip() for name, _, value in lines}
 
 
 def _processor() -> str:
-    return _cpuinfo("model name") or platform.processor() or "unknown processor"
+    return _cpu().get("model name") or platform.processor() or "unknown processor"
 
 
 def _vector_instructions() -> str:

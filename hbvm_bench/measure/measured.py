@@ -104,10 +104,6 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
         As `integrators.integrate` returns it.
     reference : Reference, optional
         The trusted solution of the same problem.
-
-    Returns
-    -------
-    Measured
     """
     problem, t, y = solution.problem, solution.t, solution.y
     # an overflow is a result here: it becomes a sentence in the metrics

@@ -1,13 +1,15 @@
 """What a metric is, and when its number must not be compared."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from hbvm_bench.measure.measured import Measured
-from hbvm_bench.measure.quantities import Quantity
 from hbvm_bench.store.records import Value
+
+Quantity = Callable[[Measured], float | str]
 
 # A symmetry guard that left zero by less than this, relative to the size of the
 # trajectory, has not yet changed the trajectory; the row says so all the same.
@@ -46,13 +48,28 @@ class Metric:
     label: str
     short: str
     unit: str
-    better: Literal["lower"] | None
-    scale: Literal["log", "linear"]
     function: Quantity
     description: str
+    better: Literal["lower"] | None = "lower"
+    scale: Literal["log", "linear"] = "log"
     same_trajectory: bool = False
     whole_span: bool = True
     problem: str | None = None
+
+
+METRICS: dict[str, Metric] = {}
+"""All metrics by key, in the order of `hbvm_bench.measure.metrics`."""
+
+
+def metric(label: str, short: str, unit: str, more: str = "", **rest: Any) -> Callable[[Quantity], Quantity]:
+    """Make a function a metric: its name is the key, its docstring, and ``more``, the description."""
+
+    def enter(function: Quantity) -> Quantity:
+        key, words = function.__name__, f"{function.__doc__} {more}"
+        METRICS[key] = Metric(key, label, short, unit, function, " ".join(words.split()), **rest)
+        return function
+
+    return enter
 
 
 def guard_violation(measured: Measured) -> str:

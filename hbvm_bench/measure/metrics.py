@@ -1,14 +1,26 @@
-"""The one table of metrics: the command line, the reports and the documents read only this."""
+"""The one table of metrics: the command line, the reports and the documents read only this.
+
+A metric is a function from what was measured to a number, or to the sentence that says why there is
+none. Its docstring is what readers are told of it; a new metric is a function here.
+"""
 
 from collections.abc import Iterable
+from typing import Any
 
-from hbvm_bench.measure import quantities
+import numpy as np
+from numpy.typing import NDArray
+
+from hbvm_bench.measure import drift
 from hbvm_bench.measure.measured import POSITION, Measured
-from hbvm_bench.measure.metric import GUARD_TOLERANCE, Metric, guard_violation, value
+from hbvm_bench.measure.metric import GUARD_TOLERANCE, METRICS, Metric, guard_violation, metric, value
 from hbvm_bench.store.records import Value
 from problems.errors import unknown
 
 __all__ = ["GUARD_TOLERANCE", "METRICS", "TIMING_KEYS", "Metric", "evaluate", "find", "guard_violation"]
+
+PLANETOID_Z = 8  # component of Sitnikov's state
+LOADED = "another case had loaded it; the timing pass measures it"
+TIMING_KEYS = ("warm_seconds", "throughput", "compile_seconds", "compile_cold", "compile_cached")
 
 
 def evaluate(measured: Measured, keys: Iterable[str] | None = None) -> dict[str, Value]:
@@ -32,304 +44,252 @@ def find(key: str) -> Metric:
     return METRICS[key]
 
 
-_TABLE = [
-    Metric(
-        key="energy_max",
-        label="energy error",
-        short="energy",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.error_max("energy"),
-        description="Largest relative error of the energy over all samples, evaluated in double-double.",
-    ),
-    Metric(
-        key="energy_end",
-        label="energy error at the end",
-        short="energy, end",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.energy_end,
-        description="Relative error of the energy at the last sample.",
-    ),
-    Metric(
-        key="angular_momentum_max",
-        label="angular momentum error",
-        short="ang. mom.",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.error_max("angular_momentum"),
-        description="Largest 2-norm of the error of the angular momentum vector, relative to its length.",
-    ),
-    Metric(
-        key="invariants_max",
-        label="error of the other invariants",
-        short="others",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.others_max,
-        description="Largest error of any invariant but the energy over all samples, relative to its size.",
-    ),
-    Metric(
-        key="energy_slope",
-        label="power of t of the energy error",
-        short="slope",
-        unit="",
-        better="lower",
-        scale="linear",
-        function=quantities.law_number("slope"),
-        description="Power of t with which the energy error grows, over starts: 1/2 for a random walk.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="energy_rate",
-        label="mean energy drift",
-        short="drift",
-        unit="1/time",
-        better=None,
-        scale="linear",
-        function=quantities.law_number("rate"),
-        description="Mean signed relative energy error per unit of time, over several starts.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="energy_rms",
-        label="energy error at the end, over the starts",
-        short="energy, rms",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.energy_rms,
-        description="Root mean square over several starts of the relative energy error at the end.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="energy_bias",
-        label="mean energy error over what is called a drift",
-        short="bias",
-        unit="",
-        better="lower",
-        scale="linear",
-        function=quantities.energy_bias,
-        description="Mean energy error over several starts, in units of the least that is called a drift "
-        "(3 of its standard errors, with few starts more): above 1 it is one.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="energy_rate_least",
-        label="least energy drift within the interval",
-        short="least drift",
-        unit="1/time",
-        better="lower",
-        scale="log",
-        function=quantities.energy_rate_least,
-        description="The drift nearest to 0 in the 95 % interval over several starts; 0 where that has it.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="reversal",
-        label="error of time reversal",
-        short="reversal",
-        unit="length",
-        better="lower",
-        scale="log",
-        function=quantities.reversal,
-        description="Largest distance of a body from its start after integrating part of the span and back.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="guard_max",
-        label="off-axis distance",
-        short="off axis",
-        unit="length",
-        better="lower",
-        scale="log",
-        function=quantities.guard_max,
-        description="Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the "
-        "planetoid's distance from the axis). Where it is not 0 the run follows another trajectory.",
-    ),
-    Metric(
-        key="position_end",
-        label="position error at the end",
-        short="position",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.position_end,
-        description="Position error at the end time. " + POSITION,
-        same_trajectory=True,
-    ),
-    Metric(
-        key="position_max",
-        label="position error",
-        short="position, max",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.position_max,
-        description="The same, the largest over the times of the stored reference.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="position_mean",
-        label="mean position error",
-        short="position, mean",
-        unit="relative",
-        better="lower",
-        scale="log",
-        function=quantities.position_mean,
-        description="The geometric mean over the times of the stored reference after the start: at "
-        "round-off a single one is a matter of luck.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="phase_end",
-        label="phase error at the end",
-        short="phase",
-        unit="time",
-        better="lower",
-        scale="log",
-        function=quantities.phase_end,
-        description="How far in time the run is from the reference along its trajectory at the end.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="phase_max",
-        label="phase error",
-        short="phase, max",
-        unit="time",
-        better="lower",
-        scale="log",
-        function=quantities.phase_max,
-        description="The same, the largest over the times of the stored reference.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="z_end",
-        label="z at the end",
-        short="z(end)",
-        unit="length",
-        better=None,
-        scale="linear",
-        function=quantities.axis_end,
-        description="Where the planetoid is on the axis at the end time.",
-        same_trajectory=True,
-        problem="sitnikov",
-    ),
-    Metric(
-        key="z_error",
-        label="error of z at the end",
-        short="z error",
-        unit="length",
-        better="lower",
-        scale="log",
-        function=quantities.axis_error,
-        description="Distance of z at the end time from the stored 128-bit reference.",
-        same_trajectory=True,
-        problem="sitnikov",
-    ),
-    Metric(
-        key="distance_max",
-        label="largest distance",
-        short="distance",
-        unit="length",
-        better=None,
-        scale="log",
-        function=quantities.distance_max,
-        description="Largest distance of a body from the origin: shows what escaped.",
-    ),
-    Metric(
-        key="steps",
-        label="steps",
-        short="steps",
-        unit="",
-        better=None,
-        scale="log",
-        function=quantities.counter("steps", "steps"),
-        description="Accepted steps.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="evaluations",
-        label="evaluations",
-        short="evals",
-        unit="",
-        better="lower",
-        scale="log",
-        function=quantities.counter("evaluations", "right-hand-side evaluations"),
-        description="Evaluations of the vector field at one state; Taylor methods and maps have none.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="warm_seconds",
-        label="time",
-        short="time",
-        unit="s",
-        better="lower",
-        scale="log",
-        function=quantities.warm_seconds,
-        description="Median wall seconds of a whole integration without output, compiled before, alone.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="throughput",
-        label="trajectories per second",
-        short="per second",
-        unit="1/s",
-        better=None,
-        scale="log",
-        function=quantities.throughput,
-        description="Trajectories of an ensemble per second, on one core.",
-        same_trajectory=True,
-    ),
-    Metric(
-        key="compile_seconds",
-        label="compile time",
-        short="compile",
-        unit="s",
-        better="lower",
-        scale="log",
-        function=quantities.compile_seconds,
-        description="Seconds of compilation before the first step, from a cache where the library keeps one.",
-        whole_span=False,
-    ),
-    Metric(
-        key="compile_cold",
-        label="compile time, cold",
-        short="cold",
-        unit="s",
-        better="lower",
-        scale="log",
-        function=quantities.compiled(cached=False),
-        description="Seconds of compilation with nothing in a cache.",
-        whole_span=False,
-    ),
-    Metric(
-        key="compile_cached",
-        label="compile time, cached",
-        short="cached",
-        unit="s",
-        better="lower",
-        scale="log",
-        function=quantities.compiled(cached=True),
-        description="Seconds until compiled code was loaded from the library's cache.",
-        whole_span=False,
-    ),
-    Metric(
-        key="peak_memory",
-        label="peak memory",
-        short="memory",
-        unit="MiB",
-        better="lower",
-        scale="log",
-        function=quantities.peak_memory,
-        description="Largest resident memory of the process that took the samples, libraries included.",
-        whole_span=False,
-    ),
-]
+@metric("energy error", "energy", "relative")
+def energy_max(m: Measured) -> float | str:
+    """Largest relative error of the energy over all samples, evaluated in double-double."""
+    return _error_max(m, "energy")
 
-METRICS: dict[str, Metric] = {metric.key: metric for metric in _TABLE}
-TIMING_KEYS = ("warm_seconds", "throughput", "compile_seconds", "compile_cold", "compile_cached")
+
+@metric("energy error at the end", "energy, end", "relative")
+def energy_end(m: Measured) -> float | str:
+    """Relative error of the energy at the last sample."""
+    if "energy" not in m.errors:
+        return "the problem declares no energy"
+    return float(m.errors["energy"][-1]) if m.t.size else "no samples"
+
+
+@metric("angular momentum error", "ang. mom.", "relative")
+def angular_momentum_max(m: Measured) -> float | str:
+    """Largest 2-norm of the error of the angular momentum vector, relative to its length."""
+    return _error_max(m, "angular_momentum")
+
+
+@metric("error of the other invariants", "others", "relative")
+def invariants_max(m: Measured) -> float | str:
+    """Largest error of any invariant but the energy over all samples, relative to its size."""
+    others = [errors for name, errors in m.errors.items() if name != "energy"]
+    return _largest_of(others, m) if others else "the problem has no invariant but the energy"
+
+
+@metric("power of t of the energy error", "slope", "", scale="linear", same_trajectory=True)
+def energy_slope(m: Measured) -> float | str:
+    """Power of t with which the energy error grows, over starts: 1/2 for a random walk."""
+    return _of_law(m, "slope")
+
+
+@metric("mean energy drift", "drift", "1/time", better=None, scale="linear", same_trajectory=True)
+def energy_rate(m: Measured) -> float | str:
+    """Mean signed relative energy error per unit of time, over several starts."""
+    return _of_law(m, "rate")
+
+
+@metric("energy error at the end, over the starts", "energy, rms", "relative", same_trajectory=True)
+def energy_rms(m: Measured) -> float | str:
+    """Root mean square over several starts of the relative energy error at the end."""
+    errors = m.drift.get("energy", np.empty((0, 0)))
+    return float(drift.rms(errors)[-1]) if errors.size else "no further starts were asked for"
+
+
+@metric("mean energy error over what is called a drift", "bias", "", scale="linear", same_trajectory=True)
+def energy_bias(m: Measured) -> float | str:
+    """Mean energy error over several starts, in units of the least that is called a drift
+    (3 of its standard errors, with few starts more): above 1 it is one.
+    """
+    law = m.laws.get("energy")
+    if law is None or law.mean is None or not law.mean_error:
+        return "a mean needs several starts"
+    return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
+
+
+@metric("least energy drift within the interval", "least drift", "1/time", same_trajectory=True)
+def energy_rate_least(m: Measured) -> float | str:
+    """The drift nearest to 0 in the 95 % interval over several starts; 0 where that has it."""
+    law = m.laws.get("energy")
+    if law is None or law.rate_low is None or law.rate_high is None:
+        return "an interval needs several starts"
+    return max(law.rate_low, -law.rate_high, 0.0)
+
+
+@metric("error of time reversal", "reversal", "length", same_trajectory=True)
+def reversal(m: Measured) -> float | str:
+    """Largest distance of a body from its start after integrating part of the span and back."""
+    return m.reversal
+
+
+@metric("off-axis distance", "off axis", "length")
+def guard_max(m: Measured) -> float | str:
+    """Largest value of what the problem's symmetry keeps at exactly 0 (Sitnikov: the
+    planetoid's distance from the axis). Where it is not 0 the run follows another trajectory.
+    """
+    return _largest_of(list(m.guards.values()), m) if m.guards else "the problem declares no symmetry guard"
+
+
+@metric("position error at the end", "position", "relative", more=POSITION, same_trajectory=True)
+def position_end(m: Measured) -> float | str:
+    """Position error at the end time."""
+    return _no_reference_at_end(m) or float(m.position[-1])
+
+
+@metric("position error", "position, max", "relative", same_trajectory=True)
+def position_max(m: Measured) -> float | str:
+    """The same, the largest over the times of the stored reference."""
+    return _no_reference(m) or _largest(m.position, m.position_t)
+
+
+@metric("mean position error", "position, mean", "relative", same_trajectory=True)
+def position_mean(m: Measured) -> float | str:
+    """The geometric mean over the times of the stored reference after the start: at round-off a single
+    one is a matter of luck.
+    """
+    if why := _no_reference_at_end(m):
+        return why
+    with np.errstate(divide="ignore"):
+        return float(np.exp(np.mean(np.log(m.position[m.position_t != m.problem.t0]))))
+
+
+@metric("phase error at the end", "phase", "time", same_trajectory=True)
+def phase_end(m: Measured) -> float | str:
+    """How far in time the run is from the reference along its trajectory at the end."""
+    return _no_reference_at_end(m) or abs(float(m.phase[-1]))
+
+
+@metric("phase error", "phase, max", "time", same_trajectory=True)
+def phase_max(m: Measured) -> float | str:
+    """The same, the largest over the times of the stored reference."""
+    return _no_reference(m) or _largest(m.phase, m.position_t)
+
+
+@metric(
+    "z at the end", "z(end)", "length",
+    better=None, scale="linear", same_trajectory=True, problem="sitnikov",
+)  # fmt: skip
+def z_end(m: Measured) -> float | str:
+    """Where the planetoid is on the axis at the end time."""
+    return float(m.y[-1, PLANETOID_Z]) if m.complete else f"ended at t = {m.t_stop:.4g}"
+
+
+@metric("error of z at the end", "z error", "length", same_trajectory=True, problem="sitnikov")
+def z_error(m: Measured) -> float | str:
+    """Distance of z at the end time from the stored 128-bit reference."""
+    if (why := _no_reference_at_end(m)) or m.reference is None:
+        return why
+    (last,) = np.flatnonzero(m.reference.t == m.t[-1])
+    high, low = m.reference.high[last, PLANETOID_Z], m.reference.low[last, PLANETOID_Z]
+    return abs(float((m.y[-1, PLANETOID_Z] - high) - low))
+
+
+@metric("largest distance", "distance", "length", better=None)
+def distance_max(m: Measured) -> float | str:
+    """Largest distance of a body from the origin: shows what escaped."""
+    return _largest(m.distance, m.t)
+
+
+@metric("steps", "steps", "", better=None, same_trajectory=True)
+def steps(m: Measured) -> float | str:
+    """Accepted steps."""
+    return "not applicable: the library counts no steps" if m.counters.steps is None else m.counters.steps
+
+
+@metric("evaluations", "evals", "", same_trajectory=True)
+def evaluations(m: Measured) -> float | str:
+    """Evaluations of the vector field at one state; Taylor methods and maps have none."""
+    if m.counters.evaluations is None:
+        return "not applicable: the library counts no right-hand-side evaluations"
+    return m.counters.evaluations
+
+
+@metric("time", "time", "s", same_trajectory=True)
+def warm_seconds(m: Measured) -> float | str:
+    """Median wall seconds of a whole integration without output, compiled before, alone."""
+    if m.timing is None:
+        return "not timed"
+    return m.timing.summary.get("median", m.timing.why or "not timed")
+
+
+@metric("trajectories per second", "per second", "1/s", better=None, same_trajectory=True)
+def throughput(m: Measured) -> float | str:
+    """Trajectories of an ensemble per second, on one core."""
+    if m.trajectories == 1:
+        return "one trajectory, no ensemble"
+    seconds = warm_seconds(m)
+    return seconds if isinstance(seconds, str) else m.trajectories / seconds
+
+
+@metric("compile time", "compile", "s", whole_span=False)
+def compile_seconds(m: Measured) -> float | str:
+    """Seconds of compilation before the first step, from a cache where the library keeps one."""
+    compiled = m.timing.compile if m.timing is not None and m.timing.compile else m.compile
+    if compiled is None:
+        return LOADED
+    return "nothing is compiled at run time" if compiled.cached is None else compiled.seconds
+
+
+@metric("compile time, cold", "cold", "s", whole_span=False)
+def compile_cold(m: Measured) -> float | str:
+    """Seconds of compilation with nothing in a cache."""
+    return _compiled(m, cached=False, otherwise="compiled code was in the cache already")
+
+
+@metric("compile time, cached", "cached", "s", whole_span=False)
+def compile_cached(m: Measured) -> float | str:
+    """Seconds until compiled code was loaded from the library's cache."""
+    return _compiled(m, cached=True, otherwise="compiled code was not in a cache")
+
+
+@metric("peak memory", "memory", "MiB", whole_span=False)
+def peak_memory(m: Measured) -> float | str:
+    """Largest resident memory of the process that took the samples, libraries included."""
+    return "not measured" if m.peak_gib is None else 1024.0 * m.peak_gib
+
+
+def _error_max(m: Measured, invariant: str) -> float | str:
+    if invariant not in m.errors:
+        return f"the problem declares no {invariant.replace('_', ' ')}"
+    return _largest(m.errors[invariant], m.t)
+
+
+def _of_law(m: Measured, name: str) -> float | str:
+    """Return a number of the law of the energy's error."""
+    law = m.laws.get("energy")
+    if law is None:
+        return "no law was sought"
+    number = getattr(law, name)
+    return law.why or "the samples do not say" if number is None else number
+
+
+def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:
+    """Return the median seconds of the compilations of a kind; ``otherwise`` where there are only others."""
+    rounds = m.timing.rounds if m.timing is not None else []
+    found = [one for one in (m.compile, *(r.compile for r in rounds)) if one is not None]
+    if not found:
+        return LOADED
+    if all(one.cached is None for one in found):
+        return "nothing is compiled at run time"
+    seconds = sorted(one.seconds for one in found if one.cached is cached)
+    return seconds[(len(seconds) - 1) // 2] if seconds else otherwise
+
+
+def _largest(values: NDArray[np.float64], t: NDArray[np.float64]) -> float | str:
+    if values.size == 0:
+        return "no samples"
+    bad = np.flatnonzero(~np.isfinite(values))
+    if bad.size:
+        return f"not finite from t = {t[bad[0]]:.4g}"
+    return float(np.max(np.abs(values)))
+
+
+def _largest_of(series: list[NDArray[np.float64]], m: Measured) -> float | str:
+    found: list[Any] = [_largest(values, m.t) for values in series]
+    return next((one for one in found if isinstance(one, str)), None) or max(found)
+
+
+def _no_reference(m: Measured) -> str:
+    return "no stored reference for this problem" if m.reference is None else ""
+
+
+def _no_reference_at_end(m: Measured) -> str:
+    if m.reference is not None and not m.complete:
+        return f"ended at t = {m.t_stop:.4g}"
+    if m.reference is not None and (m.position_t.size == 0 or m.position_t[-1] != m.t[-1]):
+        return "the reference does not reach the end time"
+    return _no_reference(m)

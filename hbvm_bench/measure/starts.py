@@ -35,29 +35,12 @@ def scaled(problem: Problem, count: int) -> Array:
     return problem.y0 * np.repeat(factors, [dof, dim - dof], axis=1)
 
 
-def cloud(problem: Problem, count: int, spread: float) -> Array:
-    """Return the starts of an ensemble, shape (count, dim); the first is the problem's own.
-
-    Every number is multiplied by 1 + ``spread`` x, where x runs evenly through [-1, 1] in
-    all of them together: the Weyl sequence of the root of x^(dim+1) = x + 1.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its start is the centre.
-    count : int
-        How many.
-    spread : float
-        Relative size.
-    """
-    return problem.y0 * (1.0 + spread * _evenly(count, problem.system.dim))
-
-
 def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
     """Return the starts and the parameters of an ensemble, shapes (n, dim) and (n, n_par).
 
-    As `cloud`, of the start and of each parameter that varies, together; all numbers of a
-    parameter that is a list are multiplied by one.
+    The first is the problem's own. Every number of the start, and each parameter that varies, is
+    multiplied by 1 + spread x, where x runs evenly through [-1, 1] in all of them together: the Weyl
+    sequence of the root of x^(n+1) = x + 1. All numbers of a parameter that is a list are multiplied by one.
 
     Raises
     ------

@@ -1,7 +1,11 @@
-"""Warm seconds of whole integrations, honestly: compiled before, without output, samples kept."""
+"""Warm seconds of whole integrations, honestly: compiled before, without output, samples kept.
+
+A run is timed alone in its process, or together with all settings of its problem, in turn.
+"""
 
 import gc
 import math
+import os
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,10 +15,11 @@ from statistics import median, quantiles
 from typing import Any, Literal, Protocol
 
 import numpy as np
+import psutil
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import TimingPlan
-from hbvm_bench.store.records import Compile, TimingRound
+from hbvm_bench.store.records import Compile, Load, Timing, TimingRound
 from integrators.protocol import MethodBase, Program, Samples, Status
 from problems.problem import Problem
 
@@ -22,6 +27,9 @@ WARM_UP = 0.01  # of the span: everything has run once
 SLOW = 1.0  # seconds; an integration longer than this needs no second warm-up
 CALIBRATION_LOOPS = 800_000
 ORDER_SEED = 2026
+NOWHERE = 1e-9  # of the span: what a call takes that goes next to nowhere
+CALLS = 20
+CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "thread": time.thread_time}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,28 +56,13 @@ class Run:
     sample: str | None
 
     @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        method: MethodBase,
-        program: Program | None = None,
-        *,
-        t_end: float | None = None,
-    ) -> "Run":
+    def of(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
         """Return the run of a method on a problem, which meets its end as the method's library does.
 
-        Parameters
-        ----------
-        problem, method
-            What to integrate, and how.
-        program : Program, optional
-            What ``method.compile(problem.system)`` returned; made anew by default.
-        t_end : float, optional
-            The problem's own by default.
+        ``program`` is what ``method.compile(problem.system)`` returned; it is made anew by default.
         """
         program = method.compile(problem.system) if program is None else program
-        end = problem.t_end if t_end is None else t_end
-        return cls(program, problem.y0, problem.par, problem.t0, end, method.to_end)
+        return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
 
     def seconds(
         self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
@@ -180,26 +173,6 @@ def repeats_for(seconds: float, shortest: float) -> int:
     return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1
 
 
-def time_round(problem: Problem, method: MethodBase, plan: TimingPlan) -> TimingRound | str:
-    """Take the samples of one round.
-
-    Parameters
-    ----------
-    problem, method
-        What to time: integrations from ``t0`` to ``t_end`` that return the end state only.
-    plan : TimingPlan
-        How many samples, and how long they may take.
-
-    Returns
-    -------
-    TimingRound or str
-        A sentence where the integration does not reach the end.
-    """
-    run = Run.of(problem, method)
-    run.until(WARM_UP).seconds()
-    return sampled(run, run.program, plan)
-
-
 class Timeable(Protocol):
     """What can be timed: a `Run`, or an ensemble."""
 
@@ -219,13 +192,27 @@ class Timeable(Protocol):
         ...
 
 
-def sampled(run: Timeable, program: Program, plan: TimingPlan) -> TimingRound | str:
-    """Take the samples of one round of a run that is warm; see `time_round`."""
+def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
+    """Take the samples of one round of a run that is alone in its process.
+
+    Parameters
+    ----------
+    run : Timeable
+        Compiled.
+    plan : TimingPlan
+        How many samples, and how long they may take.
+
+    Returns
+    -------
+    Timing
+        Of one round; of none, with the reason, where the integration does not reach the end.
+    """
+    run.until(WARM_UP).seconds()
     wall, busy = time.perf_counter(), time.process_time()
     calibration = [calibrate()]
     first, reached = run.seconds()
     if reached.status is not Status.FINISHED:
-        return f"not timed: the integration ended as {reached.status.value}"
+        return _unfinished(reached)
     repeats = repeats_for(first, plan.shortest)
     samples = [first] if first > SLOW else []
     calibration += [calibrate()] if samples else []
@@ -236,13 +223,102 @@ def sampled(run: Timeable, program: Program, plan: TimingPlan) -> TimingRound | 
         calibration.append(calibrate())
         spent += mean * repeats
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
-    return TimingRound(
+    taken = TimingRound(
         share=round(busy / wall, 3),
         samples=samples,
         repeats=repeats,
         calibration=calibration,
-        compile=Compile(seconds=float(program.compile_seconds), cached=program.from_cache),
+        compile=_compilation(run),
     )
+    return Timing(rounds=[taken])
+
+
+def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
+    """Take all samples of the runs of one problem, interleaved round by round in this process.
+
+    Every round begins with a garbage collection and one sample of the calibration. A run
+    that is too slow for all rounds within the plan's budget takes part in fewer of them.
+
+    Parameters
+    ----------
+    runs : sequence of Timeable
+        Compiled.
+    plan : TimingPlan
+        How many rounds, in which order and by which clock.
+
+    Returns
+    -------
+    list of Timing
+        For each run; without rounds, with the reason, where it does not reach the end.
+    """
+    clock = CLOCKS[plan.clock]
+    firsts, calls = [], []
+    for run in runs:
+        run.until(WARM_UP).seconds()
+        firsts.append(run.seconds(clock=clock))
+        calls.append(run.until(NOWHERE).seconds(CALLS, clock)[0])
+    fine = [i for i, (_, reached) in enumerate(firsts) if reached.status is Status.FINISHED]
+    repeats = {i: repeats_for(firsts[i][0], plan.shortest) for i in fine}
+    turns = {
+        i: spread_evenly(int(plan.budget / max(firsts[i][0] * repeats[i], 1e-9)), plan.rounds) for i in fine
+    }
+    calibration: list[float] = []
+
+    def begin(number: int) -> None:
+        gc.collect()
+        calibration.append(calibrate())
+
+    before = busy()
+    taken = interleaved(
+        [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine],
+        plan.rounds,
+        order=plan.order,
+        turns=[turns[i] for i in fine],
+        begin=begin,
+    )
+    load = load_between(before, busy())
+    made = [_unfinished(reached) for _, reached in firsts]
+    for i, seconds in zip(fine, taken, strict=True):
+        compiled, enough = _compilation(runs[i]), len(seconds) == plan.rounds
+        made[i] = Timing(
+            rounds=[
+                TimingRound(
+                    samples=[sample],
+                    repeats=repeats[i],
+                    compile=compiled,
+                    calibration=[calibration[n]],
+                    number=n,
+                )
+                for n, sample in zip(turns[i], seconds, strict=True)
+            ],
+            why="" if enough else f"{len(seconds)} of {plan.rounds} rounds: a run takes {firsts[i][0]:.2g} s",
+            call=calls[i],
+            load=load,
+        )
+    return made
+
+
+def _unfinished(reached: Samples) -> Timing:
+    return Timing(why=f"not timed: the integration ended as {reached.status.value}")
+
+
+def _compilation(run: Timeable) -> Compile:
+    return Compile(seconds=float(run.program.compile_seconds), cached=run.program.from_cache)
+
+
+def busy() -> tuple[float, float, float, float]:
+    """Return, in seconds, the busy and stolen time of all cores, our own, and the wall clock's."""
+    all_, own = psutil.cpu_times(), os.times()
+    spent = all_.user + all_.nice + all_.system + all_.irq + all_.softirq
+    return spent, all_.steal, own.user + own.system, own.elapsed
+
+
+def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | None:
+    """Return what else the machine did between two looks at `busy`; ``None`` where they are one."""
+    all_, stolen, own, wall = (b - a for a, b in zip(before, after, strict=True))
+    if wall <= 0.0:
+        return None
+    return Load(others=round(max(all_ - own, 0.0) / wall, 3), stolen=round(stolen / wall, 3))
 
 
 def calibrate() -> float:

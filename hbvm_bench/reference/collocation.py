@@ -246,6 +246,3 @@ def _decay(slope, legendre):
             else:
                 tail = max(tail, abs(total.hi))
     return tail / top
-
-
-__all__ = ["decimals", "integrate"]

@@ -329,6 +329,3 @@ def _setitem(a, i, value):
         a.pairs[i, 1] = 0.0
 
     return single
-
-
-__all__ = ["FUNCTIONS", "NUMBER", "ROW", "number", "row"]

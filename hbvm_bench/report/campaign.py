@@ -4,9 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
-import msgspec
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.report import overview, provenance, words
+from hbvm_bench.report import provenance, words
 from hbvm_bench.report.document import (
     Block,
     Commands,
@@ -28,14 +26,15 @@ from hbvm_bench.report.document import (
     Section,
     attempt,
 )
+from hbvm_bench.report.figures.profiles import profiles
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.problem import ProblemPart, part
-from hbvm_bench.store.files import csv_of, json_of
+from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
-from hbvm_bench.store.store import Store, again, damage, progress
-from hbvm_bench.summaries import fairness, goals
+from hbvm_bench.store.store import Index, Store, again, damage, progress
+from hbvm_bench.summaries import export, fairness, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import family_of
-from hbvm_bench.summaries.rows import columns, group_of, status_of, tasks
+from hbvm_bench.summaries.rows import columns, tasks
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -53,24 +52,15 @@ KINDS = ("chosen", "default", "recommended", "as published", "outside its domain
 
 @dataclass(frozen=True)
 class Run:
-    """One of the runs that a report is made of.
+    """One of the runs that a report is made of: what was asked for, and the cases that have no result yet."""
 
-    Attributes
-    ----------
-    title, description, command, version
-        Of its campaign.
-    planned : int
-        How many cases it has.
-    missing : list of Case
-        Those that have no result yet.
-    """
-
-    title: str
-    description: str
-    command: str
-    version: str
-    planned: int
+    index: Index
     missing: list[Case]
+
+    @property
+    def title(self) -> str:
+        """For readers."""
+        return self.index.campaign.title or self.index.campaign.name
 
 
 @dataclass(frozen=True)
@@ -109,15 +99,7 @@ def gather(stores: Sequence[Store]) -> Gathered:
             f"{str(stores[0].directory)!r} has finished; {again(indices[0], stores[0].directory)}."
         )
     runs = [
-        Run(
-            title=index.campaign.title or index.campaign.name,
-            description=" ".join(index.campaign.description.split()),
-            command=index.command,
-            version=index.version,
-            planned=len(index.ids),
-            missing=[case for number, case in index.listed() if number not in furthest],
-        )
-        for index in indices
+        Run(index, [case for number, case in index.listed() if number not in furthest]) for index in indices
     ]
     found = [
         _read(record, store) if number < DRAWN_CASES else (record, {})
@@ -160,7 +142,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
     overall = _overall(records, several=len(parts) > 1)
     return Document(
         title,
-        [runs[0].description] if one else [],
+        [runs[0].index.campaign.description] if one else [],
         [
             *attempt(("the goals", partial(_goals, stores, records))),
             *(overall if len(parts) > 1 else []),
@@ -207,20 +189,28 @@ def _overall(records: Sequence[Record], *, several: bool) -> list[Block]:
     for record in records:
         numbers.setdefault(family_of(record), look[record.case.method].number)
     made = attempt(
-        ("which integrator for which need", partial(overview.needed, records)),
-        ("which integrator on which problem", partial(overview.outcome, records)),
-        ("the law of the energy's drift", partial(overview.drifting, records)),
-        ("performance profiles", partial(overview.profiles, records, numbers)),
+        ("which integrator for which need", partial(needs.table, records)),
+        ("which integrator on which problem", partial(_outcomes, records)),
+        ("the law of the energy's drift", partial(laws.table, records)),
+        ("performance profiles", partial(profiles, records, numbers)),
     )
     return [Section(title, made, "overview", nav="Over all problems" * several)] if made else []
+
+
+def _outcomes(records: Sequence[Record]) -> list[Block]:
+    """Return which integrator reached the end of which problem, and why not; nothing for one problem."""
+    if (found := outcomes.table(records)) is None:
+        return []
+    table, reasons = found
+    return [table, *([Details(f"Why not: {len(reasons)} reasons", [Items(reasons)])] if reasons else [])]
 
 
 def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequence[Record]) -> Section:
     """Return what came out: the sentences where there are few, and every case as a row."""
     blocks: list[Block] = [
         Notice(
-            f"{len(run.missing)} of {run.planned} cases have no result yet",
-            f"({run.title}). To run them: `{run.command}`",
+            f"{len(run.missing)} of {len(run.index.ids)} cases have no result yet",
+            f"({run.title}). To run them: `{run.index.command}`",
         )
         for run in runs
         if run.missing
@@ -268,7 +258,7 @@ def _fairness(records: Sequence[Record]) -> Section:
         "How many settings each method has",
         ("method", "library", "settings", *KINDS),
         [
-            (name, library, str(sum(kinds.values())), *(str(kinds.get(kind, 0)) for kind in KINDS))
+            (name, library, str(kinds.total()), *(str(kinds[kind]) for kind in KINDS))
             for name, library, kinds in words.settings_count(records)
         ],
         words=(0, 1),
@@ -292,11 +282,11 @@ def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
     return Section(
         "Run it again",
         [
-            Commands("\n".join(run.command for run in runs)),
-            f"Measured{f' on {days}' if days else ''} with hbvm-bench {runs[0].version}. "
+            Commands("\n".join(run.index.command for run in runs)),
+            f"Measured{f' on {days}' if days else ''} with hbvm-bench {runs[0].index.version}. "
             "`hbvm-bench show DIRECTORY --json` prints every number with all timing samples; "
             "`hbvm-bench report DIRECTORY` draws this report again without running anything.",
-            *provenance.facts(dict(provenance.machines(records)), dict(provenance.versions(records))),
+            *provenance.facts(provenance.machines(records), provenance.versions(records)),
         ],
         "again",
         nav="Run it again",
@@ -309,48 +299,12 @@ def _sources(parts: Sequence[ProblemPart]) -> list[str]:
 
 
 def _files(title: str, runs: Sequence[Run], records: Sequence[Record]) -> Files:
+    commands = [{"command": run.index.command, "version": run.index.version} for run in runs]
+    made_by = {"title": title, "runs": commands}
     return Files(
         "Every case with every metric, every reason and every timing sample",
         {
-            "data/results.csv": results_csv(records),
-            "data/results.json": json_of(results_json(title, runs, records)),
+            "data/results.csv": export.cases_csv(records),
+            "data/results.json": json_of(made_by | export.as_json(records)),
         },
     )
-
-
-def results_csv(records: Sequence[Record]) -> bytes:
-    """Return one line per case: what it is, how it ended, every metric, and the quartiles of the time."""
-    keys = [key for key in METRICS if any(key in record.result.metrics for record in records)]
-    first = ("problem", "method", "library", "settings", "group", "status", "reason", "t_stop")
-    rows: list[tuple[str, ...]] = [
-        (*first, *keys, *(f"{key}_void" for key in keys), "time_q1", "time_q3", "time_samples")
-    ]
-    for record in records:
-        result, values = record.result, record.result.metrics
-        summary = record.timing.summary if record.timing is not None else {}
-        numbers = (values[key].value if key in values else None for key in keys)
-        rows.append(
-            (
-                *(record.case.problem, record.case.method, record.library, record.case.settings),
-                *(group_of(record), status_of(record), result.reason or result.violation),
-                "" if result.t_stop is None else repr(result.t_stop),
-                *("" if number is None else repr(number) for number in numbers),
-                *("void" if key in values and values[key].void else "" for key in keys),
-                *("" if q not in summary else repr(summary[q]) for q in ("q1", "q3")),
-                " ".join(map(repr, record.timing.samples)) if record.timing is not None else "",
-            )
-        )
-    return csv_of(rows)
-
-
-def results_json(title: str, runs: Sequence[Run], records: Sequence[Record]) -> dict[str, Any]:
-    """Return all records as JSON values, with what they were made by."""
-    return {
-        "title": title,
-        "runs": [{"command": run.command, "version": run.version} for run in runs],
-        "metrics": {
-            metric.key: {"label": metric.label, "unit": metric.unit, "description": metric.description}
-            for metric in METRICS.values()
-        },
-        "cases": [msgspec.to_builtins(record) for record in records],
-    }

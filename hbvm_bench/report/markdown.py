@@ -24,7 +24,7 @@ from hbvm_bench.report.document import (
 )
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.summaries.rows import Row, seconds
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 
 def markdown(document: Document) -> str:
@@ -116,7 +116,7 @@ def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
     made = []
     for metric in columns:
         cell = row.cells.get(metric.key)
-        text = "–" if cell is None else f"({cell.text})" if cell.void else cell.text
+        text = NONE if cell is None else cell.shown
         if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:
             summary = row.record.timing.summary
             text += f" [{seconds(summary['q1'])}, {seconds(summary['q3'])}]"

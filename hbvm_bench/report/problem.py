@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
@@ -23,7 +23,7 @@ from hbvm_bench.report.figures.over_time import Drawn, OverTime
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import family_of, number
 from hbvm_bench.summaries.rows import GROUPS, at_once, group_of, rows, title_of
 from problems.problem import Problem
 
@@ -171,11 +171,10 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
     return [case for case in cases if case.record.id in kept][:MOST_DRAWN]
 
 
-def _rank(case: Drawn) -> tuple[str, float]:
-    metrics = case.record.result.metrics
-    values = [metrics[key] for key in ("position_end", "energy_max") if key in metrics]
-    number = next((v.value for v in values if v.counts and v.value is not None), np.inf)
-    return ("a" if group_of(case.record) == "on" else "b", number)
+def _rank(case: Drawn) -> tuple[bool, float]:
+    errors = [number(case.record, key) for key in ("position_end", "energy_max")]
+    least = next((error for error in errors if error is not None), np.inf)
+    return group_of(case.record) != "on", least
 
 
 OVER_TIME = (
@@ -262,7 +261,9 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
     if known is None:
         return None
     made = known.provenance
-    said = [f"Reference: {made.get('method', '')}, version {made.get('heyoka', '')}; {made.get('check', '')}"]
+    version = f", version {made['heyoka']}" if "heyoka" in made else ""
+    check = f"; {made['check']}" if "check" in made else ""
+    said = [f"Reference: {made.get('method', '')}{version}{check}"]
     if "agreement" in made:
         said.append(f"The two agree to {made['agreement']}")
     floor = problem.errors(known.high, known.t)

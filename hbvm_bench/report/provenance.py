@@ -27,16 +27,13 @@ def days(records: Sequence[Record]) -> str:
     return "" if not found else found[0] if found[0] == found[-1] else f"{found[0]} to {found[-1]}"
 
 
-def versions(records: Sequence[Record]) -> list[tuple[str, str]]:
-    """Return the libraries with their versions and how their machine code came about."""
-    found: dict[str, set[str]] = {}
-    for record in records:
-        for name, number in record.versions.items():
-            found.setdefault(name, set()).add(number)
-    return [
-        (name, ", ".join(sorted(numbers)) + (f" ({BUILT[name.lower()]})" if name.lower() in BUILT else ""))
-        for name, numbers in sorted(found.items())
-    ]
+def versions(records: Sequence[Record]) -> dict[str, str]:
+    """Return the versions of the libraries, and how their machine code came about."""
+    found = _each_once([record.versions for record in records], ", ")
+    return {
+        name: f"{numbers} ({BUILT[name.lower()]})" if name.lower() in BUILT else numbers
+        for name, numbers in found.items()
+    }
 
 
 def processors(records: Sequence[Record]) -> list[str]:
@@ -45,15 +42,19 @@ def processors(records: Sequence[Record]) -> list[str]:
     return machine.sentences(timing.machine for timing in timings if timing.machine)
 
 
-def machines(records: Sequence[Record]) -> list[tuple[str, str]]:
-    """Return what is known of the machine; values that differ between cases stand side by side."""
-    found: dict[str, list[str]] = {}
-    for record in records:
-        for name, value in sorted(record.machine.items()):
-            values = found.setdefault(name.replace("_", " "), [])
-            if str(value) not in values:
-                values.append(str(value))
-    return [(name, " | ".join(sorted(values))) for name, values in sorted(found.items())]
+def machines(records: Sequence[Record]) -> dict[str, str]:
+    """Return what is known of the machine."""
+    found = _each_once([record.machine for record in records], " | ")
+    return {name.replace("_", " "): values for name, values in found.items()}
+
+
+def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str]:
+    """Return the values by name; those that differ stand side by side."""
+    found: dict[str, set[str]] = {}
+    for one in all_:
+        for name, value in one.items():
+            found.setdefault(name, set()).add(str(value))
+    return {name: glue.join(sorted(values)) for name, values in sorted(found.items())}
 
 
 def again(
@@ -75,14 +76,5 @@ def again(
 
 def facts(machine: Mapping[str, object], versions: Mapping[str, object]) -> list[Table]:
     """Return the tables of what is known of the machine and of the libraries."""
-    found = (("machine", machine), ("library", versions))
-    return [
-        Table(
-            "",
-            (name, "" if name == "machine" else "version"),
-            [(k, str(v)) for k, v in of.items()],
-            words=(0, 1),
-        )
-        for name, of in found
-        if of
-    ]
+    found = ((("machine", ""), machine), (("library", "version"), versions))
+    return [Table("", head, [(k, str(v)) for k, v in of.items()], words=(0, 1)) for head, of in found if of]

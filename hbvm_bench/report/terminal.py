@@ -14,7 +14,7 @@ from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import goals
 from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -46,11 +46,15 @@ def print_json(value: Any) -> None:
     print(json_of(value).decode(), end="")
 
 
+def empty(title: str) -> RichTable:
+    """Return a table without columns, in the style of all."""
+    return RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+
+
 def print_table(table: Table) -> None:
     """Print a table of text."""
-    made = RichTable(
-        title=Text(table.title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, caption=table.note
-    )
+    made = empty(table.title)
+    made.caption = table.note
     for index, head in enumerate(table.head):
         made.add_column(
             Text(head), justify="left" if index in table.words else "right", overflow="fold", min_width=6
@@ -107,7 +111,7 @@ def _results(
     lines = rows(records, sort)
     hidden = 0 if keys else len(shown) - len(shown := _fitting(shown, lines, width))
     number_of = numbers(records)
-    made = RichTable(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    made = empty(title)
     made.add_column("#", justify="right", no_wrap=True)
     made.add_column("method", overflow="fold", min_width=NARROWEST)
     for metric in shown:
@@ -136,15 +140,10 @@ def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metr
     kept = list(shown)
 
     def needed() -> int:
-        lengths = [
-            max(
-                [
-                    len(metric.short),
-                    *(len(row.cells[metric.key].text) + 2 for row in lines if metric.key in row.cells),
-                ]
-            )
-            for metric in kept
-        ]
+        cells = {
+            metric.key: [row.cells[metric.key] for row in lines if metric.key in row.cells] for metric in kept
+        }
+        lengths = [max([len(one.short), *(len(cell.text) + 2 for cell in cells[one.key])]) for one in kept]
         return 5 + NARROWEST + sum(length + 3 for length in lengths)
 
     for key in GIVEN_UP:
@@ -159,7 +158,5 @@ def _method(row: Row) -> Text:
 
 
 def _cell(row: Row, key: str) -> Text:
-    if key not in row.cells:
-        return Text("–", style="dim")
-    cell = row.cells[key]
-    return Text(f"({cell.text})", style="dim") if cell.void else Text(cell.text)
+    cell = row.cells.get(key)
+    return Text(NONE if cell is None else cell.shown, style="dim" if cell is None or cell.void else "")

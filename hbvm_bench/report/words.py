@@ -1,18 +1,18 @@
 """What the report says in sentences; every number in them is read from the records."""
 
+from collections import Counter
 from collections.abc import Sequence
-from statistics import median
 
 from hbvm_bench.measure.measured import POSITION
-from hbvm_bench.measure.metrics import GUARD_TOLERANCE, METRICS
+from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
-from hbvm_bench.summaries.rows import group_of, seconds, status_of
+from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries.points import accurate, family_of, number
+from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, status_of
 
-# The levels of the summary's question "who is fastest among those that are right?"
-RIGHT_POSITION = 1e-8
-RIGHT_ENERGY = 1e-13
-UNDISTURBED = 0.9  # of a core, in the timing pass
+RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
+"""The errors in the summary's question "who is fastest among those that are right?\""""
+BEST = 3  # of them
 
 WITNESSES = (
     "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
@@ -78,22 +78,19 @@ WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
 
 def summary(records: Sequence[Record]) -> list[str]:
     """Return what came out of a problem's cases, in sentences, whoever wins."""
-    groups = {key: [r for r in records if group_of(r) == key] for key in ("on", "off", "ended")}
+    groups = {key: [r for r in records if group_of(r) == key] for key in GROUPS}
+    cases = "1 case" if len(records) == 1 else f"{len(records)} cases"
     sentences = [
-        f"{_count(len(records), 'case')}: {len(groups['on'])} follow the trajectory to the end, "
+        f"{cases}: {len(groups['on'])} follow the trajectory to the end, "
         f"{len(groups['off'])} lost its symmetry, {len(groups['ended'])} did not reach the end."
     ]
-    ranked = sorted(_counted(groups["on"], "position_end"), key=lambda r: _number(r, "position_end"))
+    ranked = _ranked(groups["on"], "position_end")
     if ranked:
-        sentences.append(_best("Smallest position error at the end", ranked[:3], "position_end"))
-        right = [
-            r for r in _counted(ranked, "energy_max", "warm_seconds")
-            if _number(r, "position_end") <= RIGHT_POSITION and _number(r, "energy_max") <= RIGHT_ENERGY
-        ]  # fmt: skip
-        fast = sorted(right, key=lambda r: _number(r, "warm_seconds"))
-        level = f"position to {RIGHT_POSITION:g} and energy to {RIGHT_ENERGY:g}"
+        sentences.append(_best("Smallest position error at the end", ranked, "position_end"))
+        fast = _ranked([r for r in ranked if accurate(r, RIGHT)], "warm_seconds")
+        level = " and ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in RIGHT.items())
         if fast:
-            sentences.append(_best(f"Fastest of the {len(fast)} that keep {level}", fast[:3], "warm_seconds"))
+            sentences.append(_best(f"Fastest of the {len(fast)} that keep {level}", fast, "warm_seconds"))
         elif any(r.timing for r in ranked):
             sentences.append(f"No case that was timed keeps {level}.")
     elif groups["on"]:
@@ -101,12 +98,7 @@ def summary(records: Sequence[Record]) -> list[str]:
             "This problem has no stored reference: positions are not measured, and nothing is ranked. "
             "`reference = true` in the campaign file, or `--reference`, computes one before the run."
         )
-    shares = [record.timing.share for record in records if record.timing and record.timing.rounds]
-    if shares and median(shares) < UNDISTURBED:
-        sentences.append(
-            f"The times are disturbed: the machine had other work and left half of the cases less than "
-            f"{median(shares):.0%} of a core. Compare them with care."
-        )
+    sentences += fairness.disturbed(records)
     for record in groups["ended"]:
         if record.result.outcome == "stalled":
             sentences.append(f"{record.case.method} {status_of(record)}, seen by the watchdog.")
@@ -117,16 +109,15 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
     """Return what our own methods do wrong, general facts first, then what this run shows."""
     shown = list(WEAKNESSES)
     for record in records:
-        if record.role != "ours" or group_of(record) != "on":
-            continue
-        position, energy = _value(record, "position_end"), _value(record, "energy_max")
-        if position is None or energy is None or position < 1e-2:
+        position, energy = number(record, "position_end"), number(record, "energy_max")
+        ours = record.role == "ours" and group_of(record) == "on"
+        if not ours or position is None or energy is None or position < 1e-2:
             continue
         parts = [
             f"Here {record.case.method} has the energy right to {energy:.1e} "
             f"and a position error of {position:.2g} at the end"
         ]
-        z, angular = _value(record, "z_error"), _value(record, "angular_momentum_max")
+        z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
         if z is not None:
             parts.append(f"z wrong by {z:.2g}")
         if angular is not None:
@@ -135,58 +126,33 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
     return shown
 
 
-def settings_count(records: Sequence[Record]) -> list[tuple[str, str, dict[str, int]]]:
+def settings_count(records: Sequence[Record]) -> list[tuple[str, str, Counter[str]]]:
     """Return method, library and how many settings it has of each kind."""
-    counted: dict[tuple[str, str], dict[str, int]] = {}
+    counted: dict[tuple[str, str], Counter[str]] = {}
     for record in records:
-        kinds = counted.setdefault((family_of(record), record.library), {})
-        kinds[record.case.settings] = kinds.get(record.case.settings, 0) + 1
+        counted.setdefault((family_of(record), record.library), Counter())[record.case.settings] += 1
     return [(name, library, kinds) for (name, library), kinds in counted.items()]
 
 
 def excluded(records: Sequence[Record]) -> list[str]:
     """Return which cases take no part in any ranking, and why."""
-    said = []
-    for record in records:
-        group = group_of(record)
-        if group == "on":
-            continue
-        why = record.result.violation if group == "off" else status_of(record)
-        reason = f": {record.result.reason}" if group == "ended" and record.result.reason else ""
-        said.append(f"{record.case.method} on {record.case.problem}: {why}{reason}".rstrip(". ") + ".")
-    return said
+    return [
+        f"{record.case.method} on {record.case.problem}: {reason_of(record)}".rstrip(". ") + "."
+        for record in records
+        if group_of(record) != "on"
+    ]
 
 
-def _best(title: str, records: Sequence[Record], key: str) -> str:
-    unit = METRICS[key].unit
+def _ranked(records: Sequence[Record], key: str) -> list[Record]:
+    """Return the cases that have a metric, the least first."""
+    found = [(value, record) for record in records if (value := number(record, key)) is not None]
+    return [record for _, record in sorted(found, key=lambda pair: pair[0])]
+
+
+def _best(title: str, ranked: Sequence[Record], key: str) -> str:
     parts = []
-    for record in records:
-        number = _number(record, key)
-        text = seconds(number) if unit == "s" else f"{number:.1e}"
-        energy = _value(record, "energy_max")
+    for record in ranked[:BEST]:
+        energy = number(record, "energy_max")
         beside = f", energy {energy:.1e}" if energy is not None and key == "position_end" else ""
-        parts.append(f"{record.case.method} ({text}{beside})")
+        parts.append(f"{record.case.method} ({format_metric(record, key)}{beside})")
     return f"{title}: {'; '.join(parts)}."
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
-def _counted(records: Sequence[Record], *keys: str) -> list[Record]:
-    def has(record: Record, key: str) -> bool:
-        value = record.result.metrics.get(key)
-        return value is not None and value.counts
-
-    return [record for record in records if all(has(record, key) for key in keys)]
-
-
-def _value(record: Record, key: str) -> float | None:
-    value = record.result.metrics.get(key)
-    return None if value is None else value.value
-
-
-def _number(record: Record, key: str) -> float:
-    value = _value(record, key)
-    assert value is not None
-    return value

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import fmean, variance
 
 FEWEST = 2  # finished cases before anything is said about one that never ran
 SPREAD = 0.3  # relative standard deviation of a case whose seconds are known from before
@@ -50,19 +51,16 @@ class Estimate:
         low, high : float
             Or ``None`` where too little is known.
         """
-        counts = [self._mean(key) for key in [*waiting, *running]]
-        if slots < 1 or any(mean is None for mean in counts):
+        means = {key: self._mean(key) for key in {*waiting, *running}}
+        if slots < 1 or None in means.values():
             return None
-        means = [mean for mean in counts if mean is not None]
-        rest = [
-            self._rest(mean, ran) for mean, ran in zip(means[len(waiting) :], running.values(), strict=True)
-        ]
-        total = sum(means[: len(waiting)]) + sum(rest)
-        doubt = 2 * math.sqrt(self._variance(waiting, means))
-        longest = max(rest, default=0.0)
+        mean = {key: seconds or 0.0 for key, seconds in means.items()}
+        rest = [self._rest(mean[key], ran) for key, ran in running.items()]
+        total = sum(mean[key] for key in waiting) + sum(rest)
+        doubt = 2 * math.sqrt(self._variance(waiting, mean))
         most = self._limit * math.ceil((len(waiting) + len(running)) / slots)
         low = max((total - doubt) / slots, 0.0)
-        return low, max(min(max((total + doubt) / slots, longest), most), low)
+        return low, max(min(max((total + doubt) / slots, max(rest, default=0.0)), most), low)
 
     def _rest(self, mean: float, ran: float) -> float:
         """Return the seconds left of a case; one that is overdue may take as long again."""
@@ -75,7 +73,7 @@ class Estimate:
             return self._known[key] * self._speed()
         if len(self._taken) < FEWEST:
             return None
-        return sum(self._taken.values()) / len(self._taken)
+        return fmean(self._taken.values())
 
     def _speed(self) -> float:
         """Return how much longer this run takes than the earlier one."""
@@ -83,19 +81,13 @@ class Estimate:
         before = sum(self._known[key] for key in both)
         return sum(self._taken[key] for key in both) / before if before > 0 else 1.0
 
-    def _variance(self, waiting: Sequence[str], means: Sequence[float]) -> float:
-        strangers = [key for key in waiting if key not in self._known and key not in self._taken]
-        familiar = sum(
-            (SPREAD * mean) ** 2
-            for key, mean in zip(waiting, means, strict=False)
-            if key in self._known or key in self._taken
-        )
-        if not strangers:
-            return familiar
-        taken = list(self._taken.values())
-        mean = sum(taken) / len(taken)
-        spread = sum((seconds - mean) ** 2 for seconds in taken) / (len(taken) - 1)
-        return familiar + spread * (len(strangers) + len(strangers) ** 2 / len(taken))
+    def _variance(self, waiting: Sequence[str], mean: Mapping[str, float]) -> float:
+        familiar = [key for key in waiting if key in self._known or key in self._taken]
+        found = sum((SPREAD * mean[key]) ** 2 for key in familiar)
+        if strangers := len(waiting) - len(familiar):
+            taken = self._taken.values()
+            found += variance(taken) * (strangers + strangers**2 / len(taken))
+        return found
 
 
 def in_words(left: tuple[float, float] | None) -> str:

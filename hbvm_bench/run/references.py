@@ -1,4 +1,4 @@
-"""References for the problems of a campaign that ask for one: made once, kept beside the results."""
+"""References for the problems of a campaign that ask for one or give their end: kept beside the results."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import numpy as np
 from hbvm_bench.campaign.file import Campaign, chosen
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.sweep import fill
-from hbvm_bench.reference import solutions, trusted
+from hbvm_bench.reference import solutions
 from hbvm_bench.store.store import Store
 from problems.errors import InputError, MissingLibraryError
 
@@ -15,13 +15,14 @@ from problems.errors import InputError, MissingLibraryError
 def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) -> bool:
     """Make the references that a campaign asks for and that are not known yet.
 
-    Two computations share nothing but the formula, see `hbvm_bench.reference.trusted`; where they
-    differ too early there is none, and the report says that no position was measured.
+    Where the campaign gives the end, it is that. Else two computations share nothing but the formula,
+    see `hbvm_bench.reference.trusted`; where they differ too early there is none, and the report says
+    that no position was measured.
 
     Parameters
     ----------
     campaign : Campaign
-        Its problems say ``reference``.
+        Its problems say ``reference`` or ``end``.
     store : Store
         They are kept there.
     tell : callable
@@ -36,16 +37,27 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
     ------
     problems.errors.MissingLibraryError
         Without heyoka.
+    problems.errors.InputError
+        For an end that is no state of its problem.
     """
     made = False
     for entry in campaign.entries():
-        for values in chosen(entry) if entry.reference else []:
+        for values in chosen(entry) if entry.reference or entry.end else []:
             text = fill(entry.use, values)
             problem = make_problem(text)
+            if entry.end:
+                given = solutions.of_end(problem, entry.end)
+                if given != solutions.find_file(problem):
+                    solutions.know(solutions.encode(given))
+                    store.keep(text)
+                    made = True
+                continue
             samples = (campaign.grid if entry.grid is None else entry.grid).times(problem)
             known = solutions.find(problem)
             if known is not None and known.t.size > 1 and np.isin(known.t, samples).all():
                 continue
+            from hbvm_bench.reference import trusted  # it brings numba, for the few campaigns that ask
+
             tell(f"computing a reference of {text} by two methods ...")
             try:
                 found = trusted.make(problem, at=trusted.some(problem, samples))
@@ -59,6 +71,3 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
             tell(f"the two agree to {found.provenance['agreement']}")
             made = True
     return made
-
-
-__all__ = ["make_missing"]

@@ -135,10 +135,6 @@ def watch(child: Process, limits: Limits, compiled: Path | None = None) -> Ended
     compiled : Path, optional
         The child makes this file when it has compiled: the wall seconds count from then on, and the
         seconds to compile until then.
-
-    Returns
-    -------
-    Ended
     """
     start = time.monotonic()
     begun = start if compiled is None else None

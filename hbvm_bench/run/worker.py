@@ -15,17 +15,16 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Case, Ensemble, Limits, TimingPlan
+from hbvm_bench.campaign.file import Case, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
-from hbvm_bench.measure import ensemble, timing, together
+from hbvm_bench.measure import ensemble, timing
 from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import Measured, measure
 from hbvm_bench.measure.solve import solve, solve_with_bare_end
@@ -34,11 +33,9 @@ from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing, Value
 from hbvm_bench.store.store import NAME, encode_series
-from integrators.protocol import MethodBase, Program, Status
+from integrators.protocol import Program, Status
 from integrators.solution import Solution
 from problems.errors import InputError
-from problems.problem import Problem
-from problems.systems.base import System
 
 REPLY = "reply.json"
 COMPILED = "compiled"  # the file that says that compiling has ended
@@ -116,11 +113,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         if request.plan is None:
             reply: object = _measure(request, path.parent, _Fork(parent, found))
         else:
-            time = _interleave if request.plan.interleaved else _time
-            reply = [
-                Timing(why=one) if isinstance(one, str) else one
-                for one in time(_resolved(request), request.plan, path.parent)
-            ]
+            reply = _time(request, request.plan, path.parent)
         with atomic(path.parent / REPLY) as temporary:
             temporary.write_bytes(msgspec.json.encode(reply))
     except (OSError, InputError) as error:
@@ -151,7 +144,8 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))
-        program = _compiled(resolved, directory)
+        program = _compiled(resolved)
+        (directory / COMPILED).touch()
         if (asked := resolved.case.ensemble) is not None:
             return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
         integrate = solve_with_bare_end if resolved.case.grid.own_steps else solve
@@ -170,16 +164,10 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         return Result(outcome="crashed", reason=wrong, status=solution.status.value)
     measured = measure(solution, solutions.find(resolved.problem))
     try:
-        checked = check(measured, resolved.method, program, resolved.case.checks)
+        measured = check(measured, resolved.method, program, resolved.case.checks)
     except Exception as error:
         traceback.print_exc()
         return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    measured = replace(
-        measured,
-        laws=checked.laws,
-        drift={"t": checked.t, **checked.errors} if checked.errors else {},
-        reversal=checked.reversal,
-    )
     return _stored(measured, solution.status, solution.reason, directory, fork, solution.warnings)
 
 
@@ -226,50 +214,27 @@ def _mapped(pid: int) -> int:
     return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
 
 
-def _time(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[Timing | str]:
-    (resolved,) = cases
-    asked = resolved.case.ensemble
-    method: Any = _Telling(resolved, directory)
-    if asked is None:
-        answer = timing.time_round(resolved.problem, method, plan)
-    else:
-        answer = ensemble.time_round(resolved.problem, method, asked, plan)
-    return [answer if isinstance(answer, str) else Timing(rounds=[answer])]
-
-
-def _interleave(cases: Sequence[Resolved], plan: TimingPlan, directory: Path) -> list[Timing | str]:
-    runs = [_run(one.problem, one.method, one.case.ensemble) for one in cases]  # compiled
+def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
+    runs = [_run(one) for one in _resolved(request)]
     (directory / COMPILED).touch()
-    return together.time_together(runs, plan)
+    if plan.interleaved:
+        return timing.time_together(runs, plan)
+    return [timing.time_alone(run, plan) for run in runs]
 
 
-def _run(problem: Problem, method: MethodBase, asked: Ensemble | None) -> Timeable:
-    if asked is None:
-        return Run.of(problem, method)
-    return ensemble.EnsembleRun.of(problem, method, asked)
+def _run(resolved: Resolved) -> Timeable:
+    problem, method, program = resolved.problem, resolved.method, _compiled(resolved)
+    if (asked := resolved.case.ensemble) is None:
+        return Run.of(problem, method, program)
+    return ensemble.EnsembleRun.of(problem, method, program, asked)
 
 
-class _Telling:
-    """A method that tells the runner when it has compiled."""
-
-    def __init__(self, resolved: Resolved, directory: Path) -> None:
-        self._resolved, self._directory = resolved, directory
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._resolved.method, name)
-
-    def compile(self, system: System) -> Program:
-        del system  # the resolved problem's
-        return _compiled(self._resolved, self._directory)
-
-
-def _compiled(resolved: Resolved, directory: Path) -> Program:
-    """Compile, what only a batch needs too where an ensemble is asked for; then tell the runner."""
+def _compiled(resolved: Resolved) -> Program:
+    """Compile; where an ensemble is asked for, also what a program leaves to its first batch."""
     problem = resolved.problem
     program = resolved.method.compile(problem.system)
     if resolved.case.ensemble is not None and hasattr(program, "prepare_batch"):
         ensemble.prepared(program, problem.y0[None], problem)
-    (directory / COMPILED).touch()
     return program
 
 

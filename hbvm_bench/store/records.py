@@ -13,7 +13,8 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from hbvm_bench.campaign.file import Case, Limits, Role
+from hbvm_bench.campaign.entries import Limits, Role
+from hbvm_bench.campaign.file import Case
 
 T = TypeVar("T")
 SCHEMA = 2  # 1 had position errors in units of length

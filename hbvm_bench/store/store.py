@@ -22,8 +22,9 @@ import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -394,12 +395,18 @@ def decode_series(content: bytes) -> dict[str, NDArray[np.float64]]:
     return found if ours else {}
 
 
-def _array(content: bytes) -> NDArray[np.float64]:
-    """Read a ``.npy`` file whose header promises no more than follows it."""
+@lru_cache(maxsize=128)  # a run's series are alike
+def _header(content: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     stream = io.BytesIO(content)
     np.lib.format.read_magic(stream)
-    shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
-    if math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+    return np.lib.format.read_array_header_1_0(stream)
+
+
+def _array(content: bytes) -> NDArray[np.float64]:
+    """Read a ``.npy`` file whose header promises no more than follows it."""
+    start = 10 + int.from_bytes(content[8:10], "little")
+    shape, fortran, dtype = _header(content[:start])
+    if math.prod(shape) * dtype.itemsize != len(content) - start:
         raise ValueError("its header says another size")
-    array = np.frombuffer(content, dtype, offset=stream.tell())  # refuses what would need pickles
+    array = np.frombuffer(content, dtype, offset=start)  # refuses what would need pickles
     return np.atleast_1d(array.reshape(shape, order="F" if fortran else "C").copy())

@@ -4,7 +4,7 @@
 `profiles`   Dolan-More performance profiles of the families over all problems
 `needs`      which integrator for which need, in rows of text
 `outcomes`   which integrator did what on which problem, with the reasons
-`laws`       the law of each invariant's drift, in rows, and counted by family
+`laws`       the law of each invariant's drift, in a few signs, and counted by family
 `fairness`   how many settings each family had, and what is doubtful
 
 `findings`   what can be read off a formula or a problem; it takes no records

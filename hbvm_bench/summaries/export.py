@@ -1,7 +1,7 @@
-"""A run as flat tables for other tools: CSV, and Parquet with the extra ``hbvm-bench[export]``."""
+"""A run for other tools: JSON, and flat tables as CSV or, with the extra ``hbvm-bench[export]``, Parquet."""
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.store.files import atomic
+from hbvm_bench.store.files import atomic, csv_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError, MissingLibraryError, unknown
@@ -71,6 +71,30 @@ def export(store: Store, path: Path, table: str = "cases") -> int:
     return count
 
 
+def cases_csv(records: Sequence[Record]) -> bytes:
+    """Return the table of cases as comma-separated text."""
+    names = CASE_COLUMNS.keys()
+    return csv_of([names, *([row.get(name) for name in names] for row in map(_case_row, records))])
+
+
+def as_json(records: Sequence[Record]) -> dict[str, Any]:
+    """Return all about the cases as JSON values; numbers are finite or null with a reason."""
+    metrics = {
+        key: {"label": m.label, "unit": m.unit, "better": m.better, "description": m.description}
+        for key, m in METRICS.items()
+    }
+    return {"metrics": metrics, "cases": [_as_json(record) for record in records]}
+
+
+def _as_json(record: Record) -> dict[str, Any]:
+    fields = msgspec.to_builtins(record)
+    words = {key: fields["case"].get(key, "") for key in ("problem", "method", "note")}
+    settings, timing, result = record.case.settings, record.timing, fields.pop("result")
+    del fields["case"]
+    timed = None if timing is None else timing.summary | fields["timing"]
+    return {**words, "settings": settings, **result, **fields, "timing": timed}
+
+
 @contextmanager
 def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], None]]:
     with path.open("w", encoding="utf-8", newline="") as stream:
@@ -99,8 +123,7 @@ def _key(record: Record) -> Row:
     return {"id": record.id, "problem": record.case.problem, "method": record.case.method}
 
 
-def _case(record: Record, store: Store) -> Iterator[Row]:
-    del store
+def _case_row(record: Record) -> Row:
     case, result, timing = record.case, record.result, record.timing
     row = _key(record) | {
         "problem_name": parse_spec(case.problem).name,
@@ -135,7 +158,7 @@ def _case(record: Record, store: Store) -> Iterator[Row]:
     row |= {"rejections": counters.rejections, "iterations": counters.iterations, "solver": counters.solver}
     row |= {"process_seconds": record.seconds, "process_peak_gib": record.peak_memory_gib}
     row |= {"versions": _json(record.versions), "machine": _json(record.machine)}
-    yield row | {"finished": record.finished}
+    return row | {"finished": record.finished}
 
 
 def _timings(record: Record, store: Store) -> Iterator[Row]:
@@ -191,9 +214,10 @@ def _case_columns() -> dict[str, type]:
     return columns | dict.fromkeys(("versions", "machine", "finished"), str)
 
 
+CASE_COLUMNS = _case_columns()
 _KEY: dict[str, type] = {"id": str, "problem": str, "method": str}
 TABLES = {
-    "cases": Table(_case_columns(), _case),
+    "cases": Table(CASE_COLUMNS, lambda record, store: iter([_case_row(record)])),
     "timings": Table(
         _KEY
         | {"round": int, "sample": int, "seconds": float, "repeats": int, "calibration": float}

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from statistics import median
 
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Record, TimingRound
 from hbvm_bench.summaries.points import by_family, by_problem, family_of
 from hbvm_bench.summaries.rows import group_of
 
@@ -32,14 +32,8 @@ def sentences(records: Sequence[Record]) -> list[str]:
 
 def doubts(records: Sequence[Record]) -> list[str]:
     """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
-    said: list[str] = []
-    rounds = [one for record in records if record.timing for one in record.timing.rounds]
-    shares = [one.share for one in rounds]
-    if shares and median(shares) < UNDISTURBED:
-        said.append(
-            f"The times are disturbed: the machine had other work and left half of the visits less "
-            f"than {median(shares):.0%} of a core. Ratios below 2 say nothing."
-        )
+    said = disturbed(records)
+    rounds = _rounds(records)
     calibrations = sorted(seconds for one in rounds for seconds in one.calibration)
     if len(calibrations) >= 4:
         low, high = calibrations[len(calibrations) // 10], calibrations[-1 - len(calibrations) // 10]
@@ -63,6 +57,21 @@ def doubts(records: Sequence[Record]) -> list[str]:
             f"The time limit ended {timeouts.total()} cases ({which}); a faster machine may finish some."
         )
     return said
+
+
+def disturbed(records: Sequence[Record]) -> list[str]:
+    """Return a sentence where the machine had other work while times were taken."""
+    share = median(one.share for one in rounds) if (rounds := _rounds(records)) else 1.0
+    if share >= UNDISTURBED:
+        return []
+    return [
+        f"The times are disturbed: the machine had other work and left half of the visits less "
+        f"than {share:.0%} of a core. Ratios below 2 say nothing."
+    ]
+
+
+def _rounds(records: Sequence[Record]) -> list[TimingRound]:
+    return [one for record in records if record.timing for one in record.timing.rounds]
 
 
 def _settings(records: Sequence[Record]) -> tuple[int, int]:

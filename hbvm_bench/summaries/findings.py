@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 import problems
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
@@ -118,13 +120,6 @@ def _describe(name: str, system: System, problem: Problem) -> Findings:
         formula = ""
     dof = system.dof
     cyclic = structure.cyclic(system) if dof is not None else []
-    values: dict[str, Any] = {}
-    offset = 0
-    for key, default in system.parameters.items():
-        size = len(default) if isinstance(default, tuple) else 1
-        part = problem.par[offset : offset + size].tolist()
-        values[key] = part if isinstance(default, tuple) else part[0]
-        offset += size
     return Findings(
         name=name,
         formula=formula,
@@ -137,7 +132,10 @@ def _describe(name: str, system: System, problem: Problem) -> Findings:
         depends_on_time=structure.depends_on_time(system),
         invariants=system.invariant_names,
         guards=system.guard_names,
-        parameters=values,
+        parameters={
+            key: value.tolist() if isinstance(value, np.ndarray) else value
+            for key, value in system.unpack(problem.par).items()
+        },
         engines=engines.reasons(problem),
     )
 
@@ -154,7 +152,8 @@ def lines(found: Findings) -> list[tuple[str, str]]:
     if found.formula:
         rows.append(("H", found.formula))
     if found.parameters:
-        rows.append(("parameters", _values(found.parameters)))
+        values = ", ".join(f"{name} = {value!r}" for name, value in found.parameters.items())
+        rows.append(("parameters", values))
     if found.kind == "hamiltonian":
         yes = "yes: H = sum of c p^2/2 + V(q), the second-order form applies"
         rows.append(("separable", yes if found.separable else "no: the first-order form applies"))
@@ -179,7 +178,3 @@ def _polynomial(found: Findings) -> str:
         return "not polynomial: the energy is kept to rounding once k is large enough, never exactly"
     pairs = ", ".join(f"k = {k} for s = {s}" for s, k in found.exact)
     return f"degree {found.degree}: HBVM(k, s) keeps the energy exactly from {pairs}"
-
-
-def _values(parameters: dict[str, Any]) -> str:
-    return ", ".join(f"{name} = {value!r}" for name, value in parameters.items())

@@ -12,9 +12,9 @@ from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.points import number
-from hbvm_bench.summaries.rows import format_value
+from hbvm_bench.summaries.rows import format_metric
 from hbvm_bench.summaries.standings import Comparison
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 PLACE = ("position", "phase", "z_error")
 """With what the metrics begin that say where a run is, not only on which level of energy."""
@@ -92,34 +92,31 @@ def said(found: Verdict) -> str:
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
     for key in (goal.metric, *goal.within, *goal.no_worse):
         find(key)
-    if goal.ratio is None:
-        return _alone(goal, entry, records)
-    return _against(goal, entry, records, goal.ratio)
+    judge = _alone if goal.ratio is None else _against
+    return judge(goal, entry, records)
 
 
 def _alone(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
+    assert goal.at is not None
     metric, able = METRICS[goal.metric], standings.among(records, goal.method)
     ours = standings.best(able, goal.within, goal.metric)
-    reached = ours is not None and goal.at is not None and (number(ours, goal.metric) or 0.0) <= goal.at
-    why = ""
-    if ours is None:
-        why = next(
-            (one.result.metrics[goal.metric].why for one in able if goal.metric in one.result.metrics), ""
-        )
+    reached = ours is not None and (number(ours, goal.metric) or 0.0) <= goal.at
+    missing = (one.result.metrics[goal.metric].why for one in able if goal.metric in one.result.metrics)
     return Verdict(
         goal=goal,
         entry=entry,
         words=goal.words or f"{metric.label} of {goal.method or 'ours'}",
         asked=f"≤ {goal.at:g}",
-        measured="–" if ours is None else format_value(metric, ours.result.metrics[goal.metric]).text,
+        measured=NONE if ours is None else format_metric(ours, goal.metric),
         verdict="reached" if reached else "missed",
-        why=why,
+        why=next(missing, "") if ours is None else "",
         comparison=Comparison(ours, None),
         records=records,
     )
 
 
-def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], asked: float) -> Verdict:
+def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
+    assert goal.ratio is not None
     within = goal.within if goal.within or goal.no_worse else entry.within
     theirs = standings.best(standings.among(records, goal.against), within, goal.metric)
     found = Comparison(None, None)
@@ -128,20 +125,19 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], asked: 
         allowed |= {key: min(bound, allowed.get(key, bound)) for key, bound in within.items()}
         ours = standings.best(standings.among(records, goal.method), allowed, goal.metric)
         found = standings.compare(ours, theirs, goal.metric)
-    bounds = {**within, **goal.no_worse}
-    blind = not goal.alone and not any(key.startswith(PLACE) for key in bounds)
-    reached = found.ratio is not None and found.ratio.median >= asked
+    blind = not goal.alone and not any(key.startswith(PLACE) for key in (*within, *goal.no_worse))
+    reached = found.ratio is not None and found.ratio.median >= goal.ratio
     why = ""
     if blind:
         why = "energy is not ranked without position"
     elif found.ratio is None:
         why = "the peer has no setting as accurate" if theirs is None else "none of ours is as accurate"
+    label = METRICS[goal.metric].label
     return Verdict(
         goal=goal,
         entry=entry,
-        words=goal.words
-        or f"{METRICS[goal.metric].label} of {goal.against} over ours, {_bounds(goal, within)}",
-        asked=f"≥ {asked:g}",
+        words=goal.words or f"{label} of {goal.against} over ours, {_bounds(goal, within)}",
+        asked=f"≥ {goal.ratio:g}",
         measured=ratio_text(found.ratio),
         verdict="void" if blind else "reached" if reached else "missed",
         why=why,
@@ -162,11 +158,10 @@ def _bounds(goal: Goal, within: dict[str, float]) -> str:
 def ratio_text(ratio: Spread | None) -> str:
     """Write a ratio with its quartiles."""
     if ratio is None:
-        return "–"
-    spread = (
-        "" if ratio.low is None or ratio.high is None else f" ({_number(ratio.low)}–{_number(ratio.high)})"
-    )
-    return f"{_number(ratio.median)}×{spread}"
+        return NONE
+    if ratio.low is None or ratio.high is None:
+        return f"{_number(ratio.median)}×"
+    return f"{_number(ratio.median)}× ({_number(ratio.low)}–{_number(ratio.high)})"
 
 
 def _number(value: float) -> str:

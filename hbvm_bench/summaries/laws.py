@@ -1,11 +1,12 @@
-"""The laws of the drifts of a run, in rows, and counted by family."""
+"""The laws of the drifts of a run: in a few signs, and counted by family."""
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from hbvm_bench.store.records import Law, Record
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.table import Table
 
 SHORT = {
     "bounded": "bounded",
@@ -18,56 +19,28 @@ SHORT = {
 """Every law in a few signs, by the keys of `hbvm_bench.measure.drift.LAWS`."""
 
 
-@dataclass(frozen=True)
-class LawRow:
-    """The law of one invariant's error in one case.
-
-    Attributes
-    ----------
-    record : Record
-        The case.
-    family, invariant : str
-        Names.
-    law : Law
-        As found.
-    text : str
-        In a few signs, with the power of t and its interval where it grows.
-    """
-
-    record: Record
-    family: str
-    invariant: str
-    law: Law
-    text: str
-
-
-def rows(records: Sequence[Record], invariant: str | None = None) -> list[LawRow]:
-    """Return the laws of all cases that stayed on their trajectory, in the order of the run.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Of a run.
-    invariant : str, optional
-        Only this one's; all by default.
-    """
-    return [
-        LawRow(record, family_of(record), name, law, text(law))
-        for record in records
-        if group_of(record) == "on"
-        for name, law in record.result.laws.items()
-        if invariant in (None, name)
-    ]
-
-
-def counts(records: Sequence[Record], invariant: str = "energy") -> dict[str, dict[str, int]]:
-    """Return for each family how many of its cases follow each law; ``"none"`` where none is clear."""
-    counted: dict[str, dict[str, int]] = {}
-    for row in rows(records, invariant):
-        laws = counted.setdefault(row.family, {})
-        key = row.law.law or "none"
-        laws[key] = laws.get(key, 0) + 1
+def counts(records: Sequence[Record]) -> dict[str, Counter[str]]:
+    """Return for each family how many cases have which law of the energy; ``"none"`` where none is clear."""
+    counted: dict[str, Counter[str]] = {}
+    for record in records:
+        law = record.result.laws.get("energy")
+        if law is not None and group_of(record) == "on":
+            counted.setdefault(family_of(record), Counter())[law.law or "none"] += 1
     return counted
+
+
+def table(records: Sequence[Record]) -> Table | None:
+    """Return how many cases of each method follow which law; ``None`` where no law was sought."""
+    counted = counts(records)
+    if not counted:
+        return None
+    kinds = [*SHORT, "none"]
+    return Table(
+        "The law of the energy's drift",
+        ("method", *(SHORT.get(kind, "not clear") for kind in kinds)),
+        [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
+        "How many cases of each method follow which law.",
+    )
 
 
 def text(law: Law) -> str:

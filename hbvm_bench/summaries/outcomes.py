@@ -1,36 +1,26 @@
 """Which integrator did what on which problem: a matrix with reasons."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import by_family, by_problem
-from hbvm_bench.summaries.rows import group_of, status_of
+from hbvm_bench.summaries.rows import group_of, reason_of
+from hbvm_bench.summaries.table import Table
 
-State = Literal["ok", "off", "ended", "refused", "absent"]
+State = Literal["on", "off", "ended", "refused", "absent"]
 
-STATES: dict[State, str] = {
-    "ok": "reached the end on the trajectory that was asked for",
-    "off": "reached the end on another trajectory: a symmetry was lost",
-    "ended": "did not reach the end",
-    "refused": "the method does not accept the problem",
-    "absent": "not in the campaign",
-}
+SIGNS: dict[State, str] = {"on": "●", "off": "◐", "ended": "○", "refused": "–", "absent": ""}
+"""From best to worst."""
 
 
-ORDER: tuple[State, ...] = ("ok", "off", "ended", "refused")
-"""From best to worst, of the cases there are."""
-
-
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What became of all settings of a family on a problem.
 
     Attributes
     ----------
     state : str
-        The best that any of them did, a key of `STATES`.
+        The best that any of them did, a key of `SIGNS`.
     reached, settings : int
         How many of how many reached the end on the trajectory.
     reasons : list of str
@@ -54,36 +44,44 @@ def matrix(records: Sequence[Record]) -> tuple[list[str], dict[str, dict[str, Ou
     return families, rows
 
 
-def reason_of(record: Record) -> str:
-    """Return one sentence on why a case did not reach the end on its trajectory; empty if it did."""
-    result = record.result
-    if group_of(record) == "on":
-        return ""
-    if group_of(record) == "off":
-        return result.violation
-    status = status_of(record)
-    return f"{status}: {result.reason}" if result.reason else status
+def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
+    """Return the matrix as a table, with the reasons; ``None`` for one problem alone."""
+    families, found = matrix(records)
+    if len(found) < 2:
+        return None
+    reasons = [
+        f"{problem}, {family}: {reason}"
+        for problem, row in found.items()
+        for family, one in row.items()
+        for reason in one.reasons
+        if reason
+    ]
+    made = Table(
+        "Which integrator on which problem",
+        ("problem", *families),
+        [(problem, *map(_sign, row.values())) for problem, row in found.items()],
+        "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
+        "Numbers: how many of its settings reached the end, where not all did.",
+    )
+    return made, reasons
+
+
+def _sign(one: Outcome) -> str:
+    some = one.state == "on" and one.reached < one.settings
+    return SIGNS[one.state] + (f" {one.reached}/{one.settings}" if some else "")
 
 
 def _outcome(records: Sequence[Record]) -> Outcome:
     states: list[State] = [_state(record) for record in records]
     said: dict[str, list[str]] = {}
     for record, state in zip(records, states, strict=True):
-        if state != "ok":
+        if state != "on":
             said.setdefault(reason_of(record), []).append(record.case.method)
-    reasons = [reason if _same(records) else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
-    best: State = "absent"
-    for state in reversed(ORDER):
-        best = state if state in states else best
-    return Outcome(best, states.count("ok"), len(states), reasons)
-
-
-def _same(records: Sequence[Record]) -> bool:
-    return len({reason_of(record) for record in records}) == 1
+    same = len({reason_of(record) for record in records}) == 1
+    reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
+    found: list[State] = [state for state in SIGNS if state in states]
+    return Outcome(found[0] if found else "absent", states.count("on"), len(states), reasons)
 
 
 def _state(record: Record) -> State:
-    if record.result.outcome == "refused":
-        return "refused"
-    states: dict[str, State] = {"on": "ok", "off": "off", "ended": "ended"}
-    return states[group_of(record)]
+    return "refused" if record.result.outcome == "refused" else group_of(record)

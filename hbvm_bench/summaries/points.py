@@ -1,11 +1,12 @@
 """What every summary reads off the cases: families, problems, numbers, and which settings nothing beats."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.rows import group_of
 
 T = TypeVar("T")
 
@@ -39,6 +40,14 @@ def number(record: Record, key: str) -> float | None:
     """Return a metric of a case that may be compared with others, else ``None``."""
     value = record.result.metrics.get(key)
     return value.value if value is not None and value.counts else None
+
+
+def accurate(record: Record, within: Mapping[str, float]) -> bool:
+    """Whether a case reached its end on the trajectory asked for, with errors at most these."""
+    if group_of(record) != "on":
+        return False
+    errors = [(number(record, key), bound) for key, bound in within.items()]
+    return all(error is not None and error <= bound for error, bound in errors)
 
 
 def front(items: Iterable[T], place: Callable[[T], tuple[float, float]]) -> list[T]:

@@ -9,38 +9,19 @@ Mathematical Programming 91 (2002) 201-213.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import by_family, by_problem, family_of, number
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.needs import Need, factors
+from hbvm_bench.summaries.points import accurate, by_family, number
 
-
-@dataclass(frozen=True)
-class Accuracy:
-    """What a setting must reach to count as a solution.
-
-    Attributes
-    ----------
-    position : float
-        Error at the end; see `hbvm_bench.measure.measured.POSITION`.
-    energy : float
-        Largest relative error.
-    """
-
-    position: float
-    energy: float = math.inf
-
-    @property
-    def words(self) -> str:
-        """The accuracy in words."""
-        text = f"position to {self.position:g}"
-        return text if math.isinf(self.energy) else f"{text}, energy to {self.energy:g}"
-
-
-ACCURACIES = (Accuracy(1e-4), Accuracy(1e-8), Accuracy(1e-8, 1e-13))
-"""Loose, accurate, and accurate with the energy at round-off."""
+ACCURACIES = (
+    {"position_end": 1e-4},
+    {"position_end": 1e-8},
+    {"position_end": 1e-8, "energy_max": 1e-13},
+)
+"""Errors by metric: loose, accurate, and accurate with the energy at round-off."""
 
 
 @dataclass(frozen=True)
@@ -49,27 +30,20 @@ class Profile:
 
     Attributes
     ----------
-    accuracy : Accuracy
-        What was asked.
-    work : str
-        Key of the metric of cost.
-    problems : list of str
-        Those with a reference at the end that any family solves; the shares are of these.
-    unsolved : list of str
-        Those with a reference that no family solves.
-    best : dict of (str, Record)
-        By problem: the family with the least work, and its case.
+    words : str
+        The accuracy that was asked for.
     ratios : dict of list of float
-        By family: its work over the least, problem by problem; infinite where it does not
-        reach the accuracy.
+        By family: its work over the least, problem by problem of those that any family solves;
+        infinite where it does not reach the accuracy.
     """
 
-    accuracy: Accuracy
-    work: str
-    problems: list[str]
-    unsolved: list[str]
-    best: dict[str, tuple[str, Record]]
+    words: str
     ratios: dict[str, list[float]]
+
+    @property
+    def problems(self) -> int:
+        """On how many problems any family reaches the accuracy; the shares are of these."""
+        return len(next(iter(self.ratios.values()), ()))
 
     def share(self, family: str, tau: float) -> float:
         """Return the share of the problems on which a family is within a factor ``tau`` of the best."""
@@ -86,56 +60,27 @@ class Profile:
         return sum(math.isfinite(ratio) for ratio in self.ratios[family])
 
     def wins(self, family: str) -> int:
-        """Return on how many problems a family has the least work."""
-        return sum(winner == family for winner, _ in self.best.values())
+        """Return on how many problems a family has the least work, the first of several that have it."""
+        first = [min(self.ratios, key=lambda name: self.ratios[name][i]) for i in range(self.problems)]
+        return first.count(family)
 
 
-def reaches(record: Record, accuracy: Accuracy) -> bool:
-    """Whether a case is as accurate."""
-    if group_of(record) != "on" or record.case.ensemble:
-        return False
-    position, energy = number(record, "position_end"), number(record, "energy_max")
-    if position is None or position > accuracy.position:
-        return False
-    return math.isinf(accuracy.energy) or (energy is not None and energy <= accuracy.energy)
-
-
-def profile(records: Sequence[Record], accuracy: Accuracy, work: str) -> Profile:
+def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -> Profile:
     """Return the profiles of all families for an accuracy.
 
     Parameters
     ----------
     records : sequence of Record
         Of a run.
-    accuracy : Accuracy
-        What a setting must reach.
+    within : mapping of str to float
+        The errors that a setting may have at most, by metric.
     work : str
         Key of the metric of cost; a family without it (a Taylor method has no count of
         evaluations) has no ratio there.
     """
-    families = list(by_family([record for record in records if record.case.ensemble is None]))
-    solved: list[str] = []
-    unsolved: list[str] = []
-    best: dict[str, tuple[str, Record]] = {}
-    ratios: dict[str, list[float]] = {family: [] for family in families}
-    for problem, here in by_problem(records).items():
-        if not any(number(record, "position_end") is not None for record in here):
-            continue
-        cheapest: dict[str, tuple[float, Record]] = {}
-        for record in here:
-            cost = number(record, work)
-            if not cost or not reaches(record, accuracy):
-                continue
-            family = family_of(record)
-            if family not in cheapest or cost < cheapest[family][0]:
-                cheapest[family] = (cost, record)
-        if not cheapest:
-            unsolved.append(problem)
-            continue
-        winner = min(cheapest, key=lambda family: cheapest[family][0])
-        least = cheapest[winner][0]
-        solved.append(problem)
-        best[problem] = (winner, cheapest[winner][1])
-        for family in families:
-            ratios[family].append(cheapest[family][0] / least if family in cheapest else math.inf)
-    return Profile(accuracy, work, solved, unsolved, best, ratios)
+    need = Need("", lambda record: bool(number(record, work)) and accurate(record, within), work)
+    found = factors(records, need)
+    solved = len(next(iter(found.values()), ()))
+    families = by_family([record for record in records if record.case.ensemble is None])
+    words = ", ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in within.items())
+    return Profile(words, {family: list(found.get(family, [math.inf] * solved)) for family in families})

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from hbvm_bench.campaign.entries import Ensemble
 from hbvm_bench.measure.metrics import METRICS, Metric, find
@@ -52,6 +53,11 @@ class Cell:
     void: bool
     why: str
     sort: float
+
+    @property
+    def shown(self) -> str:
+        """The text, in brackets where it is void."""
+        return f"({self.text})" if self.void else self.text
 
 
 @dataclass(frozen=True)
@@ -131,7 +137,7 @@ def numbers(records: Sequence[Record]) -> dict[str, int]:
     return {record.id: methods.setdefault(record.case.method, len(methods) + 1) for record in records}
 
 
-def group_of(record: Record) -> str:
+def group_of(record: Record) -> Literal["on", "off", "ended"]:
     """Return the key in `GROUPS` of a case."""
     result = record.result
     if result.outcome != "ok" or result.status != "finished":
@@ -149,6 +155,14 @@ def status_of(record: Record) -> str:
     else:
         words = result.outcome
     return words if result.t_stop is None else f"{words} at t = {result.t_stop:.4g}"
+
+
+def reason_of(record: Record) -> str:
+    """Return why a case did not reach the end on its trajectory; empty if it did."""
+    if group_of(record) != "ended":
+        return record.result.violation
+    head, reason = status_of(record), record.result.reason
+    return f"{head}: {reason}" if reason else head
 
 
 def format_value(metric: Metric, value: Value) -> Cell:
@@ -169,10 +183,7 @@ def format_value(metric: Metric, value: Value) -> Cell:
 
 def format_metric(record: Record, key: str) -> str:
     """Format a metric of a case; in brackets where it is void, a dash where there is none."""
-    if key not in record.result.metrics:
-        return "–"
-    cell = format_value(METRICS[key], record.result.metrics[key])
-    return f"({cell.text})" if cell.void else cell.text
+    return format_value(METRICS[key], record.result.metrics.get(key, Value())).shown
 
 
 def seconds(number: float) -> str:
@@ -196,11 +207,8 @@ def _row(record: Record) -> Row:
 def _remark(record: Record) -> str:
     result = record.result
     parts: list[str] = []
-    if result.outcome != "ok" or result.status != "finished":
-        head = status_of(record)
-        parts.append(f"{head}: {result.reason}" if result.reason else head)
-    elif result.violation:
-        parts.append(result.violation)
+    if reason := reason_of(record):
+        parts.append(reason)
     elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
         parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
     parts += result.warnings

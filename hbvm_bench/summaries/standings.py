@@ -11,8 +11,8 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import combinations, fill
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, number
-from hbvm_bench.summaries.rows import group_of, tasks
+from hbvm_bench.summaries.points import accurate, family_of, number
+from hbvm_bench.summaries.rows import tasks
 
 TIME = "warm_seconds"
 
@@ -58,14 +58,6 @@ def among(records: Sequence[Record], who: str) -> list[Record]:
     if not who:
         return [one for one in records if one.role == "ours"]
     return [one for one in records if who in (family_of(one), one.case.method)]
-
-
-def accurate(record: Record, within: Mapping[str, float]) -> bool:
-    """Whether a case reached its end on the trajectory asked for, with errors at most these."""
-    if group_of(record) != "on":
-        return False
-    errors = [(number(record, key), bound) for key, bound in within.items()]
-    return all(error is not None and error <= bound for error, bound in errors)
 
 
 def best(records: Sequence[Record], within: Mapping[str, float], metric: str = TIME) -> Record | None:

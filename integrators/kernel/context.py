@@ -123,7 +123,9 @@ class Context(Memory):
     # --- tables ---
     raw_matrix = Array()  # values -> stages (THROUGH: coefficients -> stages), for a step of 1
     matrix = Array(8, "matrix_size")  # the same for the step h
-    extrapolation = Array()  # the previous step's values -> stages
+    scaled_by = Real()  # the step that `step.begin.set_step` made it for
+    # The previous step's values -> stages. Where steps vary, for a step of 1, for each of `tables.RATIOS`.
+    extrapolation = Array()
     two_steps = Integer()  # whether first stages come from two steps
     extrapolation_two = Array()  # the values of the step before that one, and its own -> stages; route 8
     matrix_size = Integer()  # in vectors of 8
@@ -194,6 +196,7 @@ class Context(Memory):
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
     tolerance = Real()
+    log_rest = Real()  # binary logarithm of what may be left of a change when the step is solved
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
     made = Integer()  # samples

@@ -25,7 +25,7 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.step.rule import TOLERANCE
+from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, TOLERANCE
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
@@ -280,6 +280,7 @@ class HBVMProgram(Compiled):
             tables = {**self._fixed, **({} if side else self.scaled(self.h))}
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
+            made.log_rest = LOG_REST
             made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
@@ -360,6 +361,7 @@ class AdaptiveProgram(HBVMProgram):
         c = self.constants
         if c.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(c)
+        self._onward = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
         # P_s vanishes at the nodes of the rule with s nodes.
         self.degree = s if k > s else s - 1
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
@@ -399,8 +401,9 @@ class AdaptiveProgram(HBVMProgram):
 
     def _context(self, *, side: bool) -> Context:
         context = super()._context(side=True)  # with a matrix of its own
-        context.point({"estimators": self._estimators})
+        context.point({"estimators": self._estimators, "extrapolation": self._onward})
         context.varying = 1
+        context.log_rest = LOG_REST_VARYING
         context.error_degree = self.degree
         context.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None

@@ -30,6 +30,12 @@ WIDE, THROUGH = 0, 1
 # it helps. Steps of varying length are long, and what they leave out is larger than that.
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
+PER_OCTAVE = 32
+_UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
+RATIOS = np.append(0.5 * _UP[:-1], _UP)
+"""Steps of varying length are so many times as long as the step before, where nothing else asks for more or
+less: there are tables for these ratios."""
+
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 
 NAMES = (
@@ -259,6 +265,18 @@ def rounded(constants: Constants) -> Array:
     columns = constants.route if constants.route > 1 else None
     kept = keep_moments(a["matrix"], a["matrix_low"], a["basis"])
     return packed(kept, columns=columns, repeat=True)
+
+
+@lru_cache(maxsize=32)
+def onward(constants: Constants) -> Array:
+    """Return the tables for first stages where steps vary: for a step of 1, for all `RATIOS`."""
+    import integrators.legendre as legendre
+
+    a = constants.arrays
+    nodes, modes, columns = a["nodes"].reshape(-1), constants.modes, constants.route
+    beyond = [legendre.legendre(1.0 + ratio * nodes, modes) for ratio in RATIOS]
+    matrices = [a["matrix"] @ there @ a["into_modes"] for there in beyond]
+    return joined([packed(matrix, columns=columns, repeat=True) for matrix in matrices])
 
 
 def fixed(constants: Constants) -> dict[str, Array]:

@@ -7,7 +7,7 @@ import pytest
 
 import problems
 from hbvm_bench.studies.paper import axis_motion
-from hbvm_bench.studies.paper.sitnikov_claims import chaotic_from
+from hbvm_bench.studies.paper.sitnikov_part import chaotic_from
 from integrators import integrate
 from integrators.hbvm import HBVM
 

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from hbvm_bench.cli import main
-from hbvm_bench.report.figures.png import small
+from hbvm_bench.commands.paper import PARTS
+from hbvm_bench.report.figures.canvas import new, small
 from hbvm_bench.studies.paper import others, report, results
 from hbvm_bench.studies.paper.departure import departure
-from hbvm_bench.studies.paper.drawn import number, sheet
+from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.henon_heiles_figures import fates
 from integrators.gauss import Gauss
 from integrators.protocol import Array, Samples, Status
@@ -61,8 +62,13 @@ def square(i: int) -> int:
     return i**2
 
 
+def part(count: int) -> results.Part:
+    runs = [results.Task(f"{i}", partial(square, i), cost=i) for i in range(count)]
+    return results.Part("squares", "Squares", runs, lambda found: [], lambda found: [])
+
+
 def work(count: int) -> list[results.Task]:
-    return [results.Task(f"{i}", partial(square, i), cost=i) for i in range(count)]
+    return part(count).tasks
 
 
 def ran(tasks, directory, jobs=1):
@@ -76,25 +82,36 @@ def ran(tasks, directory, jobs=1):
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_tasks_give_the_same_results_here_and_in_processes(tmp_path, jobs):
     kept, said = ran(work(3), tmp_path, jobs)
-    found = results.Found(work(3), results.load(tmp_path))
-    assert dict(found) == {"0": 0, "1": 1, "2": 4}
+    found = results.Results(part(3), results.load(tmp_path))
+    assert [found["0"], found["1"], found["2"]] == [0, 1, 4]
     assert results.load(tmp_path) == kept
     if jobs == 1:
-        assert list(said) == ["2", "1", "0"]  # the long ones first
+        assert list(said) == ["squares/2", "squares/1", "squares/0"]  # the long ones first
+
+
+def row(values: list[float]) -> list[float]:
+    return [value + 1 for value in values]
+
+
+def test_what_was_divided_is_put_together_again(tmp_path):
+    runs = results.split("rows", row, [1.0, 2.0, 3.0, 4.0, 5.0], 2, cost=1)
+    whole = results.Part("p", "P", runs, lambda found: [], lambda found: [])
+    ran(whole.tasks, tmp_path)
+    assert results.Results(whole, results.load(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
 
 
 def test_a_computation_that_fails_loses_no_other_and_says_why(tmp_path):
     ran(work(4), tmp_path)
-    found = results.Found(work(4), results.load(tmp_path))
+    found = results.Results(part(4), results.load(tmp_path))
     assert found["2"] == 4
-    with pytest.raises(InputError, match=r"'3' failed with ValueError: three is too many \(test_paper_rep"):
+    with pytest.raises(InputError, match=r"'squares/3' failed with ValueError: three is too many \(test_pa"):
         found["3"]
 
 
 def test_a_run_that_was_interrupted_goes_on_and_a_whole_one_starts_anew(tmp_path):
     ran(work(2), tmp_path)
     said = ran(work(3), tmp_path)[1]
-    assert [key for key, what in said.items() if what.startswith("kept")] == ["1", "0"]
+    assert [key for key, what in said.items() if what.startswith("kept")] == ["squares/1", "squares/0"]
     assert not any(what.startswith("kept") for what in ran(work(3), tmp_path)[1].values())
 
 
@@ -119,7 +136,7 @@ def test_what_is_kept_comes_back_to_the_last_bit():
 
 def test_every_result_of_the_paper_can_be_kept():
     """Its function says what it returns; else it could not be read again."""
-    for task in report.tasks():
+    for task in report.tasks(PARTS):
         assert get_type_hints(results.function_of(task.run))["return"]
 
 
@@ -140,7 +157,7 @@ def test_the_same_figure_gives_the_same_bytes():
 def test_pictures_are_kept_small_without_a_visible_difference():
     from PIL import Image
 
-    stream, sheet_of_paper = io.BytesIO(), sheet(5.0, 3.0)
+    stream, sheet_of_paper = io.BytesIO(), new(5.0, 3.0)
     sheet_of_paper.subplots().plot(np.sin(np.linspace(0.0, 20.0, 400)))
     sheet_of_paper.savefig(stream, format="png", dpi=160)
     drawn = stream.getvalue()

@@ -8,8 +8,8 @@ import pytest
 import problems
 from hbvm_bench.studies.paper import sitnikov
 from hbvm_bench.studies.paper.axis_motion import Growth
-from hbvm_bench.studies.paper.sitnikov_claims import beat, claims, kept, oscillates
 from hbvm_bench.studies.paper.sitnikov_figures import apocentres
+from hbvm_bench.studies.paper.sitnikov_part import beat, dynamics, kept, oscillates, trajectories
 from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -35,24 +35,23 @@ def test_the_verdict_on_the_planetoids_motion_follows_from_its_numbers(reached, 
 def verdicts(runs, steps):
     """Return the verdicts by the first words of the claims, from made-up scans for what is not varied."""
     growth = [Growth(e, 1.0, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
-    found = claims(runs, [100.0] * 20, 32, steps, growth, [(17, 1e-14, None)])
+    found = [*trajectories(runs, [100.0] * 20 + [None] * 12), *dynamics(steps, growth)]
     return {claim.words[:14]: claim.verdict for claim in found}
 
 
-def said(runs, steps, words):
+def said(runs, words):
     """Return what was measured beside the claim that begins so."""
-    growth = [Growth(e, 1.0, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
-    found = claims(runs, [100.0] * 20, 32, steps, growth, [(17, 1e-14, None)])
+    found = trajectories(runs, [100.0] * 20 + [None] * 12)
     return next(claim.here for claim in found if claim.words.startswith(words))
 
 
-def test_the_sentences_follow_from_the_verdicts(runs, steps):
-    assert "because rounding keeps the symmetry" in said(runs, steps, "Both methods")
+def test_the_sentences_follow_from_the_verdicts(runs):
+    assert "because rounding keeps the symmetry" in said(runs, "Both methods")
     astray = {key: dataclasses.replace(run, off_axis=0.1, plane=0.0) for key, run in runs.items()}
-    assert said(astray, steps, "Both methods") == "off the axis: 0.1. The plane drifts along z by up to 0"
-    assert "But z itself is off" in said(runs, steps, "Under HBVM")
+    assert said(astray, "Both methods") == "off the axis: 0.1. The plane drifts along z by up to 0"
+    assert "But z itself is off" in said(runs, "Under HBVM")
     alike = runs | {"hbvm": dataclasses.replace(runs["hbvm"], z=runs["truth"].z)}
-    assert ". z itself is off by up to 0.00" in said(alike, steps, "Under HBVM")
+    assert ". z itself is off by up to 0.00" in said(alike, "Under HBVM")
 
 
 def test_verdicts_change_with_what_was_measured(runs, steps):

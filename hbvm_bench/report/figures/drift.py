@@ -1,4 +1,4 @@
-"""The drift of an invariant: its error over the starts, and the law that was fitted to it."""
+"""The drift of the energy: its error over the starts, and the law that was fitted to it."""
 
 from collections.abc import Sequence
 
@@ -24,15 +24,15 @@ POWERS = (-18, 3)  # an error beyond is no drift but a failure, and is in the ta
 Found = tuple[Array, Array, Law]
 
 
-def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture | None:
-    """Draw the error of an invariant, rms over starts and windows of time, with its law; else ``None``."""
-    found = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c, invariant)) is not None}
+def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
+    """Draw the error of the energy, rms over starts and windows of time, with its law; else ``None``."""
+    found = {c.record.id: got for c in cases[:MOST_CASES] if (got := _drift(c)) is not None}
     shown = [case for case in cases if case.record.id in found and _visible(found[case.record.id][1])]
     if not shown:
         return None
     laws = {number: law for number, (_, _, law) in found.items()}
     curves = {number: _windows(t, rows) for number, (t, rows, _) in found.items()}
-    label = f"error of {invariant.replace('_', ' ')}, rms"
+    label = "error of energy, rms"
     figure, grid = family_panels(shown, label)
     low, high = power_range([y for _, y in curves.values()], *POWERS)
     times = np.concatenate([t for t, _ in curves.values()])
@@ -47,9 +47,7 @@ def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture |
             law = laws[case.record.id]
             at, fitted = _law(law, t)
             axes.plot(t, error, case.look.marker, color=case.look.light, markersize=2.4, linestyle="")
-            (line,) = axes.plot(at, fitted, color=case.look.light, linewidth=1.1)
-            if case.look.dash:
-                line.set_dashes(case.look.dash)
+            axes.plot(at, fitted, color=case.look.light, linewidth=1.1, dashes=case.look.dash)
             traces += [
                 trace(case, t, error),
                 Trace(case.look.number, case.record.case.method, at, fitted, "law", text(law)),
@@ -69,12 +67,12 @@ def drift_figure(cases: Sequence[Drawn], invariant: str = "energy") -> Picture |
     )
     return picture(
         figure,
-        "drift" if invariant == "energy" else f"drift-{invariant.replace('_', '-')}",
-        f"Drift of the {invariant.replace('_', ' ')} and its law",
+        "drift",
+        "Drift of the energy and its law",
         f"Markers: root mean square of the error over {over}. Lines: the law that was fitted, "
         "a floor with a growth; its power of t stands with its 95 % interval. Bounded or t^1/2 is the best "
         "there is; a law is what these samples show, not a proof."
-        + (f" {drift.told(starts)}." if starts > 1 and invariant == "energy" else ""),
+        + (f" {drift.told(starts)}." if starts > 1 else ""),
         "Law of each case. "
         + "; ".join(f"{c.record.case.method}: {text(laws[c.record.id])}" for c in shown)
         + ".",
@@ -87,16 +85,15 @@ def _visible(rows: Array) -> bool:
     return positive.size > 0 and float(np.median(positive)) < 10.0 ** POWERS[1]
 
 
-def _drift(case: Drawn, invariant: str) -> Found | None:
+def _drift(case: Drawn) -> Found | None:
     """Return times, errors of shape (starts, n) and their law: as stored, or else from this trajectory."""
-    stored = case.record.result.laws.get(invariant)
-    if stored is not None and f"drift.{invariant}" in case.series:
-        t, rows = case.series["drift.t"], np.atleast_2d(case.series[f"drift.{invariant}"])
+    stored = case.record.result.laws.get("energy")
+    if stored is not None and "drift.energy" in case.series:
+        t, rows = case.series["drift.t"], np.atleast_2d(case.series["drift.energy"])
         return (t, rows, stored) if t.size > 1 else None
-    name = f"error.{invariant}"
-    if group_of(case.record) != "on" or name not in case.series:
+    if group_of(case.record) != "on" or "error.energy" not in case.series:
         return None
-    t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series[name]
+    t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series["error.energy"]
     later = t >= t[-1] / EARLIEST
     if later.sum() < 2 or not np.isfinite(error).all():
         return None

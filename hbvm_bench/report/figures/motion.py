@@ -9,11 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.report.figures.canvas import Picture, new, picture
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, TRUTH, options
+from hbvm_bench.report.figures.views import REVOLUTION
 from hbvm_bench.summaries.points import family_of
 from hbvm_bench.summaries.rows import status_of
 
@@ -23,7 +24,6 @@ FAMILIES = ("Gauss", "HBVM", "Taylor", "IAS15")
 EACH = 2  # cases of a family that the page can show
 GRAIN = 200  # of the moving view: positions are kept to 1/200 of a length
 FAR = 300.0  # what is farther away is drawn at the edge
-REVOLUTION = 21.46
 YAW, PITCH = 0.6, 0.42  # of the camera, in radians
 REACH = 4.2
 NUMBERS = 90  # places in time of the table and the curves
@@ -37,7 +37,7 @@ def chosen(cases: Sequence[Drawn]) -> list[list[Drawn]]:
         if not members:
             continue
         first = next((c for c in members if c.record.case.settings == "as published"), None)
-        best = min(members, key=_position_error)
+        best = min(members, key=lambda case: case.position_error)
         picked = [case for case in (first, best) if case is not None]
         picked += [c for c in members if c.record.result.outcome != "ok"]
         panes.append(list({case.record.id: case for case in picked}.values())[:EACH])
@@ -148,8 +148,3 @@ def _fate(case: Drawn, end: float) -> str:
     if case.record.result.outcome != "ok":
         return status_of(case.record)
     return f"t = {end:g}, z = {z:.4g}" + (", off the axis" if lost else "")
-
-
-def _position_error(case: Drawn) -> float:
-    value = case.record.result.metrics.get("position_end")
-    return value.value if value is not None and value.counts and value.value is not None else math.inf

@@ -1,5 +1,6 @@
 """Errors over time, and what the figures of cases share: their panels and legends."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -15,7 +16,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, Look, options, panels
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import family_of, number
 from hbvm_bench.summaries.rows import group_of
 
 Array = NDArray[np.float64]
@@ -25,7 +26,7 @@ FINE_BINS = 120  # and in so many in the page's interactive figures
 COLUMNS = 4
 # Inches: the panels of all figures over time have one size and stand under each other.
 WIDTH, LEFT, RIGHT, GAP = 12.4, 0.9, 0.18, 0.36
-TOP, BOTTOM, LEGEND_LINE = 0.28, 0.52, 0.153
+HEIGHT, TOP, BOTTOM, LEGEND_LINE = 1.75, 0.28, 0.52, 0.153
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,12 @@ class Drawn:
     record: Record
     look: Look
     series: dict[str, Array]
+
+    @property
+    def position_error(self) -> float:
+        """Its position error at the end; infinite where there is none that may be compared."""
+        error = number(self.record, "position_end")
+        return math.inf if error is None else error
 
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
@@ -128,9 +135,7 @@ def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
     return t[finite], np.abs(values[finite])
 
 
-def family_panels(
-    cases: Sequence[Drawn], label: str, *, height: float = 1.75
-) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
+def family_panels(cases: Sequence[Drawn], label: str) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
     """Return a figure with a panel per family, all of one size, with room for a legend under each.
 
     Parameters
@@ -139,21 +144,19 @@ def family_panels(
         Divided as `style.panels` does.
     label : str
         Of the vertical axes.
-    height : float
-        Of a panel, in inches.
     """
     by_id = {case.record.id: case for case in cases}
     groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
     rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
-    heights = [TOP + height + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
+    heights = [TOP + HEIGHT + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
     figure = new(WIDTH, sum(heights))
     panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
     made: list[tuple[Axes, list[Drawn]]] = []
     ceiling = sum(heights)
     for row, used in zip(rows, heights, strict=True):
         for column, (name, members) in enumerate(row):
-            x, y = LEFT + column * (panel + GAP), ceiling - TOP - height
-            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, height / sum(heights)))
+            x, y = LEFT + column * (panel + GAP), ceiling - TOP - HEIGHT
+            axes = figure.add_axes((x / WIDTH, y / sum(heights), panel / WIDTH, HEIGHT / sum(heights)))
             axes.set_title(name, color=INK)
             axes.text(1.0, -0.2, "time", transform=axes.transAxes, ha="right", fontsize=8, color=MUTED)
             axes.xaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
@@ -181,7 +184,7 @@ def panel_legend(
             [],
             [],
             color=case.look.light,
-            dashes=case.look.dash or (None, None),
+            dashes=case.look.dash,
             marker=case.look.marker if markers else "",
             markersize=4,
             label=shortened(case.legend(named=named), notes.get(case.record.id, "")),
@@ -228,14 +231,9 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
     bottom = 10.0**what.low
     clipped = np.clip(values, bottom * (10.0 if what.zero else 1.0), 10.0**what.high)
     drawn = np.where(values == 0, bottom, clipped) if what.zero else clipped
-    (line,) = axes.plot(t, drawn, color=case.look.light, clip_on=False)
-    if case.look.dash:
-        line.set_dashes(case.look.dash)
+    (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False)
     if not what.joined:
-        line.set_linewidth(0.7)
-        line.set_marker(case.look.marker)
-        line.set_markersize(2.6)
-        line.set_markevery(max(1, t.size // 10))
+        line.set(linewidth=0.7, marker=case.look.marker, markersize=2.6, markevery=max(1, t.size // 10))
 
 
 def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.store.files import csv_of
+from hbvm_bench.summaries.table import Table
 
 Array = NDArray[np.float64]
 
@@ -87,35 +88,17 @@ class Plot:
     kind: Literal["lines", "points", "paths", "dots"] = "lines"
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """A table of a figure's numbers: the first ``words`` columns hold words."""
-
-    head: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    words: int = 3
-
-
 def as_json(plot: Plot) -> dict[str, Any]:
     """Return a plot for the page; numbers have `DIGITS` digits, gaps are null."""
     return {
         "kind": plot.kind,
         "panels": [
-            {
-                "title": panel.title,
-                "square": panel.square,
+            vars(panel)
+            | {
                 "x": vars(panel.x),
                 "y": vars(panel.y),
                 "traces": [
-                    {
-                        "case": trace.case,
-                        "name": trace.name,
-                        "role": trace.role,
-                        "note": trace.note,
-                        "joined": trace.joined,
-                        "x": [short(value) for value in trace.x.tolist()],
-                        "y": [short(value) for value in trace.y.tolist()],
-                    }
+                    vars(trace) | {"x": list(map(short, trace.x)), "y": list(map(short, trace.y))}
                     for trace in panel.traces
                     if trace.x.size
                 ],
@@ -142,7 +125,7 @@ def as_csv(plot: Plot) -> bytes:
     return csv_of([("panel", "case", "name", "kind", "x", "y"), *rows])
 
 
-def numbers(plot: Plot) -> Numbers:
+def numbers(plot: Plot) -> Table:
     """Return a table of what a figure shows, short enough to be read aloud."""
     traces = [(panel, trace) for panel in plot.panels for trace in panel.traces if trace.role == "case"]
     many = len(plot.panels) > 1
@@ -162,12 +145,12 @@ def numbers(plot: Plot) -> Numbers:
                 trace.name,
                 panel.title if many else "",
                 *(_at(trace, place) for place in places),
-                _largest(trace.y),
+                _range(np.abs(trace.y))[1],
                 laws.get((panel.title, trace.case), ""),
             )
             for panel, trace in traces
         ]
-        return Numbers(head, rows)
+        return Table("", head, rows, words=range(3))
     head = ("#", "case", "panel", "points", "x from", "to", "y from", "to")
     if plot.kind == "points":
         head = ("#", "case", "panel", "x", "y")
@@ -178,7 +161,7 @@ def numbers(plot: Plot) -> Numbers:
             rows += [(*first, _text(x), _text(y)) for x, y in zip(trace.x, trace.y, strict=True)]
         else:
             rows.append((*first, str(trace.x.size), *_range(trace.x), *_range(trace.y)))
-    return Numbers(head, rows)
+    return Table("", head, rows, words=range(3))
 
 
 def short(value: float) -> float | None:
@@ -187,13 +170,11 @@ def short(value: float) -> float | None:
 
 
 def _places(xs: Sequence[Array], *, log: bool) -> list[float]:
-    xs = [x for x in xs if x.size]
-    if not xs:
+    every = np.concatenate([np.empty(0), *xs])
+    if not every.size:
         return []
-    low, high = min(float(x.min()) for x in xs), max(float(x.max()) for x in xs)
-    if log and low > 0:
-        return [float(x) for x in np.geomspace(low, high, TABLE_COLUMNS)]
-    return [float(x) for x in np.linspace(low, high, TABLE_COLUMNS)]
+    space = np.geomspace if log and every.min() > 0 else np.linspace
+    return space(every.min(), every.max(), TABLE_COLUMNS).tolist()
 
 
 def _at(trace: Trace, place: float) -> str:
@@ -203,11 +184,6 @@ def _at(trace: Trace, place: float) -> str:
     if x.size == 0 or place > x[-1] * (1 + 1e-3) + 1e-12 or place < x[0] - NEAR * (x[-1] - x[0]):
         return "–"
     return _text(float(y[np.argmin(np.abs(x - place))]))
-
-
-def _largest(y: Array) -> str:
-    y = np.abs(y[np.isfinite(y)])
-    return _text(float(y.max())) if y.size else "–"
 
 
 def _range(values: Array) -> tuple[str, str]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture
-from hbvm_bench.report.figures.over_time import WIDTH, Drawn
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, options
 from problems.problem import Problem
@@ -114,7 +114,7 @@ def _grid(
             va="top",
         )
         fewer = max(1, -(-x.size // PAGE_POINTS))
-        traces.append(Trace(case.look.number, case.record.case.method, x[::fewer], y[::fewer]))
+        traces.append(trace(case, x[::fewer], y[::fewer]))
     for row in range(rows):
         grid[row * COLUMNS].set_ylabel(labels[1])
     said = "; ".join(f"{case.record.case.method}: {x.size} points" for case, x, _ in clouds)

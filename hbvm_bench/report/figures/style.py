@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import by_family
 
 # Base colour of each method: light theme, dark theme.
 FAMILIES = {
@@ -58,6 +58,7 @@ MARKERS = {
     "DOP853": "h",
     "Radau": "H",
 }
+IN_A_PANEL = 6  # cases
 UNKNOWN_MARKER = "8"  # of a method that is not in the table
 
 # Neutral colours of the figures; each is unique so that it can be themed in the page.
@@ -143,17 +144,15 @@ def options(record: Record) -> str:
     return ", ".join(words) or "default"
 
 
-def panels(records: Sequence[Record], most: int = 6) -> list[tuple[str, list[Record]]]:
-    """Divide cases into panels: by library, and by method where a library has more than ``most``."""
+def panels(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
+    """Divide cases into panels: by library, and by method where a library has more than `IN_A_PANEL`."""
     libraries: dict[str, list[Record]] = {}
     for record in records:
         libraries.setdefault("ours" if record.role == "ours" else record.library, []).append(record)
     made: list[tuple[str, list[Record]]] = []
     for library, members in libraries.items():
-        names: dict[str, list[Record]] = {}
-        for record in members:
-            names.setdefault(family_of(record), []).append(record)
-        if len(members) <= most:
+        names = by_family(members)
+        if len(members) <= IN_A_PANEL:
             made.append((f"{', '.join(names)} · {library}" if len(names) < 3 else library, members))
         else:
             made += [(f"{name} · {library}", group) for name, group in names.items()]

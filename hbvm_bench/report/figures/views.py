@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from hbvm_bench.measure.quantities import PLANETOID_Z
+from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, family_panels, panel_legend, trace
@@ -31,20 +30,18 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
         return None
     figure, grid = family_panels(shown, "z of the planetoid")
     curves: list[Trace] = []
-    late_truth: tuple[Array, Array] | None = None
+    truth: list[Trace] = []
     for axes, members in grid:
         for case in members:
             t, z = case.series["t"], case.series["y"][:, PLANETOID_Z]
             kept = (t >= start) & (np.abs(z) <= REACH)
-            (line,) = axes.plot(t[kept], z[kept], color=case.look.light)
+            axes.plot(t[kept], z[kept], color=case.look.light, dashes=case.look.dash)
             curves.append(trace(case, t[kept], z[kept]))
-            if case.look.dash:
-                line.set_dashes(case.look.dash)
         if reference is not None:
             late = reference.t >= start
-            truth = reference.high[late, PLANETOID_Z]
-            late_truth = (reference.t[late], truth)
-            axes.plot(reference.t[late], truth, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
+            known = reference.t[late], reference.high[late, PLANETOID_Z]
+            axes.plot(*known, "o", mfc="none", color=INK, ms=5, clip_on=False, zorder=5)
+            truth = [Trace(0, "128-bit reference", *known, role="truth")]
         axes.set(xlim=(start, problem.t_end), ylim=(-REACH, REACH))
         panel_legend(axes, members)
     ends = "; ".join(
@@ -59,12 +56,8 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
         "Rings: the stored 128-bit reference. A line that is missing has left the picture: its planetoid "
         "is far away. A curve that misses the rings conserves, at best, the energy of another motion.",
         f"z at t = {problem.t_end:g}. {ends}.",
-        Plot([Panel("", Axis("time"), Axis("z of the planetoid"), [*curves, *_truth(late_truth)])]),
+        Plot([Panel("", Axis("time"), Axis("z of the planetoid"), [*curves, *truth])]),
     )
-
-
-def _truth(points: tuple[Array, Array] | None) -> list[Trace]:
-    return [] if points is None else [Trace(0, "128-bit reference", *points, role="truth")]
 
 
 def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | None) -> Picture | None:
@@ -73,7 +66,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
     shown = [case for case in cases if case.series["t"].size > 2]
     if not shown:
         return None
-    best = min(shown, key=_position_error)
+    best = min(shown, key=lambda case: case.position_error)
     columns = 9
     rows = -(-len(shown) // columns)
     figure = new(WIDTH, 1.66 * rows)
@@ -87,9 +80,10 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         first = best.series["t"] <= REVOLUTION
         last = t >= t[-1] - 3 * REVOLUTION
         for body in (0, 1):
-            _path(axes, problem, best, first, body, color=TRUTH, linewidth=2.6)
-            _path(axes, problem, case, last, body, color=case.look.light, linewidth=0.9)
-            curves[body].append(trace(case, *path(problem, case, last, body).T[:, ::4]))
+            axes.plot(*path(problem, best, first, body).T, color=TRUTH, linewidth=2.6)
+            mine = path(problem, case, last, body).T
+            axes.plot(*mine, color=case.look.light, linewidth=0.9)
+            curves[body].append(trace(case, *mine[:, ::4]))
         axes.set(xlim=(-3.4, 3.4), ylim=(-3.4, 3.4), aspect="equal")
         axes.set_xticks([-2.5, 0, 2.5], labels=[])
         axes.set_yticks([-2.5, 0, 2.5], labels=[])
@@ -171,25 +165,6 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
 
 
 VIEWS: dict[str, tuple[View, ...]] = {"sitnikov": (axis_motion, primaries)}
-
-
-def _position_error(case: Drawn) -> float:
-    value = case.record.result.metrics.get("position_end")
-    return value.value if value is not None and value.counts and value.value is not None else np.inf
-
-
-def _path(
-    axes: Axes,
-    problem: Problem,
-    case: Drawn,
-    chosen: NDArray[np.bool_],
-    body: int,
-    *,
-    color: str,
-    linewidth: float,
-) -> None:
-    curve = path(problem, case, chosen, body)
-    axes.plot(curve[:, 0], curve[:, 1], color=color, linewidth=linewidth)
 
 
 def path(problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int) -> Array:

@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.protocol import Array, Stepper
+from integrators.protocol import Array, MethodBase, Stepper
+from problems import Problem
 
 Test = Callable[[Array], NDArray[np.bool_]]
 
@@ -49,11 +50,21 @@ def departure(
             samples = stepper.advance(
                 np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))[1:]
             )
-        if samples.t.size:
-            found = np.flatnonzero(departed(samples.y))
-            if found.size:
-                return float(samples.t[found[0]])
+        if samples.t.size and (found := first(samples.t, departed(samples.y))) is not None:
+            return found
         if samples.status.failed:
             return stepper.t
         stretch = min(stretch * GROWTH, longest)
     return None
+
+
+def first(t: Array, holds: NDArray[np.bool_]) -> float | None:
+    """Return the first of the times at which something holds; ``None`` where it never does."""
+    return float(t[np.argmax(holds)]) if holds.any() else None
+
+
+def own_steps(problem: Problem, method: MethodBase, y0: Array, span: float) -> tuple[Array, Array, Stepper]:
+    """Return the times (n,) and states (n, dim) at a method's own steps, with the start, and its stepper."""
+    stepper = method.compile(problem.system).start(y0, problem.par, 0.0)
+    samples = stepper.advance(np.array([span]), sample="steps")
+    return np.concatenate([[0.0], samples.t]), np.vstack([y0, samples.y]), stepper

@@ -1,12 +1,19 @@
 """What all figures on the paper share: colours, sizes, the numbers that a page reads off them."""
 
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Concatenate, ParamSpec
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from hbvm_bench.report.figures import canvas
-from hbvm_bench.report.figures.canvas import Picture, new
+from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.read_off import read_off
 from hbvm_bench.report.figures.style import TRUTH, looks
+from integrators.protocol import Array
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
@@ -17,6 +24,8 @@ SEQUENTIAL = LinearSegmentedColormap.from_list(
     "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
 WIDTH = 10.4  # inches, of a whole line
+P = ParamSpec("P")
+Said = tuple[str, str] | tuple[str, str, str, str]
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -33,16 +42,49 @@ def number(value: float | None, digits: int = 2) -> str:
     return f"{mantissa}e{int(exponent)}"
 
 
-def sheet(width: float, height: float) -> Figure:
-    """Return an empty figure of ``width`` × ``height`` inches that makes room for its labels."""
-    figure = new(width, height)
-    figure.set_layout_engine("constrained")
-    return figure
+def drawn(
+    key: str, title: str, width: float, height: float, *, values: bool = False
+) -> Callable[[Callable[Concatenate[Figure, P], Said]], Callable[P, Picture]]:
+    """Have a function draw on an empty sheet, of which a picture is made; the same gives the same bytes.
+
+    Parameters
+    ----------
+    key, title : str
+        Of the picture; unless they follow from what is drawn: then the function returns both, before
+        the caption and the summary that every such function returns.
+    width, height : float
+        Of the sheet, in inches; it makes room for its labels.
+    values : bool
+        Whether colours mean values.
+    """
+
+    def decorate(draw: Callable[Concatenate[Figure, P], Said]) -> Callable[P, Picture]:
+        @styled
+        @wraps(draw)
+        def made(*args: P.args, **kwargs: P.kwargs) -> Picture:
+            figure = new(width, height)
+            figure.set_layout_engine("constrained")
+            *named, caption, summary = draw(figure, *args, **kwargs)
+            key_, title_ = named or (key, title)
+            plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
+            return picture(figure, key_, title_, caption, summary, plot, values=values)
+
+        return made
+
+    return decorate
 
 
-def picture(
-    figure: Figure, key: str, title: str, caption: str, summary: str, *, values: bool = False
-) -> Picture:
-    """Render a figure with the numbers that are read off it; the same figure gives the same bytes."""
-    plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
-    return canvas.picture(figure, key, title, caption, summary, plot, values=values)
+def heat(
+    axes: Axes, x: Sequence[float] | Array, y: Sequence[float], values: Array, low: float, high: float
+) -> QuadMesh:
+    """Colour cells by the logarithm of their value, from ``low`` to ``high``; blank are those without."""
+    return axes.pcolormesh(
+        x,
+        y,
+        np.ma.masked_invalid(np.log10(values)),
+        cmap=SEQUENTIAL.reversed(),
+        vmin=low,
+        vmax=high,
+        shading="nearest",
+        rasterized=True,
+    )

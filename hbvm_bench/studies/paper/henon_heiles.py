@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.departure import departure
+from hbvm_bench.studies.paper.departure import departure, first, own_steps
 from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -85,13 +85,10 @@ def start(t_end: float = T_END) -> Problem:
     return henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
 
 
-def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END, every: int = 1) -> Orbit:
-    """Integrate from the start, ``offset`` last bits away; keep every ``every``-th step."""
+def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END) -> Orbit:
+    """Integrate from the start, ``offset`` last bits away."""
     problem = start(t_end)
-    y0 = neighbour(problem.y0, offset)
-    stepper = method.compile(problem.system).start(y0, problem.par, 0.0)
-    samples = stepper.advance(np.array([t_end]), sample="steps")
-    t, y = np.concatenate([[0.0], samples.t])[::every], np.vstack([y0, samples.y])[::every]
+    t, y, stepper = own_steps(problem, method, neighbour(problem.y0, offset), t_end)
     gone = np.flatnonzero(np.abs(y[:, :2]).max(axis=1) > GONE)
     if gone.size:
         t, y = t[: gone[0] + 1], y[: gone[0] + 1]
@@ -101,7 +98,7 @@ def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END, every: int 
         q=y[:, :2],
         energy=problem.invariants(y)["energy"],
         error=float(problem.errors(y)["energy"].max()),
-        left=float(t[-1]) if gone.size else float(stepper.t) if samples.status.failed else None,
+        left=float(t[-1]) if gone.size else float(stepper.t) if stepper.status.failed else None,
         outside=int(np.count_nonzero(~inside_triangle(y))) - int(gone.size > 0),
     )
 
@@ -139,8 +136,13 @@ def agreement(method: MethodBase, t_end: float = 100.0) -> float:
     problem = start(t_end)
     found = integrate(problem, method, times=[t_end], sample="steps")
     truth = integrate(problem, TRUTH, times=found.t)
-    parted = np.flatnonzero(~(np.hypot(*(found.y[:, :2] - truth.y[:, :2]).T) < AGREES))
-    return float(found.t[parted[0]] if parted.size else found.t[-1])
+    return parted(found.t, found.y, truth.y)
+
+
+def parted(t: Array, y: Array, truth: Array) -> float:
+    """Return the first time at which positions are `AGREES` away from the true ones, or else the last."""
+    found = first(t, ~(np.hypot(*(y[:, :2] - truth[:, :2]).T) < AGREES))
+    return float(t[-1]) if found is None else found
 
 
 def escape_map(

@@ -5,12 +5,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, power_label, say, styled
+from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, SEQUENTIAL, WIDTH, number, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn, heat, number
 from hbvm_bench.studies.paper.henon_heiles import DIRECTIONS, GAP, GAPS, MAP_END, T_END, H, Orbit, potential
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
@@ -19,10 +20,9 @@ LEVELS = (0.02, 0.05, 0.08, 0.11, 0.14, ESCAPE)
 LABELLED = (math.radians(162), math.radians(34))  # directions from the origin, alternating
 
 
-@styled
-def level_curves(trace: Array) -> Picture:
+@drawn("henon-heiles-1", "Figure 1 · level curves of the potential and an orbit", WIDTH * 0.6, 5.0)
+def level_curves(figure: Figure, trace: Array) -> Said:
     """henon_fig1: level curves of U with a traced orbit."""
-    figure = sheet(WIDTH * 0.6, 5.0)
     axes = figure.subplots()
     x, y = np.meshgrid(np.linspace(-1.25, 1.25, 301), np.linspace(-0.75, 1.25, 301))
     axes.plot(*trace.T, color=HBVM, linewidth=0.6, alpha=0.6)
@@ -38,10 +38,7 @@ def level_curves(trace: Array) -> Picture:
     axes.plot(0, 0, "+", color=INK, markersize=8)
     say(axes, "O", (0, 0), (5, 4), fontsize=9)
     _plane(axes, 1.25, (-0.75, 1.25))
-    return picture(
-        figure,
-        "henon-heiles-1",
-        "Figure 1 · level curves of the potential and an orbit",
+    return (
         "The level 1/6 is the triangle of the three saddles. The true orbit from our start, H₀ = 1/6 − "
         f"{GAP:g}, to t = 300: it comes close to the sides, where a small error of the energy lets it "
         "out.",
@@ -49,11 +46,12 @@ def level_curves(trace: Array) -> Picture:
     )
 
 
-@styled
-def plane(run: Orbit, family: str, figure_number: int, caption: str) -> Picture:
+@drawn("", "", WIDTH * 0.6, 5.0)
+def plane(figure: Figure, run: Orbit, family: str, figure_number: int, caption: str) -> Said:
     """henon_fig2, henon_fig3: every step in the (q1, q2) plane."""
     colour = GAUSS if family == "gauss" else HBVM
-    figure = sheet(WIDTH * (0.6 if run.left is None else 0.66), 5.0)
+    if run.left is not None:
+        figure.set_size_inches(WIDTH * 0.66, 5.0)
     axes = figure.subplots()
     corners = np.array([*SADDLES, SADDLES[0]])
     axes.plot(*corners.T, color=INK, linewidth=0.9)
@@ -72,8 +70,7 @@ def plane(run: Orbit, family: str, figure_number: int, caption: str) -> Picture:
         axes, 1.5 if run.left is not None else 1.25, (-0.9, 1.25) if run.left is not None else (-0.75, 1.25)
     )
     name = "Gauss of order four" if family == "gauss" else "HBVM(4,2)"
-    return picture(
-        figure,
+    return (
         f"henon-heiles-{figure_number}",
         f"Figure {figure_number} · {name}, h = {H:g}",
         caption,
@@ -82,10 +79,9 @@ def plane(run: Orbit, family: str, figure_number: int, caption: str) -> Picture:
     )
 
 
-@styled
-def hamiltonian(gauss: Orbit, hbvm: Orbit) -> Picture:
+@drawn("henon-heiles-4", "Figure 4 · the Hamiltonian along both solutions", WIDTH, 3.3)
+def hamiltonian(figure: Figure, gauss: Orbit, hbvm: Orbit) -> Said:
     """henon_fig4: H along both runs."""
-    figure = sheet(WIDTH, 3.3)
     left, right = figure.subplots(1, 2, width_ratios=[1.5, 1])
     inside = gauss.t <= (gauss.left or T_END) - 3
     left.plot(
@@ -102,10 +98,7 @@ def hamiltonian(gauss: Orbit, hbvm: Orbit) -> Picture:
     right.plot(*envelope(hbvm.t[1:], error[1:], 300), color=HBVM, linewidth=1.1)
     log_axis(right, "y", -17, -10)
     right.set(xlim=(0, T_END), xlabel="time", ylabel="|H − H₀| / H₀", title=hbvm.method)
-    return picture(
-        figure,
-        "henon-heiles-4",
-        "Figure 4 · the Hamiltonian along both solutions",
+    return (
         "Left, the paper's figure: under Gauss H swings irregularly across 1/6, under HBVM it is a "
         "straight line. Right: that line's error over the whole run.",
         f"{gauss.method}: H between {gauss.energy[inside].min():.5f} and "
@@ -113,10 +106,9 @@ def hamiltonian(gauss: Orbit, hbvm: Orbit) -> Picture:
     )
 
 
-@styled
-def fates(times: Mapping[str, Sequence[float | None]], printed: float) -> Picture:
+@drawn("henon-heiles-fates", "Beyond the paper · the escape time is chance", WIDTH * 0.66, 3.2)
+def fates(figure: Figure, times: Mapping[str, Sequence[float | None]], printed: float) -> Said:
     """Draw how long neighbouring starts stay: the distribution behind the paper's one number."""
-    figure = sheet(WIDTH * 0.66, 3.2)
     axes = figure.subplots()
     summary = []
     for method, found in times.items():
@@ -135,10 +127,7 @@ def fates(times: Mapping[str, Sequence[float | None]], printed: float) -> Pictur
     say(axes, f"the paper's t ≃ {printed:.0f}", (printed, 0.04), (5, 0), fontsize=8, color=INK)
     axes.set(xlim=(0, T_END), ylim=(0, 1.04), xlabel="time", ylabel="share of orbits still inside")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    return picture(
-        figure,
-        "henon-heiles-fates",
-        "Beyond the paper · the escape time is chance",
+    return (
         "The same start but for the last bits of one momentum. The motion is chaotic, so the last bit "
         "decides when Gauss lets the orbit out; the paper's single escape time is one draw from this "
         "distribution. Under HBVM none leaves.",
@@ -146,28 +135,17 @@ def fates(times: Mapping[str, Sequence[float | None]], printed: float) -> Pictur
     )
 
 
-@styled
-def maps(found: Mapping[str, Array]) -> Picture:
+@drawn("henon-heiles-map", "Beyond the paper · who escapes from where", WIDTH, 3.6, values=True)
+def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     """Escape times over starts and energies, both methods."""
     gauss, hbvm, gaps, t_end = found["gauss"], found["hbvm"], GAPS, MAP_END
     degrees = np.degrees(DIRECTIONS)
-    figure = sheet(WIDTH, 3.6)
     panels = figure.subplots(1, 2, sharey=True)
     mesh = None
     for axes, times, name in zip(
         panels, (gauss, hbvm), ("Gauss(s=2, h=1.0)", "HBVM(k=4, s=2, h=1.0)"), strict=True
     ):
-        shown = np.ma.masked_invalid(np.log10(np.maximum(times, 1.0)))
-        mesh = axes.pcolormesh(
-            degrees,
-            gaps,
-            shown,
-            cmap=SEQUENTIAL.reversed(),
-            vmin=2,
-            vmax=math.log10(t_end),
-            shading="nearest",
-            rasterized=True,
-        )
+        mesh = heat(axes, degrees, gaps, np.maximum(times, 1.0), 2, math.log10(t_end))
         axes.set(yscale="log", xlabel="direction of the start, degrees")
         axes.set_xticks(range(0, 361, 60))
         axes.grid(visible=False)
@@ -187,10 +165,7 @@ def maps(found: Mapping[str, Array]) -> Picture:
     bar.set_ticks(ticks, labels=[power_label(10.0**p) for p in ticks])
     bar.set_label("escape time; blank: inside throughout")
     inside = gauss[np.asarray(gaps) >= 4e-3]
-    return picture(
-        figure,
-        "henon-heiles-map",
-        "Beyond the paper · who escapes from where",
+    return (
         f"Orbits from (0, 1/2) in every direction, with energies from 1/6 − {number(max(gaps))} "
         f"(bottom) to 1/6 − {number(min(gaps))} (top), followed to t = {t_end:,.0f}. Under Gauss the "
         "triangle leaks where 1/6 is nearer than the error of H; the blank cells among the coloured "
@@ -199,7 +174,6 @@ def maps(found: Mapping[str, Array]) -> Picture:
         f"Under Gauss {int(np.count_nonzero(~np.isnan(gauss)))} of {gauss.size} orbits leave, "
         f"{int(np.count_nonzero(~np.isnan(inside)))} of {inside.size} of those with 1/6 − H₀ ≥ 4e-3; "
         f"under HBVM {int(np.count_nonzero(~np.isnan(hbvm)))}.",
-        values=True,
     )
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import takewhile
+from typing import Any
 
 import numpy as np
 
@@ -11,37 +13,21 @@ from hbvm_bench.studies.paper import henon_heiles_figures as figures
 from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
-from hbvm_bench.studies.paper.results import Results, Task, joined, split
+from hbvm_bench.studies.paper.results import Part, Results, Task, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
-KEY, TITLE = "henon-heiles", "The Hénon–Heiles problem"
 PRINTED = 7000.0  # the paper's escape time, "t ≃ 7000"
-CHUNKS = 4
 FAMILIES = {"gauss": GAUSS, "hbvm": HBVM_4}
-Steps = Mapping[str, Sequence[StepRow]]
-
-
-def tasks() -> list[Task]:
-    """Return the computations of this part."""
-    starts, gaps = range(experiment.NEIGHBOURS), experiment.GAPS
-    both = [
-        task
-        for family, method in FAMILIES.items()
-        for task in (
-            Task(f"henon-heiles/steps {family}", partial(experiment.by_step, family), 9),
-            *split(f"henon-heiles/escapes {family}", partial(experiment.escapes, method), starts, CHUNKS, 6),
-            *split(f"henon-heiles/map {family}", partial(experiment.escape_map, method), gaps, CHUNKS, 15),
-        )
-    ]
-    return [
-        Task("henon-heiles/gauss", gauss_orbit, 20),
-        Task("henon-heiles/hbvm", partial(experiment.orbit, HBVM_4), 3),
-        Task("henon-heiles/truth", experiment.true_orbit, 1),
-        *both,
-        *others.tasks(KEY, others.on_henon_heiles, others.HENON_HEILES, 8),
-    ]
+PROBLEM = (
+    "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” "
+    "1/6; it does not say which. Here: (q₁, q₂) = ({:g}, {:g}), momentum at an angle of "
+    f"{{:g}} rad, H₀ = 1/6 − {experiment.GAP:g}. The motion is chaotic, so the last bit of the "
+    f"start decides when Gauss loses the orbit: {experiment.NEIGHBOURS} starts were tried that "
+    "differ in the last bits of one momentum, and the one drawn (number {}) is "
+    "the one that escapes nearest to the paper's time."
+)
 
 
 def gauss_orbit() -> tuple[int, Orbit]:
@@ -51,73 +37,64 @@ def gauss_orbit() -> tuple[int, Orbit]:
     return nearest, experiment.orbit(GAUSS, offset=nearest)
 
 
-def blocks(results: Results) -> list[Maker]:
-    """Return what makes each block of the section."""
-
-    def problem() -> str:
-        q1, q2, angle = experiment.START
-        return (
-            "The paper integrates to t = 50,000 with h = 1 from a point whose energy is “very close to” "
-            f"1/6; it does not say which. Here: (q₁, q₂) = ({q1:g}, {q2:g}), momentum at an angle of "
-            f"{angle:g} rad, H₀ = 1/6 − {experiment.GAP:g}. The motion is chaotic, so the last bit of the "
-            f"start decides when Gauss loses the orbit: {experiment.NEIGHBOURS} starts were tried that "
-            f"differ in the last bits of one momentum, and the one drawn (number {_gauss(results)[0]}) is "
-            "the one that escapes nearest to the paper's time."
-        )
-
+def _runs() -> list[Task]:
+    starts, gaps = range(experiment.NEIGHBOURS), experiment.GAPS
     return [
-        ("the problem", problem),
-        ("Figure 1", lambda: figures.level_curves(results["henon-heiles/truth"])),
+        Task("gauss", gauss_orbit, 20),
+        Task("hbvm", partial(experiment.orbit, HBVM_4), 3),
+        Task("truth", experiment.true_orbit, 1),
+        *(
+            task
+            for family, method in FAMILIES.items()
+            for task in (
+                Task(f"steps {family}", partial(experiment.by_step, family), 9),
+                *split(f"escapes {family}", partial(experiment.escapes, method), starts, 4, 6),
+                *split(f"map {family}", partial(experiment.escape_map, method), gaps, 4, 15),
+            )
+        ),
+        *others.tasks(others.on_henon_heiles, others.HENON_HEILES, 8),
+    ]
+
+
+def _blocks(results: Results) -> list[Maker]:
+    pair = partial(_pair, results)
+    return [
+        ("the problem", lambda: PROBLEM.format(*experiment.START, results["gauss"][0])),
+        ("Figure 1", lambda: figures.level_curves(results["truth"])),
         (
             "Figure 2",
             lambda: figures.plane(
-                _gauss(results)[1], "gauss", 2,
+                results["gauss"][1], "gauss", 2,
                 "Every step until the orbit leaves; circles: the last steps, as in the paper.",
             ),
         ),
         (
             "Figure 3",
             lambda: figures.plane(
-                _hbvm(results), "hbvm", 3, "All 50,000 steps from the first of the starts."
+                results["hbvm"], "hbvm", 3, "All 50,000 steps from the first of the starts."
             ),
         ),
-        ("Figure 4", lambda: figures.hamiltonian(_gauss(results)[1], _hbvm(results))),
+        ("Figure 4", lambda: figures.hamiltonian(results["gauss"][1], results["hbvm"])),
         (
             "the escape times",
-            lambda: figures.fates(
-                {repr(FAMILIES[family]): found for family, found in _times(results).items()}, PRINTED
-            ),
+            lambda: figures.fates({repr(FAMILIES[key]): t for key, t in pair("escapes").items()}, PRINTED),
         ),
-        ("who escapes from where", lambda: figures.maps(_maps(results))),
-        ("the table of steps", lambda: _step_table(_steps(results))),
+        ("who escapes from where", lambda: figures.maps(pair("map"))),
+        ("the table of steps", lambda: _step_table(pair("steps"))),
         ("the other integrators", lambda: _others(results)),
     ]  # fmt: skip
 
 
-def _gauss(results: Results) -> tuple[int, Orbit]:
-    return results["henon-heiles/gauss"]
+def _pair(results: Results, what: str) -> dict[str, Any]:
+    """Return what was computed with both methods; maps as arrays."""
+    found = {family: results[f"{what} {family}"] for family in FAMILIES}
+    return {family: np.stack(rows) for family, rows in found.items()} if what == "map" else found
 
 
-def _hbvm(results: Results) -> Orbit:
-    return results["henon-heiles/hbvm"]
-
-
-def _times(results: Results) -> dict[str, list[float | None]]:
-    return {family: joined(results, f"henon-heiles/escapes {family}", CHUNKS) for family in FAMILIES}
-
-
-def _maps(results: Results) -> dict[str, Array]:
-    return {family: np.stack(joined(results, f"henon-heiles/map {family}", CHUNKS)) for family in FAMILIES}
-
-
-def _steps(results: Results) -> Steps:
-    return {family: results[f"henon-heiles/steps {family}"] for family in FAMILIES}
-
-
-def claims(results: Results) -> list[Claim]:
-    """Return the claims of the paper's section."""
-    gauss, hbvm = _gauss(results)[1], _hbvm(results)
-    times, maps, steps = _times(results), _maps(results), _steps(results)
+def _claims(results: Results) -> list[Claim]:
+    gauss: Orbit = results["gauss"][1]
+    hbvm: Orbit = results["hbvm"]
+    times, maps, steps = (_pair(results, what) for what in ("escapes", "map", "steps"))
     gone = {family: sorted(time for time in found if time is not None) for family, found in times.items()}
     starts = len(times["gauss"])
     middle = float(np.median([np.inf if time is None else time for time in times["gauss"]]))
@@ -175,15 +152,11 @@ def claims(results: Results) -> list[Claim]:
 
 def kept(rows: Sequence[StepRow]) -> float:
     """Return the largest h up to which no orbit leaves with any step; 0 where one leaves with the first."""
-    largest = 0.0
-    for row in rows:
-        if any(time is not None for time in row.left):
-            break
-        largest = row.h
-    return largest
+    stay = takewhile(lambda row: row.left.count(None) == len(row.left), rows)
+    return max((row.h for row in stay), default=0.0)
 
 
-def _step_table(steps: Steps) -> Table:
+def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
     def cells(row: StepRow) -> tuple[str, ...]:
         gone = [time for time in row.left if time is not None]
         return str(len(gone)), f"{min(gone):.0f}" if gone else "–", f"{row.agrees:g}"
@@ -212,7 +185,6 @@ def _slope(x: float, y: float) -> Array:
 def _others(results: Results) -> Table:
     return others.table(
         results,
-        KEY,
         others.HENON_HEILES,
         {
             "energy": ("energy", number),
@@ -225,3 +197,6 @@ def _others(results: Results) -> Table:
         "Chaos doubles every error about every five units of time, so no double precision orbit agrees "
         "much longer than two hundred.",
     )
+
+
+PART = Part("henon-heiles", "The Hénon–Heiles problem", _runs(), _claims, _blocks)

@@ -55,16 +55,16 @@ class Row:
 
 
 Format = Callable[[float], str]
+Found = tuple[dict[str, float], str]  # the numbers, and how it ended
 
 
-def tasks(part: str, run: Callable[[str], Row], methods: Sequence[str], cost: float) -> list[Task]:
+def tasks(run: Callable[[str], Row], methods: Sequence[str], cost: float) -> list[Task]:
     """Return the computations of a part with every method."""
-    return [Task(f"{part}/other {text}", partial(run, text), cost) for text in methods]
+    return [Task(f"other {text}", partial(run, text), cost) for text in methods]
 
 
 def table(
     results: Results,
-    part: str,
     methods: Sequence[str],
     columns: Mapping[str, tuple[str, Format]],
     title: str,
@@ -75,10 +75,8 @@ def table(
 
     Parameters
     ----------
-    results : mapping
+    results : Results
         Of `tasks`.
-    part : str
-        The key of the part.
     methods : sequence of str
         As written.
     columns : mapping of str to (str, callable)
@@ -88,13 +86,13 @@ def table(
     remark : callable
         What to say of a row that says nothing itself.
     """
-    rows: list[Row] = [results[f"{part}/other {text}"] for text in methods]
+    rows: list[Row] = [results[f"other {text}"] for text in methods]
 
     def cells(row: Row) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
 
     return Table(
-        key=f"{part}-others",
+        key=f"{results.part}-others",
         title=title,
         head=("method", *columns, "remark"),
         rows=[(row.method, *cells(row), row.remark or remark(row)) for row in rows],
@@ -105,71 +103,67 @@ def table(
 
 def on_sitnikov(text: str) -> Row:
     """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
-    problem = load("sitnikov", e=sitnikov.E, d=sitnikov.D, t_end=sitnikov.T_END)
+    return _row(text, load("sitnikov", e=sitnikov.E, d=sitnikov.D, t_end=sitnikov.T_END), _on_sitnikov)
+
+
+def on_henon_heiles(text: str) -> Row:
+    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
+    return _row(text, henon_heiles.start(HENON_SPAN), _on_henon_heiles)
+
+
+def on_period_annulus(text: str) -> Row:
+    """Return the edge found over the short span and its error in H."""
+    return _row(text, period_annulus.PROBLEM, _on_period_annulus)
+
+
+def _row(text: str, problem: Problem, run: Callable[[MethodBase, Problem], Found]) -> Row:
+    """Run a method on a problem; one that refuses it, or whose library is not installed, says so itself."""
     method = make_method(text)
-    refused = _refused(method, problem)
-    if refused:
-        return Row(text, {}, refused)
+    refused = method.accepts(problem)
+    try:
+        if refused is None:
+            method.compile(problem.system)
+    except InputError as error:
+        refused = str(error)
+    return Row(text, {}, refused) if refused is not None else Row(text, *run(method, problem))
+
+
+def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
     solution = integrate(problem, method, times=np.arange(0.0, sitnikov.T_END + 0.5, 0.5))
-    errors = solution.errors()
+    if solution.status.failed:
+        return {}, _ended(solution)
+    errors, known = solution.errors(), solutions.find(problem)
     numbers = {
         "energy": float(errors["energy"].max()),
         "momentum": float(errors["angular_momentum"].max()),
         "off_axis": float(solution.guards()["off_axis"].max()),
     }
-    known = solutions.find(problem)
-    if solution.status.failed:
-        return Row(text, {}, _ended(solution))
     if known is not None:
         numbers["z"] = float(abs(solution.y[-1, 8] - known.high[-1, 8]))
     if solution.stats.evaluations:
         numbers["evaluations"] = float(solution.stats.evaluations)
-    return Row(text, numbers, "")
+    return numbers, ""
 
 
-def on_henon_heiles(text: str) -> Row:
-    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
-    problem, method = henon_heiles.start(HENON_SPAN), make_method(text)
-    refused = _refused(method, problem)
-    if refused:
-        return Row(text, {}, refused)
+def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
     times = np.arange(0.0, HENON_SPAN + 1.0)
     solution = integrate(problem, method, times=times)
-    truth = integrate(problem, henon_heiles.TRUTH, times=times).y
-    apart = np.hypot(*(solution.y[:, :2] - truth[: len(solution.y), :2]).T)
-    parted = np.flatnonzero(~(apart < henon_heiles.AGREES))
+    truth = integrate(problem, henon_heiles.TRUTH, times=times).y[: len(solution.y)]
     finite = np.isfinite(solution.y).all(axis=1) & (np.abs(solution.y[:, :2]).max(axis=1) < henon_heiles.GONE)
     numbers = {
         "energy": float(solution.errors()["energy"][finite].max()),
         "outside": float(beyond_triangle(solution.y[finite]).max()),
-        "agrees": float(solution.t[parted[0]] if parted.size else solution.t[-1]),
+        "agrees": henon_heiles.parted(solution.t, solution.y, truth),
     }
-    return Row(text, numbers, _ended(solution) if solution.status.failed else "")
+    return numbers, _ended(solution) if solution.status.failed else ""
 
 
-def on_period_annulus(text: str) -> Row:
-    """Return the edge found over the short span and its error in H."""
-    problem = period_annulus.PROBLEM
-    method = make_method(text)
-    refused = _refused(method, problem)
-    if refused:
-        return Row(text, {}, refused)
+def _on_period_annulus(method: MethodBase, problem: Problem) -> Found:
+    del problem  # the one that the edge belongs to
     every = None if method.library == "hbvm-bench" else LOOK
     found = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
-    return Row(text, {"c": found.c, "error": period_annulus.error_of(found.c)}, "")
+    return {"c": found.c, "error": period_annulus.error_of(found.c)}, ""
 
 
 def _ended(solution: Solution) -> str:
     return f"{solution.status.replace('_', ' ')} at t = {solution.t_stop:.5g}"
-
-
-def _refused(method: MethodBase, problem: Problem) -> str | None:
-    """Return why a method cannot take the problem: its own reason, or a library that is not installed."""
-    reason = method.accepts(problem)
-    if reason is not None:
-        return reason
-    try:
-        method.compile(problem.system)
-    except InputError as error:
-        return str(error)
-    return None

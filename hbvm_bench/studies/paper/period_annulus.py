@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.departure import departure
+from hbvm_bench.studies.paper.departure import departure, own_steps
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
@@ -145,9 +145,7 @@ def fates(method: MethodBase, gaps: Sequence[float], span: float = SPAN) -> list
 
 def orbit(method: MethodBase, c: float, span: float = SPAN) -> tuple[Array, Array]:
     """Return the times and states at the own steps of the orbit from (0, c), up to its departure."""
-    stepper = method.compile(PROBLEM.system).start(np.array([0.0, c]), PROBLEM.par, 0.0)
-    samples = stepper.advance(np.array([span]), sample="steps")
-    t, y = np.concatenate([[0.0], samples.t]), np.vstack([[0.0, c], samples.y])
+    t, y, _ = own_steps(PROBLEM, method, np.array([0.0, c]), span)
     far = np.flatnonzero(_departed(y))
     return (t[: far[0]], y[: far[0]]) if far.size else (t, y)
 

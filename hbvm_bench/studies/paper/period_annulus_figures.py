@@ -3,22 +3,22 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
+from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn
 from hbvm_bench.studies.paper.period_annulus import SPAN, energy
-from integrators.protocol import Array
+from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import H_STAR, P1
 
 LEVELS = (0.005, 0.02, 0.04, 0.06, 0.08, H_STAR, 0.1, 0.12, 0.15)
 Path = tuple[Array, Array]
 
 
-@styled
-def level_curves() -> Picture:
+@drawn("period-annulus-1", "Figure 1 · level curves", WIDTH * 0.56, 5.0)
+def level_curves(figure: Figure) -> Said:
     """poinc_fig1: level curves around the centre P0 and the saddle P1."""
-    figure = sheet(WIDTH * 0.56, 5.0)
     axes = figure.subplots()
     q, p, values = _levels((-1.0, 0.6), (-0.8, 0.6), 241)
     others = [level for level in LEVELS if level != H_STAR]
@@ -31,20 +31,18 @@ def level_curves() -> Picture:
     axes.plot(*P1, "s", color=INK, markersize=5)
     say(axes, "P₁", P1, (-17, 5), fontsize=9)
     axes.set(xlabel="q", ylabel="p", aspect="equal")
-    return picture(
-        figure,
-        "period-annulus-1",
-        "Figure 1 · level curves",
+    return (
         f"The edge of the annulus of the centre P₀ is the loop of H* = {H_STAR:.10f} that leaves the "
         "saddle P₁ and returns to it.",
         "Closed curves around P0 up to the loop through P1; open ones beyond.",
     )
 
 
-@styled
-def closeup(gauss: Path, hbvm: Path, names: tuple[str, str]) -> Picture:
+@drawn("period-annulus-2", "Figure 2 · the two orbits from the points found", WIDTH, 3.7)
+def closeup(figure: Figure, orbits: Mapping[str, Path], methods: Mapping[str, MethodBase]) -> Said:
     """poinc_fig2: the error of H along both orbits from the points found, and the orbits near the saddle."""
-    figure = sheet(WIDTH, 3.7)
+    gauss, hbvm = orbits["gauss"], orbits["hbvm"]
+    names = [repr(methods["gauss"]), repr(methods["hbvm"])]
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1])
     for (t, y), colour, name in zip((gauss, hbvm), (GAUSS, HBVM), names, strict=True):
         h = energy(y)
@@ -66,10 +64,7 @@ def closeup(gauss: Path, hbvm: Path, names: tuple[str, str]) -> Picture:
     )
     spread = [float(np.ptp(energy(y))) for _, y in (gauss, hbvm)]
     near = [float(np.hypot(*(y - P1).T).min()) for _, y in (gauss, hbvm)]
-    return picture(
-        figure,
-        "period-annulus-2",
-        "Figure 2 · the two orbits from the points found",
+    return (
         "Left: the error of the Hamiltonian. Right: the orbits near the saddle, where the line is the "
         "loop H*. Gauss scatters about it; the points of HBVM lie on it and run into P₁.",
         f"{names[0]}: H varies by {spread[0]:.1e}, closest to P1 {near[0]:.1e}; {names[1]}: "
@@ -77,12 +72,11 @@ def closeup(gauss: Path, hbvm: Path, names: tuple[str, str]) -> Picture:
     )
 
 
-@styled
-def periods(rows: Sequence[tuple[float, float]], rate: float) -> Picture:
+@drawn("period-annulus-period", "The period grows without bound", WIDTH * 0.62, 3.2)
+def periods(figure: Figure, rows: Sequence[tuple[float, float]], rate: float) -> Said:
     """Draw the period against the distance from H*."""
     gap = np.array([row[0] for row in rows])
     period = np.array([row[1] for row in rows])
-    figure = sheet(WIDTH * 0.62, 3.2)
     axes = figure.subplots()
     anchor = int(np.argmin(np.abs(np.log10(gap) + 7)))
     line = period[anchor] - np.log(gap / gap[anchor]) / rate
@@ -92,10 +86,7 @@ def periods(rows: Sequence[tuple[float, float]], rate: float) -> Picture:
     axes.invert_xaxis()
     axes.set(xlabel="(H* − H) / H*", ylabel="period")
     axes.legend(loc="upper left")
-    return picture(
-        figure,
-        "period-annulus-period",
-        "The period grows without bound",
+    return (
         "The period against the distance from the edge: it grows as the logarithm, at the rate 1/λ "
         f"with λ = {rate:.6f}. At H = H* the orbit never returns.",
         f"From {period.min():.3f} near the centre to {period.max():.3f} at a relative distance of "
@@ -103,10 +94,10 @@ def periods(rows: Sequence[tuple[float, float]], rate: float) -> Picture:
     )
 
 
-@styled
-def fates(series: Mapping[str, Sequence[tuple[float, float | None]]]) -> Picture:
+@drawn("period-annulus-fates", "Beyond the paper · why the Gauss entries are what they are", WIDTH, 4.65)
+def fates(figure: Figure, series: Mapping[str, Sequence[tuple[float, float | None]]]) -> Said:
     """Draw when orbits depart, against their distance inside the true edge: why Gauss's entries scatter."""
-    figure = sheet(WIDTH, 1.25 + 0.85 * len(series))
+    figure.set_size_inches(WIDTH, 1.25 + 0.85 * len(series))
     panels = np.atleast_1d(figure.subplots(len(series), 1, sharex=True))
     for axes, (name, rows) in zip(panels, series.items(), strict=True):
         colour = GAUSS if name.startswith("Gauss") else HBVM
@@ -123,10 +114,7 @@ def fates(series: Mapping[str, Sequence[tuple[float, float | None]]]) -> Picture
     panels[-1].invert_xaxis()
     panels[-1].set_xlabel("relative distance of the start inside the true edge, 1 − c/c*")
     figure.supylabel("departs at time (upper row of each: stays)", fontsize=8.5)
-    return picture(
-        figure,
-        "period-annulus-fates",
-        "Beyond the paper · why the Gauss entries are what they are",
+    return (
         "All these starts lie inside the annulus, so all should stay. Under HBVM they do. Under Gauss "
         "there is no edge but a layer in which starts that stay and starts that depart alternate on "
         "every scale: the bisection ends at one of many boundaries, and which one depends on the last "

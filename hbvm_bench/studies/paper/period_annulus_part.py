@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper import period_annulus as experiment
 from hbvm_bench.studies.paper import period_annulus_figures as figures
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.period_annulus import DEGREES, NODES, PRINTED, STEPS, Edge
-from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.studies.paper.results import Part, Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -21,7 +20,6 @@ from problems import emit
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 C_STAR_DIGITS = "0.37570559292634522367"
-KEY, TITLE = "period-annulus", "The edge of a period annulus"
 PROBLEM = (
     "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop "
     "through the saddle P₁. The paper looks for the edge by bisection on the segment from the "
@@ -50,34 +48,6 @@ Limits = Mapping[tuple[float, int], tuple[float, float]]
 Cells = Mapping[tuple[float, int], Mapping[str, Edge]]
 
 
-def tasks() -> list[Task]:
-    """Return the computations of this part."""
-    return [
-        *(
-            Task(f"period-annulus/cell {h} {s}", partial(experiment.cell, s, h), 3 / h)
-            for h in STEPS
-            for s in DEGREES
-        ),
-        *(
-            Task(f"period-annulus/spread {h} {s}", partial(experiment.spread, s, h), 10 / h)
-            for h in STEPS
-            for s in DEGREES
-        ),
-        *(
-            Task(f"period-annulus/fates {method}", partial(experiment.fates, method, FATE_GAPS), 5)
-            for method in FATE_METHODS
-        ),
-        *(
-            Task(f"period-annulus/limit {h} {s}", partial(experiment.limit, s, h), 2)
-            for h in STEPS
-            for s in DEGREES
-        ),
-        Task("period-annulus/drawn", drawn, 3),
-        Task("period-annulus/periods", partial(experiment.periods, PERIOD_GAPS), 2),
-        *others.tasks(KEY, others.on_period_annulus, others.PERIOD_ANNULUS, 8),
-    ]
-
-
 def drawn() -> dict[str, figures.Path]:
     """Return the orbits of Figure 2: each method from the last point it finds periodic."""
     return {
@@ -86,64 +56,60 @@ def drawn() -> dict[str, figures.Path]:
     }
 
 
-def blocks(results: Results) -> list[Maker]:
-    """Return what makes each block of the section."""
+def _runs() -> list[Task]:
+    return [
+        *(Task(f"cell {h} {s}", partial(experiment.cell, s, h), 3 / h) for h, s in PRINTED),
+        *(Task(f"spread {h} {s}", partial(experiment.spread, s, h), 10 / h) for h, s in PRINTED),
+        *(Task(f"limit {h} {s}", partial(experiment.limit, s, h), 2) for h, s in PRINTED),
+        *(Task(f"fates {one}", partial(experiment.fates, one, FATE_GAPS), 5) for one in FATE_METHODS),
+        Task("drawn", drawn, 3),
+        Task("periods", partial(experiment.periods, PERIOD_GAPS), 2),
+        *others.tasks(others.on_period_annulus, others.PERIOD_ANNULUS, 8),
+    ]
 
-    def closeup() -> Picture:
-        orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
-        return figures.closeup(orbits["gauss"], orbits["hbvm"], (repr(DRAWN["gauss"]), repr(DRAWN["hbvm"])))
 
-    def fates() -> Picture:
-        found = {repr(method): results[f"period-annulus/fates {method}"] for method in FATE_METHODS}
-        return figures.fates(found)
-
+def _blocks(results: Results) -> list[Maker]:
+    entries = partial(_by_entry, results)
     return [
         ("the problem", lambda: PROBLEM),
-        ("Table 1", lambda: _table(_by_entry(results, "cell"))),
+        ("Table 1", lambda: _table(entries("cell"))),
         ("the long span", lambda: LONG_SPAN),
-        (
-            "what limits the long span",
-            lambda: _limit_table(_by_entry(results, "cell"), _by_entry(results, "limit")),
-        ),
+        ("what limits the long span", lambda: _limit_table(entries("cell"), entries("limit"))),
         ("the digits", lambda: DIGITS),
-        ("how much is chance", lambda: _spread_table(_by_entry(results, "spread"))),
+        ("how much is chance", lambda: _spread_table(entries("spread"))),
         ("Figure 1", figures.level_curves),
-        ("Figure 2", closeup),
-        ("the period", lambda: figures.periods(results["period-annulus/periods"], experiment.saddle_rate())),
-        ("the fates near the edge", fates),
+        ("Figure 2", lambda: figures.closeup(results["drawn"], DRAWN)),
+        ("the period", lambda: figures.periods(results["periods"], experiment.saddle_rate())),
+        (
+            "the fates near the edge",
+            lambda: figures.fates({repr(method): results[f"fates {method}"] for method in FATE_METHODS}),
+        ),
         ("the other integrators", lambda: _others(results)),
     ]
 
 
 def _by_entry(results: Results, what: str) -> dict[tuple[float, int], Any]:
     """Return what was computed for each entry of Table 1, by h and s."""
-    return {(h, s): results[f"period-annulus/{what} {h} {s}"] for h in STEPS for s in DEGREES}
+    return {(h, s): results[f"{what} {h} {s}"] for h, s in PRINTED}
 
 
-def ratios(cells: Cells) -> list[float]:
-    """Return the error of each Gauss entry of Table 1 over the printed one."""
-    return [experiment.error_of(cells[key]["gauss"].c) / PRINTED[key][1] for key in PRINTED]
-
-
-def claims(results: Results) -> list[Claim]:
-    """Return the claims of the paper's section."""
+def _claims(results: Results) -> list[Claim]:
     cells: Cells = _by_entry(results, "cell")
     spreads: Spreads = _by_entry(results, "spread")
-    periods: list[tuple[float, float]] = results["period-annulus/periods"]
     rate = experiment.saddle_rate()
-    orbits: dict[str, figures.Path] = results["period-annulus/drawn"]
+    orbits: dict[str, figures.Path] = results["drawn"]
     field = emit.numpy(experiment.PROBLEM.system, "field")
     rest = max(float(np.abs(field(0.0, np.array(point), experiment.PROBLEM.par)).max()) for point in (P1, P2))
     rates = [float(experiment.eigenvalues(point).real.max()) for point in (P1, P2)]
     level = float(experiment.energy(np.array([P1]))[0])
-    far = np.array(periods)
+    far = np.array(results["periods"])
     slope = float(np.polyfit(np.log(far[8:-4, 0]), far[8:-4, 1], 1)[0])
     worst = {
         key: max(experiment.error_of(cells[cell][key].c) for cell in cells) for key in ("hbvm", "hbvm_short")
     }
     near = float(np.hypot(*(orbits["hbvm"][1] - P1).T).min())
     swing = {family: float(np.ptp(experiment.energy(y))) for family, (_, y) in orbits.items()}
-    single = ratios(cells)
+    single = [experiment.error_of(cells[key]["gauss"].c) / PRINTED[key][1] for key in PRINTED]
     medians = {key: float(np.median(errors)) for key, errors in spreads.items()}
     typical = [medians[key] / PRINTED[key][1] for key in PRINTED]
     falls = all(medians[h, s] > medians[h, s + 1] for h in STEPS for s in DEGREES[:-1]) and all(
@@ -279,9 +245,11 @@ def _point(c: float) -> str:
 def _others(results: Results) -> Table:
     return others.table(
         results,
-        KEY,
         others.PERIOD_ANNULUS,
         {"c": ("c", _point), "error in H": ("error", partial(number, digits=3))},
         "The same bisection with other integrators",
         f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )
+
+
+PART = Part("period-annulus", "The edge of a period annulus", _runs(), _claims, _blocks)

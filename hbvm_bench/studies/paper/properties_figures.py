@@ -4,20 +4,20 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
+from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, Said, drawn
 from hbvm_bench.studies.paper.properties import Order
 
 MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))
 Row = tuple[int, int, float]
 
 
-@styled
-def order(rows: Sequence[Order]) -> Picture:
+@drawn("properties-order", "The order is 2s for every k", WIDTH * 0.66, 3.8)
+def order(figure: Figure, rows: Sequence[Order]) -> Said:
     """Errors against steps for s = 1 .. 5 and several k."""
-    figure = sheet(WIDTH * 0.66, 3.8)
     axes = figure.subplots()
     for s in sorted({row.s for row in rows}):
         chosen = [row for row in rows if row.s == s]
@@ -47,10 +47,7 @@ def order(rows: Sequence[Order]) -> Picture:
     axes.set_xlim(0.008, 2.5)
     axes.minorticks_off()
     axes.set(xlabel="step h", ylabel="error at t = 6")
-    return picture(
-        figure,
-        "properties-order",
-        "The order is 2s for every k",
+    return (
         "HBVM(k,s) on Hénon–Heiles for k = s (small, filled), s + 1, 2s and 3s (open), which lie on one "
         "another: the silent stages do not change the order. The numbers are the fitted slopes.",
         f"{len(rows)} pairs (k, s); the largest distance of a fitted order from 2s is "
@@ -58,10 +55,9 @@ def order(rows: Sequence[Order]) -> Picture:
     )
 
 
-@styled
-def threshold(cubic: Sequence[Row], quintic: Sequence[Row]) -> Picture:
+@drawn("properties-threshold", "Conservation from k ≥ νs/2", WIDTH, 3.6)
+def threshold(figure: Figure, cubic: Sequence[Row], quintic: Sequence[Row]) -> Said:
     """Energy error against k for two polynomial Hamiltonians, with the threshold drawn in."""
-    figure = sheet(WIDTH, 3.6)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, rows, nu, name in zip(
         panels, (cubic, quintic), (3, 5), ("Hénon–Heiles, degree 3", "the quintic, degree 5"), strict=True
@@ -70,10 +66,7 @@ def threshold(cubic: Sequence[Row], quintic: Sequence[Row]) -> Picture:
         axes.set_title(name, color=INK)
     panels[0].set_ylabel("largest |H − H₀| / |H₀|")
     panels[0].legend(loc="upper right", ncols=1)
-    return picture(
-        figure,
-        "properties-threshold",
-        "Conservation from k ≥ νs/2",
+    return (
         "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
         "promises exact conservation. The dips to round-off just below it, at high s, are errors too "
         "small to see, not conservation.",

@@ -5,12 +5,12 @@ from functools import partial
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.studies.paper import properties, properties_figures
 from hbvm_bench.studies.paper.drawn import number
-from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.studies.paper.results import Part, Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 
-KEY, TITLE = "claims", "What the paper says of the methods"
+PROBLEM = "The theory's statements, each measured on the paper's own polynomial problems."
 PAIRS = tuple((k, s) for s in properties.DEGREES for k in (s, s + 1, 2 * s, 3 * s, properties.BIG))
 REVERSED = (Gauss(s=2, h=0.5), HBVM(k=4, s=2, h=0.5), HBVM(k=9, s=4, h=0.5))
 COLLOCATED = ((2, 2), (3, 2), (4, 2), (5, 2), (6, 2), (3, 3), (8, 3), (10, 4), (13, 5))
@@ -21,23 +21,6 @@ MAPPED = (
     Gauss(s=3, h=1.0),
     HBVM(k=6, s=3, h=1.0),
 )
-
-
-def tasks() -> list[Task]:
-    """Return the computations of this part."""
-    return [
-        Task("claims/orders", properties.orders, 4),
-        Task("claims/reversal", reversals, 1),
-        Task("claims/stability", partial(properties.stability, PAIRS), 1),
-        Task("claims/collocation", properties.collocation_gap, 1),
-        Task("claims/same bits", properties.same_bits, 1),
-        Task("claims/cubic", properties.conservation_cubic, 1),
-        Task("claims/quintic", properties.conservation_quintic, 1),
-        Task("claims/ranks", partial(properties.ranks, PAIRS), 1),
-        Task("claims/iterations", properties.iterations, 1),
-        Task("claims/extended", extended, 1),
-        Task("claims/symplectic", defects, 1),
-    ]
 
 
 def reversals() -> list[tuple[str, float]]:
@@ -55,18 +38,11 @@ def defects() -> list[tuple[str, float]]:
     return [(repr(method), properties.symplectic_defect(method)) for method in MAPPED]
 
 
-def blocks(results: Results) -> list[Maker]:
-    """Return what makes each block of the section."""
+def _blocks(results: Results) -> list[Maker]:
     return [
-        (
-            "the methods",
-            lambda: "The theory's statements, each measured on the paper's own polynomial problems.",
-        ),
-        ("the order", lambda: properties_figures.order(results["claims/orders"])),
-        (
-            "the threshold",
-            lambda: properties_figures.threshold(results["claims/cubic"], results["claims/quintic"]),
-        ),
+        ("the methods", lambda: PROBLEM),
+        ("the order", lambda: properties_figures.order(results["orders"])),
+        ("the threshold", lambda: properties_figures.threshold(results["cubic"], results["quintic"])),
         ("collocation and symplecticity", lambda: _collocation(results)),
     ]
 
@@ -74,12 +50,11 @@ def blocks(results: Results) -> list[Maker]:
 def _collocation(results: Results) -> Table:
     what = "residual of σ′ = Σ Pⱼ ∫ Pⱼ f(σ) at the nodes"
     residuals = [
-        (f"HBVM(k={k}, s={s}, h=0.5)", what, number(residual))
-        for k, s, residual in results["claims/extended"]
+        (f"HBVM(k={k}, s={s}, h=0.5)", what, number(residual)) for k, s, residual in results["extended"]
     ]
     defects = [
         (method, "|MᵀJM − J|, M the derivative of one step", number(defect))
-        for method, defect in results["claims/symplectic"]
+        for method, defect in results["symplectic"]
     ]
     return Table(
         key="claims-collocation",
@@ -93,29 +68,28 @@ def _collocation(results: Results) -> Table:
     )
 
 
-def claims(results: Results) -> list[Claim]:
-    """Return the claims of the paper's section on the methods."""
-    orders: list[properties.Order] = results["claims/orders"]
+def _claims(results: Results) -> list[Claim]:
+    orders: list[properties.Order] = results["orders"]
     off = max(abs(row.slope - 2 * row.s) for row in orders)
-    back = max(error for _, error in results["claims/reversal"])
-    edge, inside = results["claims/stability"]
+    back = max(error for _, error in results["reversal"])
+    edge, inside = results["stability"]
     exact = {
-        name: [row for row in results[f"claims/{name}"] if 2 * row[1] >= nu * row[0]]
+        name: [row for row in results[name] if 2 * row[1] >= nu * row[0]]
         for name, nu in (("cubic", 3), ("quintic", 5))
     }
     below = [
         e
         for name, nu in (("cubic", 3), ("quintic", 5))
-        for s, k, e in results[f"claims/{name}"]
+        for s, k, e in results[name]
         if 2 * k < nu * s and s <= 3
     ]
     kept = max(error for rows in exact.values() for _, _, error in rows)
-    ranks_right = results["claims/ranks"] == [s for _, s in PAIRS]
-    turns = [count for _, count in results["claims/iterations"]]
-    residual = {(k, s): value for k, s, value in results["claims/extended"]}
+    ranks_right = results["ranks"] == [s for _, s in PAIRS]
+    turns = [count for _, count in results["iterations"]]
+    residual = {(k, s): value for k, s, value in results["extended"]}
     met = max(value for (k, s), value in residual.items() if 2 * k >= 5 * s)
     unmet = min(value for (k, s), value in residual.items() if 2 * k < 5 * s)
-    defect = dict(results["claims/symplectic"])
+    defect = dict(results["symplectic"])
     gauss = max(value for name, value in defect.items() if name.startswith("Gauss"))
     hbvm = min(value for name, value in defect.items() if name.startswith("HBVM"))
     return [
@@ -141,9 +115,9 @@ def claims(results: Results) -> list[Claim]:
         Claim(
             "For k = s it is the Gauss method of order 2s",
             "Section 2",
-            f"its tableau is that of collocation to {number(results['claims/collocation'])}, s = 1 … 8"
-            + ("; the same doubles come out" if results["claims/same bits"] else ""),
-            "holds" if results["claims/same bits"] else "partly",
+            f"its tableau is that of collocation to {number(results['collocation'])}, s = 1 … 8"
+            + ("; the same doubles come out" if results["same bits"] else ""),
+            "holds" if results["same bits"] else "partly",
         ),
         Claim(
             "It conserves polynomial H of degree ν exactly when k ≥ νs/2",
@@ -173,3 +147,19 @@ def claims(results: Results) -> list[Claim]:
             "holds" if gauss < 1e-11 < hbvm else "no",
         ),
     ]
+
+
+RUNS = [
+    Task("orders", properties.orders, 4),
+    Task("reversal", reversals),
+    Task("stability", partial(properties.stability, PAIRS)),
+    Task("collocation", properties.collocation_gap),
+    Task("same bits", properties.same_bits),
+    Task("cubic", properties.conservation_cubic),
+    Task("quintic", properties.conservation_quintic),
+    Task("ranks", partial(properties.ranks, PAIRS)),
+    Task("iterations", properties.iterations),
+    Task("extended", extended),
+    Task("symplectic", defects),
+]
+PART = Part("claims", "What the paper says of the methods", RUNS, _claims, _blocks)

@@ -2,62 +2,29 @@
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Protocol
 
-from hbvm_bench.report.document import Claim, Claims, Commands, Document, Files, Maker, Section, attempt
+from hbvm_bench.report.document import Claims, Commands, Document, Files, Section, attempt
 from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.paper import henon_heiles_part, period_annulus_part, properties_part, sitnikov_part
 from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
-from hbvm_bench.studies.paper.results import NAME, Found, Kept, Results, Task
+from hbvm_bench.studies.paper.results import NAME, Kept, Part, Results, Task
+
+PARTS = (sitnikov_part.PART, henon_heiles_part.PART, period_annulus_part.PART, properties_part.PART)
 
 
-class Part(Protocol):
-    """One of the paper's experiments: a module that computes, draws and says."""
-
-    @property
-    def KEY(self) -> str:
-        """Its name on the command line and its anchor."""
-        ...
-
-    @property
-    def TITLE(self) -> str:
-        """Its heading."""
-        ...
-
-    @staticmethod
-    def tasks() -> list[Task]:
-        """Return the computations."""
-        ...
-
-    @staticmethod
-    def claims(results: Results) -> list[Claim]:
-        """Return what the paper says and what came out."""
-        ...
-
-    @staticmethod
-    def blocks(results: Results) -> list[Maker]:
-        """Return what is shown: what makes each block, with its name."""
-        ...
-
-
-PARTS: tuple[Part, ...] = (sitnikov_part, henon_heiles_part, period_annulus_part, properties_part)
-KEYS = tuple(part.KEY for part in PARTS)
-
-
-def tasks(keys: Sequence[str] = KEYS) -> list[Task]:
+def tasks(keys: Sequence[str]) -> list[Task]:
     """Return the computations of the named parts."""
-    return [task for part in PARTS if part.KEY in keys for task in part.tasks()]
+    return [task for part in PARTS if part.key in keys for task in part.tasks]
 
 
-def document(kept: Kept, keys: Sequence[str] = KEYS) -> Document:
+def document(kept: Kept, keys: Sequence[str]) -> Document:
     """Return the report on the named parts."""
-    parts = [part for part in PARTS if part.KEY in keys]
-    results = Found(tasks(keys), kept)
+    parts = [(part, Results(part, kept)) for part in PARTS if part.key in keys]
 
-    def claims(part: Part) -> Claims:
-        return Claims([(part.TITLE, part.KEY, part.claims(results))])
+    def claims(part: Part, results: Results) -> Claims:
+        return Claims([(part.title, part.key, part.claims(results))])
 
-    made = attempt(*((f"the claims of {part.TITLE}", partial(claims, part)) for part in parts))
+    made = attempt(*((f"the claims of {part.title}", partial(claims, part, found)) for part, found in parts))
     groups = [group for block in made if isinstance(block, Claims) for group in block.groups]
     rows = [(title, c.words, c.paper, c.here, c.verdict) for title, _, found in groups for c in found]
     table = csv_of([("part", "claim", "paper", "here", "verdict"), *rows])
@@ -77,8 +44,8 @@ def document(kept: Kept, keys: Sequence[str] = KEYS) -> Document:
                 nav="Claims",
             ),
             *(
-                Section(part.TITLE, attempt(*part.blocks(results)), part.KEY, nav=part.TITLE)
-                for part in parts
+                Section(part.title, attempt(*part.blocks(found)), part.key, nav=part.title)
+                for part, found in parts
             ),
             Section(
                 "Raw data",

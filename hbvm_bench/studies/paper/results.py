@@ -5,10 +5,11 @@ double survive; the type that its function is annotated with says how it is read
 """
 
 import functools
+import re
 import time
 import traceback
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ import msgspec
 import numpy as np
 
 from hbvm_bench.campaign.identity import digest_of
+from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.run import executors
 from hbvm_bench.store.files import atomic
 from problems.errors import InputError
@@ -25,9 +27,6 @@ from problems.errors import InputError
 POOL = "concurrent.futures:ProcessPoolExecutor"
 NAME = "data/results.msgpack"  # beside the report
 SCHEMA = 1
-
-Results = Mapping[str, Any]
-"""What the computations returned, by the key of their task."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,32 @@ def split(key: str, run: Callable[..., Any], values: Sequence[float], parts: int
     return [Task(f"{key} {i}", functools.partial(run, one.tolist()), cost) for i, one in enumerate(pieces)]
 
 
-def joined(results: Results, key: str, parts: int) -> list[Any]:
-    """Return the rows of what `split` divided."""
-    return [row for i in range(parts) for row in results[f"{key} {i}"]]
+@dataclass(frozen=True)
+class Part:
+    """One of the paper's experiments.
+
+    Attributes
+    ----------
+    key, title : str
+        Its name on the command line, which is its anchor, and its heading.
+    runs : sequence of Task
+        The computations.
+    claims : callable
+        From their results to what the paper says and what came out.
+    blocks : callable
+        From their results to what makes each block that is shown.
+    """
+
+    key: str
+    title: str
+    runs: Sequence[Task]
+    claims: Callable[["Results"], list[Claim]]
+    blocks: Callable[["Results"], list[Maker]]
+
+    @property
+    def tasks(self) -> list[Task]:
+        """The computations under the names by which they are kept: those of all parts lie side by side."""
+        return [Task(f"{self.key}/{task.key}", task.run, task.cost) for task in self.runs]
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -70,26 +92,29 @@ class Kept(msgspec.Struct, frozen=True):
     schema: int = SCHEMA
 
 
-class Found(Mapping[str, Any]):
-    """Results by task; asking for one that failed says why."""
+class Results:
+    """What the computations of a part returned, by their names; asking for one that failed says why.
 
-    def __init__(self, tasks: Sequence[Task], kept: Kept) -> None:
-        self.tasks = {task.key: task for task in tasks}
-        self.kept = kept
+    What `split` divided is put together again.
+    """
+
+    def __init__(self, part: Part, kept: Kept) -> None:
+        self.part, self.kept = part.key, kept
+        self.tasks = {task.key: task for task in part.tasks}
         self.read: dict[str, Any] = {}
 
-    def __getitem__(self, key: str) -> Any:
-        if key not in self.kept.results:
-            raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
+    def __getitem__(self, name: str) -> Any:
+        key = f"{self.part}/{name}"
         if key not in self.read:
-            self.read[key] = unpacked(self.kept.results[key], self.tasks[key].run)
+            pieces = [one for one in self.tasks if re.fullmatch(rf"{re.escape(key)} \d+", one)]
+            whole = key in self.tasks or not pieces
+            self.read[key] = self._one(key) if whole else [row for one in pieces for row in self._one(one)]
         return self.read[key]
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.kept.results)
-
-    def __len__(self) -> int:
-        return len(self.kept.results)
+    def _one(self, key: str) -> Any:
+        if key not in self.kept.results:
+            raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
+        return unpacked(self.kept.results[key], self.tasks[key].run)
 
 
 def run_all(

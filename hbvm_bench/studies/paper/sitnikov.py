@@ -8,7 +8,7 @@ import numpy as np
 
 import problems
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper.departure import departure
+from hbvm_bench.studies.paper.departure import departure, first
 from integrators import Solution, integrate, registry
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -78,8 +78,7 @@ class Orbit:
     @property
     def lost(self) -> float | None:
         """When the planetoid has left, or ``None``."""
-        found = np.flatnonzero(np.abs(self.z) > LOST)
-        return float(self.t[found[0]]) if found.size else None
+        return first(self.t, np.abs(self.z) > LOST)
 
 
 @dataclass(frozen=True)
@@ -197,9 +196,8 @@ def energy_by_nodes(h: float, ks: Sequence[int] = range(DEGREE, 25)) -> list[tup
     rows = []
     for k in ks:
         solution = _run(HBVM(k=k, s=DEGREE, h=h))
-        lost = np.flatnonzero(np.abs(solution.y[:, 8]) > LOST)
         error = float(solution.errors()["energy"].max())
-        rows.append((k, error, float(solution.t[lost[0]]) if lost.size else None))
+        rows.append((k, error, first(solution.t, np.abs(solution.y[:, 8]) > LOST)))
     return rows
 
 
@@ -255,7 +253,6 @@ def _run(method: MethodBase) -> Solution:
 def _row(solution: Solution, family: str, true_rate: float, truth: Solution) -> StepRow:
     method: Any = solution.method
     rate, unsteady = turning(solution)
-    lost = np.flatnonzero(np.abs(solution.y[:, 8]) > LOST)
     finished = not solution.status.failed
     period = radial_period(solution)
     return StepRow(
@@ -263,7 +260,7 @@ def _row(solution: Solution, family: str, true_rate: float, truth: Solution) -> 
         family=family,
         s=method.s,
         h=method.h,
-        lost=float(solution.t[lost[0]]) if lost.size else None,
+        lost=first(solution.t, np.abs(solution.y[:, 8]) > LOST),
         energy=float(solution.errors()["energy"].max()),
         z_error=float(abs(solution.y[-1, 8] - truth.y[-1, 8])) if finished else float("nan"),
         turn=rate - (0.0 if family == "truth" else true_rate),

@@ -1,25 +1,29 @@
-"""Pictures of Sitnikov's problem that the paper does not have: nodes, steps, the true trajectory."""
+"""Pictures of Sitnikov's problem that the paper does not have: nodes, steps, truth, chaos."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, say, styled
-from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, number, picture, sheet
-from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, StepRow, usable
+from hbvm_bench.report.figures.canvas import log_axis, say
+from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
+from hbvm_bench.studies.paper.axis_motion import MAP_ECCENTRICITIES, MAP_SPEEDS, MAP_TURNS, START, Growth
+from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, MOTION, WIDTH, Said, drawn, heat, number
+from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, E, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
 FRACTIONS = {1 / 32: "1/32", 1 / 16: "1/16", 1 / 12: "1/12", 1 / 8: "1/8", 1 / 4: "1/4", 1 / 2: "1/2"}
 
 
-@styled
-def by_nodes(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> Picture:
+@drawn(
+    "sitnikov-nodes", "Beyond the paper · how many nodes make the conservation practical", WIDTH * 0.62, 3.4
+)
+def by_nodes(figure: Figure, scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -> Said:
     """Draw the energy error of HBVM(k, 2) against k: practical conservation."""
-    figure = sheet(WIDTH * 0.62, 3.4)
     axes = figure.subplots()
     for (h, rows), marker, shade in zip(sorted(scans.items(), reverse=True), "os", (1.0, 0.5), strict=True):
         k = [row[0] for row in rows]
@@ -43,10 +47,7 @@ def by_nodes(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) -
         Line2D([], [], marker="o", mfc="none", mec=INK, linestyle="", markersize=8, label="planetoid lost")
     )
     axes.legend(handles=handles, loc="upper right")
-    return picture(
-        figure,
-        "sitnikov-nodes",
-        "Beyond the paper · how many nodes make the conservation practical",
+    return (
         f"HBVM(k,{DEGREE}) on Sitnikov's problem over [0, {T_END:g}]. The error falls by a constant "
         f"factor per node down to round-off; k = 2 is the Gauss method. {_enough(scans)}",
         "; ".join(
@@ -65,10 +66,9 @@ def _enough(scans: Mapping[float, Sequence[tuple[int, float, float | None]]]) ->
     return f"The first to keep the energy to 1e-13: {words}; the paper takes k = 18 with h = 0.5."
 
 
-@styled
-def by_step(rows: Sequence[StepRow]) -> Picture:
+@drawn("sitnikov-steps", "Beyond the paper · what the step costs", WIDTH, 3.7)
+def by_step(figure: Figure, rows: Sequence[StepRow]) -> Said:
     """Draw the sham rotation against h, and the time at which the planetoid is lost."""
-    figure = sheet(WIDTH, 3.7)
     left, right = figure.subplots(1, 2)
     for s, dash, marker in ((2, "-", "o"), (3, (0, (5, 2)), "s")):
         for family in ("gauss", "hbvm"):
@@ -106,10 +106,7 @@ def by_step(rows: Sequence[StepRow]) -> Picture:
     def rate(h: float) -> float:
         return next(r.turn for r in rows if (r.family, r.s, r.h) == ("hbvm", 2, h))
 
-    return picture(
-        figure,
-        "sitnikov-steps",
-        "Beyond the paper · what the step costs",
+    return (
         "Left: the rate at which the ellipses turn in the numerical solution. It is a property of the "
         "order, not of the energy: Gauss and HBVM turn alike. Right: how long the planetoid stays, h by "
         "h. Crosses: neither the fixed-point nor the Newton iteration found a solution of a step.",
@@ -118,10 +115,9 @@ def by_step(rows: Sequence[StepRow]) -> Picture:
     )
 
 
-@styled
-def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
+@drawn("sitnikov-truth", "Beyond the paper · against the true trajectory", WIDTH, 3.4)
+def truth_compared(figure: Figure, runs: Sequence[tuple[str, str, Array, Array]]) -> Said:
     """Draw |z - true z| over time for several runs: (label, family, t, error)."""
-    figure = sheet(WIDTH, 3.4)
     axes = figure.subplots()
     dashes = ["-", (0, (6, 2)), (0, (2, 1.6)), (0, (8, 2, 2, 2))]
     seen: dict[str, int] = {}
@@ -141,13 +137,96 @@ def truth_compared(runs: Sequence[tuple[str, str, Array, Array]]) -> Picture:
     log_axis(axes, "y", -13, 1, most=7)
     axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − true z|")
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    return picture(
-        figure,
-        "sitnikov-truth",
-        "Beyond the paper · against the true trajectory",
+    return (
         "Conserving the energy is not accuracy: all HBVM runs here keep the energy to 1e-13. The error "
         "of the height at the times of the stored 128-bit reference.",
         "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
+    )
+
+
+@drawn("sitnikov-chaos", "Beyond the paper · is it chaos?", WIDTH, 4.4)
+def chaos(
+    figure: Figure, rows: Sequence[Growth], points: Sequence[tuple[float, Array]], critical: float
+) -> Said:
+    """Growth rates against e for the paper's start; the stroboscopic section at the paper's e."""
+    left, right = figure.subplots(1, 2)
+    spans = sorted({turn for row in rows for turn, _ in row.along if row.left is None})
+    es = [row.e for row in rows]
+    left.plot(es, [row.across for row in rows], color=INK, marker="D", markersize=4, label="off the axis")
+    for span, face in zip(spans, (PAPER, MOTION), strict=False):
+        values = [abs(dict(row.along).get(span, math.nan)) for row in rows]
+        left.plot(
+            es,
+            values,
+            color=MOTION,
+            marker="o",
+            markersize=4.5,
+            mfc=face,
+            label=f"along it, {span} revolutions",
+        )
+    log_axis(left, "y", -5, 1)
+    left.axvline(critical, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
+    say(left, "the paper's ē", (critical, 2.5e-5), (-5, 0), ha="right", fontsize=8, color=MUTED)
+    left.set(
+        xlabel="eccentricity e",
+        ylabel="growth rate of an offset, per unit of time",
+        title="the paper's start, v = 1/2",
+    )
+    left.legend(loc="center left", bbox_to_anchor=(0.02, 0.66))
+    for speed, orbit in points:
+        if speed == START[1]:
+            continue
+        right.plot(orbit[1:, 0], orbit[1:, 1], ".", color=MUTED, markersize=1.3, alpha=0.8, rasterized=True)
+        right.plot(orbit[1:, 0], -orbit[1:, 1], ".", color=MUTED, markersize=1.3, alpha=0.8, rasterized=True)
+    ours = dict(points)[START[1]]
+    right.plot(
+        ours[:, 0], ours[:, 1], ".", color=MOTION, markersize=3.0, rasterized=True, label="the paper's orbit"
+    )
+    right.set(
+        xlim=(-4, 4),
+        ylim=(-1.4, 1.4),
+        xlabel="z",
+        ylabel="velocity",
+        title=f"at every apocentre of the primaries, e = {E:g}",
+    )
+    right.legend(loc="upper right", markerscale=3)
+    at = min(rows, key=lambda row: abs(row.e - E))
+    return (
+        "Left: the rate at which a small offset grows. Along the axis it falls with the length of the "
+        "run, as the logarithm of time over time, up to e ≈ 0.8: the orbit of this start is regular "
+        "there. Beyond, it no longer falls, and the orbit is chaotic. Off the axis it is large at every "
+        "eccentricity. Right: orbits of many starts, seen once per revolution. The paper's start is on "
+        "a closed curve inside the regular region; outside, planetoids wander and leave. Mass of the "
+        "planetoid neglected.",
+        f"At e = {at.e:g}: along the axis "
+        + ", ".join(f"{rate:.1e} after {turn} revolutions" for turn, rate in at.along)
+        + f"; off the axis {at.across:.3f}, a factor e every {1 / at.across:.2f} units of time.",
+    )
+
+
+@drawn("sitnikov-territory", "Beyond the paper · who stays on the axis", WIDTH * 0.72, 4.0, values=True)
+def territory(figure: Figure, left_after: Array) -> Said:
+    """Where planetoids stay: revolutions until they leave, over eccentricity and speed."""
+    axes = figure.subplots()
+    es, speeds, turns = MAP_ECCENTRICITIES, MAP_SPEEDS, MAP_TURNS
+    mesh = heat(axes, es, speeds, left_after.T, 0, math.log10(turns))
+    bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30)
+    ticks = [value for value in (1, 3, 10, 30, 100, 300) if value <= turns]
+    bar.set_ticks([math.log10(value) for value in ticks], labels=[str(value) for value in ticks])
+    bar.set_label(f"revolutions until |z| > 100; blank: stays for {turns}")
+    axes.plot(E, START[1], "o", color=MOTION, markersize=8, mec=PAPER, mew=1.5, zorder=5)
+    say(axes, "the paper's run", (E, START[1]), (-9, -3), ha="right", fontsize=8.5, color=INK)
+    axes.grid(visible=False)
+    axes.set(xlabel="eccentricity e", ylabel="speed through the plane at apocentre")
+    stays = np.isnan(left_after)
+    nearest = int(np.argmin(np.abs(np.asarray(es) - E)))
+    gone = np.flatnonzero(~stays[nearest])
+    edge = speeds[int(gone[0])] if gone.size else math.nan
+    return (
+        "For each eccentricity of the primaries and each speed at the start: how long the planetoid "
+        "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
+        "end of regular motion; the paper's run lies inside it.",
+        f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
     )
 
 

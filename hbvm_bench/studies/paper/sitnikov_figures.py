@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from hbvm_bench.report.figures.canvas import Picture, log_axis, styled
+from hbvm_bench.report.figures.canvas import log_axis
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, picture, sheet
+from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, Said, drawn
 from hbvm_bench.studies.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 
@@ -17,10 +18,9 @@ TILT = 0.55  # of the oblique drawing of the configuration
 SHOWN = 350.0  # the span of time that the paper shows z(t) on
 
 
-@styled
-def configuration(truth: Orbit) -> Picture:
+@drawn("sitnikov-1", "Figure 1 · the configuration and the true motion", WIDTH, 4.0)
+def configuration(figure: Figure, truth: Orbit) -> Said:
     """sit_fig1: the three bodies, and the true z(t)."""
-    figure = sheet(WIDTH, 4.0)
     grid = figure.add_gridspec(2, 2, width_ratios=[0.8, 1.2])
     _configuration(figure.add_subplot(grid[:, 0]), truth)
     panels = [figure.add_subplot(grid[row, 1]) for row in (0, 1)]
@@ -29,10 +29,7 @@ def configuration(truth: Orbit) -> Picture:
         axes.plot(truth.t[shown], truth.z[shown], color=INK, linewidth=0.9 if row == 0 else 0.6)
         axes.set(xlim=(0, end), ylim=(-2, 2), ylabel="z", title=f"the planetoid's true height, t ≤ {end:g}")
     panels[1].set_xlabel("time")
-    return picture(
-        figure,
-        "sitnikov-1",
-        "Figure 1 · the configuration and the true motion",
+    return (
         "Left: two equal masses on ellipses of eccentricity 0.75, a planetoid of mass 1e-5 on the axis "
         "through their barycentre. Right: its height over time, from a run whose end agrees with "
         "128-bit arithmetic to nine digits.",
@@ -40,8 +37,9 @@ def configuration(truth: Orbit) -> Picture:
     )
 
 
-@styled
+@drawn("", "", WIDTH, 4.1)
 def trajectories(
+    figure: Figure,
     run: Orbit,
     truth: Orbit,
     family: str,
@@ -49,13 +47,12 @@ def trajectories(
     end: float,
     caption: str,
     ellipses: Sequence[Array] = (),
-) -> Picture:
+) -> Said:
     """sit_fig2, sit_fig3: the primaries in their plane, the planetoid in space and time.
 
     ``ellipses``: paths (2, n) of one primary in the `REVOLUTIONS`, drawn as lines.
     """
     colour = FAMILIES[family]
-    figure = sheet(WIDTH, 4.1)
     left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
     reach = 3.2
     for body, shade in ((0, 0.55), (1, 1.0)):
@@ -88,8 +85,7 @@ def trajectories(
     if run.lost is None:
         right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
     name = {"gauss": "Gauss of order four", "hbvm": "HBVM(18,2)"}[family]
-    return picture(
-        figure,
+    return (
         f"sitnikov-{figure_number}",
         f"Figure {figure_number} · {name}, h = {H:g}",
         caption,
@@ -98,10 +94,9 @@ def trajectories(
     )
 
 
-@styled
-def distances(runs: Mapping[str, Orbit]) -> Picture:
+@drawn("sitnikov-4", "Figure 4 · distance of the primaries", WIDTH, 3.1)
+def distances(figure: Figure, runs: Mapping[str, Orbit]) -> Said:
     """sit_fig4: the distance of the primaries over time."""
-    figure = sheet(WIDTH, 3.1)
     panels = figure.subplots(1, 2, sharey=True)
     for axes, family in zip(panels, ("gauss", "hbvm"), strict=True):
         run = runs[family]
@@ -115,10 +110,7 @@ def distances(runs: Mapping[str, Orbit]) -> Picture:
     panels[0].set(
         ylabel="distance of the primaries", ylim=(0, max(6.0, 1.05 * float(runs["gauss"].distance.max())))
     )
-    return picture(
-        figure,
-        "sitnikov-4",
-        "Figure 4 · distance of the primaries",
+    return (
         "Dashed: the true apocentre distance, 5. HBVM keeps it because the energy fixes the length of "
         "the axis; Gauss does not.",
         "; ".join(
@@ -137,10 +129,9 @@ def apocentres(run: Orbit) -> tuple[float, float]:
     return float(peaks.min()), float(peaks.max())
 
 
-@styled
-def errors(runs: Mapping[str, Orbit]) -> Picture:
+@drawn("sitnikov-5", "Figure 5 · errors of the energy and of the angular momentum", WIDTH, 3.6)
+def errors(figure: Figure, runs: Mapping[str, Orbit]) -> Said:
     """sit_fig5: relative errors of H and of the angular momentum."""
-    figure = sheet(WIDTH, 3.6)
     left, right = figure.subplots(1, 2, sharey=True)
     shown = [runs[key] for key in ("gauss", "hbvm", "both") if key in runs]
     colours = [GAUSS, HBVM, INK]
@@ -153,10 +144,7 @@ def errors(runs: Mapping[str, Orbit]) -> Picture:
         axes.set(xlim=(0, T_END), xlabel="time", title=title)
     left.set_ylabel("relative error")
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return picture(
-        figure,
-        "sitnikov-5",
-        "Figure 5 · errors of the energy and of the angular momentum",
+    return (
         "Largest value in each of 300 spans of time; evaluated in double-double. Each of the paper's "
         "methods keeps one of the two laws and not the other"
         + (

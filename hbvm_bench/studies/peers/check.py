@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 
 import problems
+from hbvm_bench.campaign.file import Ensemble
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.measure import ensemble, machine
-from hbvm_bench.measure.starts import cloud
+from hbvm_bench.measure.starts import members
 from hbvm_bench.measure.timing import WARM_UP, Run, interleaved, no_collection
 from hbvm_bench.run.worker import ENVIRONMENT, limit_and_die_with
 from hbvm_bench.store.files import write_json
@@ -178,7 +179,7 @@ def _row(pair: Pair, rounds: int, short: bool) -> Row:
         raise InputError(reason)
     if pair.starts:
         count = min(pair.starts, 20) if short else pair.starts
-        starts, title = cloud(problem, count, 0.01), f"{title}, {count} starts"
+        starts, title = members(problem, Ensemble(count=count, spread=0.01))[0], f"{title}, {count} starts"
         harness: Any = ensemble.EnsembleRun(method.compile(problem.system), starts, problem, method.to_end)
         script = pair.alone(problem, method, starts)
         made = ensemble.integrate(harness.program, starts, problem, harness.sample)

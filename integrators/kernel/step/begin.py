@@ -7,12 +7,12 @@ formed; the state is a compensated pair whose error enters the stages.
 
 from integrators.kernel.context import RUNNING
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.lanes import binary_log, fma, two_sum
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
-from integrators.kernel.step.sweep import multiply, product, product_of_two, project, through
-from integrators.kernel.tables import THROUGH
+from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through
+from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
 FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 INFINITY = float("inf")
@@ -35,6 +35,9 @@ def set_factors(ctx, h):
 def set_step(ctx, h):
     """Scale the matrix and the velocities by a step h that is taken once (`tables.scaled` is for many)."""
     set_factors(ctx, h)
+    if ctx.scaled_by == h:
+        return
+    ctx.scaled_by = h
     twice = ctx.second and ctx.unit
     raw, matrix = ctx.raw_matrix, ctx.matrix
     for i in range(ctx.matrix_size):
@@ -135,6 +138,44 @@ def start_elsewhere(ctx, source, first, ratio):
 
 
 @compiled
+def octaves(ratio):
+    """Return how far above 1/2 a ratio is; the `tables.RATIOS` are those that this makes equidistant."""
+    return PER_OCTAVE * (binary_log(ratio) + 1.0)
+
+
+@compiled
+def ratio_at(place):
+    """Return one of the `tables.RATIOS`."""
+    part = place / PER_OCTAVE
+    return part if part > 1.0 else 0.5 + 0.5 * part
+
+
+@compiled
+def on_table(ctx, ratio):
+    """Return the next smaller ratio of lengths that there is a table for; the ratio itself without tables.
+
+    A larger one would make a third more of an error of order 29, and steps be rejected.
+    """
+    return ratio_at(int(octaves(ratio))) if ctx.route > THROUGH and 0.5 <= ratio <= 2.0 else ratio
+
+
+@compiled
+def start_onward(ctx):
+    """First stages from the values of the step before by a table, if there is one; return whether."""
+    if ctx.length == 0.0 or ctx.rejected or ctx.route <= THROUGH:
+        return False
+    ratio = ctx.h / ctx.length
+    if not 0.5 <= ratio <= 2.0:
+        return False
+    found = int(octaves(ratio) + 0.5)
+    if ctx.length * ratio_at(found) != ctx.h:
+        return False
+    product_for_one(ctx, ctx.extrapolation + 8 * ctx.matrix_size * found)
+    ctx.predicted = 1
+    return True
+
+
+@compiled
 def predict(ctx, source, length, first):
     """First stages from the values of ``source``, of a step of ``length``, if that is not too far away.
 
@@ -170,7 +211,7 @@ def begin(ctx):
         start_extrapolated(ctx)
         ctx.older_length = ctx.h
         ctx.values, ctx.older_values = ctx.older_values, ctx.values
-    else:
+    elif not (ctx.varying and start_onward(ctx)):
         ctx.older_length = 0.0
         predict(ctx, ctx, ctx.length, 0.0 if ctx.rejected else 1.0)
     ctx.age -= 1

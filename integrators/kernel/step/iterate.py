@@ -13,10 +13,6 @@ from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 MAX_ITERATIONS = 200
 LOG_TRUSTED, LOG_STEEP = log2(1e-11), log2(STEEP)
 LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
-# What may be left of a change when the step is solved. On the outer Solar System 3e-17, and values at the
-# stages before the last change, let the energy leak 7e-20 per step (Gauss(8), h = 1 year): in 1e6 years more
-# than rounding adds. With 3e-18 it still was 1e-20 (h = .5); with 1e-18 nothing is seen of it.
-LOG_REST = log2(1e-18)
 FASTEST, SLOWEST = -10.0, -1.0  # contraction, as far as it is believed
 MOST_EXTRA = 16  # sweeps of `polish`
 
@@ -69,7 +65,7 @@ def polish(ctx, change):
     The last evaluation is at the newest stages: the field's values have the error of the
     stages that they were taken at. What is left there acts on the energy in the same direction in every step.
     """
-    more = int((LOG_REST - binary_log(change)) / ctx.rate)
+    more = int((ctx.log_rest - binary_log(change)) / ctx.rate)
     sweep_to_the_end(ctx, min(max(more, 0), MOST_EXTRA))
     ctx.outcome = DONE
 

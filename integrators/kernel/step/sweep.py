@@ -89,6 +89,26 @@ def product16(ctx, table):
 
 
 @compiled
+def product_for_one(ctx, table):
+    """As `product8` and `product16`, with a table for a step of length 1."""
+    stages, values, base, state = ctx.stages, ctx.values, ctx.base, ctx.row_state
+    factor, rows, h = ctx.row_factor, ctx.rows, ctx.h
+    if ctx.route == 8:
+        matrix = columns(table, 0, 8)
+        for d in range(rows):
+            moved = fma(h * spread(factor, d), combine_only(matrix, values, 8 * d), get(base, 8 * d))
+            put(stages, 8 * d, spread(state, d) + moved)
+        return
+    for half in range(2):
+        matrix = columns(table, 128 * half, 16)
+        shift = 8 * half
+        for d in range(rows):
+            mean = combine_only(matrix, values, 16 * d)
+            moved = fma(h * spread(factor, d), mean, get(base, 16 * d + shift))
+            put(stages, 16 * d + shift, spread(state, d) + moved)
+
+
+@compiled
 def multiply(table, chunks, groups, source, source_lanes, target, target_lanes, rows, padded):
     """Target = table source, both in the layout of stage memory, in pieces of 8 x 8."""
     for chunk in range(chunks):

@@ -18,7 +18,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import binary_log, two_sum
-from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, set_step
+from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
     CLOSE,
@@ -35,16 +35,16 @@ from integrators.kernel.step.control import (
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
-from integrators.kernel.step.iterate import LOG_REST, close, polish, settle, test
+from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import kink
 from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
-# Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which takes
-# 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the terms of
-# exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame, with three
-# times the error; 36 err by 1e-14 in one step of a diffusion.
+# Iterations to aim at, at most. With contractions (h w)^2 a unit of time costs least at h w = 1/e, which
+# takes 18 to 1e-16. With h w (the first-order form) it would be 36, but rounding is then multiplied like the
+# terms of exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame,
+# with three times the error; 36 err by 1e-14 in one step of a diffusion.
 BUSY = 18.0
 # Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
@@ -110,7 +110,7 @@ def iterate(ctx):
         if ctx.outcome == RUNNING:
             if strict <= TRUSTED:
                 polish(ctx, strict)
-            elif tries >= TRIAL and tries + (LOG_REST - change) / rate > most:
+            elif tries >= TRIAL and tries + (ctx.log_rest - change) / rate > most:
                 ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
                 ctx.rate = known
     return close(ctx)
@@ -273,7 +273,7 @@ def accepts(ctx, outcome, iterations, implicit):
             factor = 1.0
         elif implicit == 0 and ctx.strategy != FIXED_POINT:
             watch(ctx, factor)
-        ctx.length_after = h * factor
+        ctx.length_after = h * (factor if implicit else on_table(ctx, factor))
         return True
     if implicit:
         ctx.implicit_steps -= 1

@@ -4,6 +4,7 @@ import pytest
 
 import problems
 from hbvm_bench.campaign import file as campaign
+from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.campaign.spec import parse_spec
@@ -17,7 +18,8 @@ GOOD = 'name = "x"\nproblems = ["sitnikov()"]\n'
 
 def test_every_shipped_campaign_resolves():
     for name in campaign.shipped():
-        cases = loop.plan(campaign.load(name))
+        opened = own.opened(campaign.load(name), campaign.file_of(name).parent, print)
+        cases = loop.plan(opened)
         assert len({case.id for case in cases}) == len(cases) > 0
 
 

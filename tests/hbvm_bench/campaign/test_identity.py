@@ -80,7 +80,6 @@ EDITED = {
     "integrators/testing/rules.py": [False, False],
     "hbvm_bench/measure/metric.py": [False, False],
     "hbvm_bench/measure/metrics.py": [False, False],
-    "hbvm_bench/measure/quantities.py": [False, False],
     "hbvm_bench/measure/measured.py": [True, True],
     "hbvm_bench/measure/drift.py": [True, True],
     "hbvm_bench/measure/timing.py": [True, True],

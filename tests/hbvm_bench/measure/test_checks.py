@@ -9,7 +9,8 @@ from hbvm_bench.measure.checks import check
 from hbvm_bench.measure.measured import measure
 from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.measure.solve import solve
-from hbvm_bench.measure.starts import PERTURBATION, cloud, members, scaled
+from hbvm_bench.measure.starts import PERTURBATION, members, scaled
+from hbvm_bench.measure.timing import time_alone
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
 from integrators.protocol import Status
@@ -37,7 +38,7 @@ def test_scaled_starts_keep_a_symmetric_start_symmetric():
 
 def test_a_cloud_begins_with_the_problem_and_fills_its_box():
     problem = problems.load("henon_heiles", q1=0.1)
-    starts = cloud(problem, 4000, 0.01)
+    starts, _ = members(problem, Ensemble(count=4000, spread=0.01))
     assert np.array_equal(starts[0], problem.y0)
     x = (starts / problem.y0 - 1) / 0.01
     assert np.abs(x).max() <= 1 + 1e-12
@@ -51,8 +52,8 @@ def test_the_law_of_a_symplectic_method_is_a_bound_and_its_phase_drifts():
     law = checked.laws["energy"]
     assert law.law == "bounded"
     assert law.starts == 3
-    assert checked.errors["energy"].shape == (3, checked.t.size)
-    assert (checked.errors["energy"] < 0).any() != (checked.errors["energy"] > 0).all()
+    assert checked.drift["energy"].shape == (3, checked.drift["t"].size)
+    assert (checked.drift["energy"] < 0).any() != (checked.drift["energy"] > 0).all()
     assert checked.reversal < 1e-10  # 6.6e-13 measured
     metrics = evaluate(measured)
     assert 1e-6 < metrics["phase_max"].value < 1e-2  # 1.9e-3 measured
@@ -92,7 +93,8 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     assert metrics["throughput"].why == "not timed"
-    timed = ensemble.time_round(problem, Gauss(s=8, h=0.5), asked, TimingPlan(samples=2, budget=1))
+    run = ensemble.EnsembleRun.of(problem, Gauss(s=8, h=0.5), program, asked)
+    timed = time_alone(run, TimingPlan(samples=2, budget=1))
     assert len(timed.samples) == 2
     # a method without a batch path takes one after the other, to the same end
     other, _, _ = ensemble.measure(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)

@@ -1,5 +1,4 @@
 import dataclasses
-import inspect
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +6,6 @@ import pytest
 
 import hbvm_bench.report
 import problems
-from hbvm_bench.measure import quantities
 from hbvm_bench.measure.measured import largest_distance, measure
 from hbvm_bench.measure.metrics import METRICS, TIMING_KEYS, evaluate, find
 from hbvm_bench.reference import solutions
@@ -57,13 +55,6 @@ def test_the_table_is_complete():
         assert metric.scale in ("log", "linear")
     assert {*HEADLINE, *TIMING_KEYS, RANKED_BY} <= METRICS.keys()
     assert len({metric.short for metric in METRICS.values()}) == len(METRICS)
-
-
-def test_every_quantity_is_a_metric():
-    functions = {f for name, f in inspect.getmembers(quantities, inspect.isfunction)
-                 if not name.startswith("_")
-                 and name not in ("error_max", "counter", "law_number", "compiled")}  # fmt: skip
-    assert functions <= {metric.function for metric in METRICS.values()}
 
 
 def test_reports_know_the_metrics_from_the_table_only():

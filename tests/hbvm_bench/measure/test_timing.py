@@ -100,9 +100,7 @@ def test_a_batch_is_prepared_before_it_runs(method):
         program.prepare_batch(np.empty((0, 4)), times=[1.0])
 
 
-def test_a_case_s_clock_begins_when_all_is_compiled(tmp_path):
-    system = problems.load("pendulum").system
-
+def test_a_case_s_clock_begins_when_all_is_compiled(tmp_path, monkeypatch):
     class Late(Batching):
         def prepare_batch(self, Y0, par=None, *, times, t0=0.0):
             assert not (tmp_path / worker.COMPILED).exists()
@@ -114,16 +112,10 @@ def test_a_case_s_clock_begins_when_all_is_compiled(tmp_path):
 
     case = SimpleNamespace(ensemble=Ensemble(count=3, spread=0.1))
     resolved = SimpleNamespace(case=case, method=Method(), problem=problems.load("pendulum", t_end=1.0))
-    program = worker._Telling(resolved, tmp_path).compile(system)
-    assert program.now == 1000.0
+    monkeypatch.setattr(worker, "_resolved", lambda request: [resolved])
+    monkeypatch.setattr(timing, "time_alone", lambda run, plan: [run.program.now])
+    assert worker._time(None, TimingPlan(), tmp_path) == [[1000.0]]
     assert (tmp_path / worker.COMPILED).exists()
-
-
-def test_a_campaign_s_round_is_of_such_runs(monkeypatch):
-    seen = []
-    monkeypatch.setattr(timing, "sampled", lambda run, program, plan: seen.append(run) or "not timed")
-    timing.time_round(problems.load("pendulum", t_end=1.0), Landing(), TimingPlan())
-    assert [run.sample for run in seen] == ["land"]
 
 
 @pytest.mark.parametrize(("asked", "order"), [("alternating", "abbaab"), ("as given", "ababab")])

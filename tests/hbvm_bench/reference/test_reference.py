@@ -56,10 +56,11 @@ def test_a_shorter_span_has_the_same_reference():
 def test_recomputing_a_short_span_gives_the_stored_digits():
     pytest.importorskip("heyoka")
     problem = problems.load("sitnikov", t_end=25.0)
-    fresh = solutions.compute(problem, intervals=1)
     stored = solutions.find_file(problem)
     assert stored is not None
     cut = msgspec.structs.replace(stored, t=stored.t[:2], y=stored.y[:2])
+    states = solutions.taylor(problem, np.array([0.0, 25.0]), solutions.TOLERANCE)
+    fresh = msgspec.structs.replace(cut, y=[[str(value) for value in state] for state in states])
     # measured 2.4e-29: the two runs take different steps to their first output
     assert solutions.difference(cut, fresh) < 1e-26
 

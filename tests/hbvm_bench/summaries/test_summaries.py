@@ -5,7 +5,6 @@ import pytest
 from hbvm_bench.campaign.file import Case, Ensemble
 from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
-from hbvm_bench.summaries.profiles import Accuracy
 
 
 def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
@@ -66,14 +65,13 @@ def test_the_front_is_what_nothing_beats_in_both():
 def test_an_ensemble_is_in_no_summary_of_single_trajectories():
     many = record("Taylor()", many=True)
     assert points.by_problem([many]) == {}
-    assert profiles.profile([many], Accuracy(1e-4), "warm_seconds").ratios == {}
+    assert profiles.profile([many], {"position_end": 1e-4}, "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})
 
 
 def test_a_profile_counts_problems_within_a_factor_of_the_best():
-    found = profiles.profile(RUN, Accuracy(1e-8), "warm_seconds")
-    assert found.problems == ["kepler()", "pendulum()"]
-    assert found.unsolved == ["toda()"]
+    found = profiles.profile(RUN, {"position_end": 1e-8}, "warm_seconds")
+    assert found.problems == 2  # nobody solves toda()
     assert found.ratios == {"Gauss": [2.0, 1.0], "Taylor": [1.0, 8.0]}
     assert found.share("Gauss", 1.0) == 0.5
     assert found.share("Gauss", 2.0) == 1.0
@@ -82,19 +80,17 @@ def test_a_profile_counts_problems_within_a_factor_of_the_best():
 
 
 def test_who_does_not_reach_the_accuracy_has_an_infinite_ratio():
-    found = profiles.profile(RUN, Accuracy(1e-8, 1e-13), "warm_seconds")
+    found = profiles.profile(RUN, {"position_end": 1e-8, "energy_max": 1e-13}, "warm_seconds")
     assert found.ratios["Taylor"] == [math.inf, 8.0]
     assert found.solved("Taylor") == 1
-    assert "energy to 1e-13" in found.accuracy.words
+    assert found.words == "position to 1e-08, energy to 1e-13"
 
 
 def test_needs_name_the_families_near_the_best_most_often():
-    cheap = next(a for a in needs.answers(RUN) if a.title == "a position right to 1e-8, in little time")
-    assert cheap.problems == 2
-    assert [c.family for c in cheap.candidates] == ["Gauss", "Taylor"]
-    assert (cheap.candidates[0].near, cheap.candidates[1].near) == (2, 1)
-    assert cheap.text == "Gauss (2 of 2, 1.5 times the best); Taylor (1 of 2, 4.5 times the best)"
-    assert all(answer.candidates for answer in needs.answers(RUN))
+    rows = {title: rest for title, *rest in needs.table(RUN).rows}
+    said = "Gauss (2 of 2, 1.5 times the best); Taylor (1 of 2, 4.5 times the best)"
+    assert rows["a position right to 1e-8, in little time"] == [said, "2"]
+    assert "the way back to the start" not in rows
 
 
 def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
@@ -106,7 +102,7 @@ def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
         ]
     )
     assert families == ["Gauss", "Taylor", "IAS15", "WHFast"]
-    assert rows["kepler()"]["Gauss"] == outcomes.Outcome("ok", 3, 3, [])
+    assert rows["kepler()"]["Gauss"] == outcomes.Outcome("on", 3, 3, [])
     assert rows["kepler()"]["IAS15"].state == "ended"
     assert rows["kepler()"]["WHFast"] == outcomes.Outcome("refused", 0, 1, ["refused: no bodies"])
     assert rows["toda()"]["Taylor"].state == "off"
@@ -133,7 +129,6 @@ def test_laws_are_counted_by_family_on_the_trajectory_only():
     kept = {"energy": Law(law="bounded", floor=1e-9), "angular_momentum": Law(law="linear")}
     run = [record("Gauss(s=2, h=0.1)", laws=kept), record("Taylor()", laws=kept, violation="lost")]
     assert laws.counts(run) == {"Gauss": {"bounded": 1}}
-    assert [row.invariant for row in laws.rows(run)] == ["energy", "angular_momentum"]
 
 
 def test_fairness_counts_settings():

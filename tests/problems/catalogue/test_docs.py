@@ -1,6 +1,7 @@
 """The pages on problems, engines and compile times are those that the code writes."""
 
 import importlib
+import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -20,6 +21,8 @@ STALE = "it is out of date: run hbvm-bench gallery docs --no-pictures"
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("docs")
+    for name in ("problems.md", "engines.md"):
+        shutil.copy(DOCS / name, directory)
     assert cli.main(["gallery", str(directory), "--no-pictures"]) == 0
     return directory
 
@@ -68,6 +71,19 @@ def test_a_problem_that_does_not_say_how_it_is_drawn_has_no_picture(monkeypatch)
     monkeypatch.setattr(registry, "entry", lambda name: None)
     with pytest.raises(InputError, match="kepler has no picture"):
         pictures.draw("kepler")
+
+
+def test_what_is_written_by_hand_stays_and_a_page_without_a_place_is_refused(tmp_path):
+    page = tmp_path / "engines.md"
+    page.write_text(f"# Mine\n\n{pages.BEGIN}\nold\n{pages.END}\n\nafter\n", encoding="utf-8")
+    pages.write(tmp_path, with_pictures=False)
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("# Mine\n")
+    assert text.endswith("\nafter\n")
+    assert "old" not in text
+    page.write_text("# Mine\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"around 1 places, not 0"):
+        pages.write(tmp_path, with_pictures=False)
 
 
 def test_pages_are_written_all_or_none(tmp_path, monkeypatch):

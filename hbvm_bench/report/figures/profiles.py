@@ -1,89 +1,25 @@
-"""What a run says over all its problems: needs, performance profiles, outcomes, laws."""
+"""Performance profiles: on which share of the problems a family is within a factor of the best."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.ticker import PercentFormatter
 
 from hbvm_bench.measure.metrics import find
-from hbvm_bench.report.document import Block, Details, Items
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.over_time import WIDTH
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import laws, needs, outcomes
 from hbvm_bench.summaries.points import work_of
 from hbvm_bench.summaries.profiles import ACCURACIES, Profile, profile
-from hbvm_bench.summaries.table import Table
 
 FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
 NEVER = 6.0  # decades: the end of the axis where a family is not within any factor
-SIGNS = {"ok": "●", "off": "◐", "ended": "○", "refused": "–", "absent": ""}
-
-
-def needed(records: Sequence[Record]) -> Table | None:
-    """Return which integrator answers which need."""
-    answers = needs.answers(records)
-    if not answers:
-        return None
-    return Table(
-        "Which integrator for which need",
-        ("need", "first choices", "problems"),
-        [(answer.title, answer.text, str(answer.problems)) for answer in answers],
-        "In brackets: on how many problems it is near the best, and its median factor behind it.",
-        words=(0, 1),
-    )
-
-
-def outcome(records: Sequence[Record]) -> list[Block]:
-    """Return which integrator reached the end of which problem, and why not; nothing for one problem."""
-    families, matrix = outcomes.matrix(records)
-    if len(matrix) < 2:
-        return []
-    rows: list[tuple[str, ...]] = []
-    reasons: list[str] = []
-    for problem, found in matrix.items():
-        signs = (
-            _sign(found[family].state, found[family].reached, found[family].settings) for family in families
-        )
-        rows.append((problem, *signs))
-        reasons += [
-            f"{problem}, {family}: {reason}"
-            for family in families
-            for reason in found[family].reasons
-            if reason
-        ]
-    table = Table(
-        "Which integrator on which problem",
-        ("problem", *families),
-        rows,
-        "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
-        "Numbers: how many of its settings reached the end, where not all did.",
-    )
-    return [table, *([Details(f"Why not: {len(reasons)} reasons", [Items(reasons)])] if reasons else [])]
-
-
-def drifting(records: Sequence[Record]) -> Table | None:
-    """Return how many cases of each method follow which law."""
-    counted = laws.counts(records)
-    if not counted:
-        return None
-    kinds = [*laws.SHORT, "none"]
-    return Table(
-        "The law of the energy's drift",
-        ("method", *(laws.SHORT.get(kind, "not clear") for kind in kinds)),
-        [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
-        "How many cases of each method follow which law.",
-    )
-
-
-def _sign(state: str, reached: int, settings: int) -> str:
-    return SIGNS[state] + (f" {reached}/{settings}" if state == "ok" and reached < settings else "")
 
 
 @styled
-def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | None:
+def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture | None:
     """Draw the performance profiles; ``None`` for too few problems.
 
     Parameters
@@ -95,7 +31,7 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
     """
     work = work_of(records)
     found = [profile(records, accuracy, work) for accuracy in ACCURACIES]
-    found = [one for one in found if len(one.problems) >= FEWEST_PROBLEMS]
+    found = [one for one in found if one.problems >= FEWEST_PROBLEMS]
     if not found:
         return None
     label = find(work).label
@@ -114,6 +50,7 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
             x = np.repeat([*taus, end], 2)[1:]
             y = np.repeat(shares, 2)
             x, y = x[: y.size], y[: x.size]
+            same = [name for name in list(one.ratios)[:index] if base_colours(name) == base_colours(family)]
             (line,) = axes.plot(
                 x,
                 y,
@@ -122,21 +59,19 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
                 markevery=(index % 3, max(3, x.size // 6)),
                 markersize=4,
                 linewidth=1.6,
+                dashes=DASHES[len(same)],
                 clip_on=False,
             )
-            dash = DASHES[sum(base_colours(f) == base_colours(family) for f in list(one.ratios)[:index])]
-            if dash:
-                line.set_dashes(dash)
             handles.setdefault(family, line)
             traces.append(Trace(numbers.get(family, 0), family, x, y))
         log_axis(axes, "x", 0, round(np.log10(end)))
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.set_title(one.accuracy.words, color=INK, fontsize=8)
+        axes.set_title(one.words, color=INK, fontsize=8)
         axes.set_xlabel("factor behind the fastest")
         panels.append(
             Panel(
-                one.accuracy.words,
+                one.words,
                 Axis("factor behind the best", log=True),
                 Axis("share of problems"),
                 traces,
@@ -144,7 +79,7 @@ def profiles(records: Sequence[Record], numbers: dict[str, int]) -> Picture | No
         )
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
-        f"{one.accuracy.words}, {len(one.problems)} problems: "
+        f"{one.words}, {one.problems} problems: "
         + ", ".join(
             f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
         )

@@ -1,1 +1,0 @@
-"""General and stiff systems with known end values."""

@@ -1,0 +1,77 @@
+"""The campaign ``general``: systems of a file beside it, judged by the ends that it gives."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from hbvm_bench.campaign import file as campaigns
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.campaign.shorter import chosen, quick_run
+from hbvm_bench.cli import main
+from hbvm_bench.commands import automatic
+from hbvm_bench.measure import reading
+from hbvm_bench.reference import solutions
+from hbvm_bench.run import references
+from hbvm_bench.store.store import Store
+from integrators import HBVM, integrate
+from problems.errors import InputError
+
+
+def opened(*names: str):
+    campaign = chosen(campaigns.load("general"), list(names))
+    return own.opened(campaign, campaigns.file_of("general").parent, print)
+
+
+def known(campaign, folder: Path) -> Store:
+    store = Store(folder)
+    store.prepare()
+    references.make_missing(campaign, store, print)
+    return store
+
+
+def test_the_end_that_a_campaign_gives_is_the_reference(tmp_path):
+    campaign = opened("robertson")
+    (entry,) = campaign.entries()
+    store = known(campaign, tmp_path)
+    found = solutions.find(make_problem(entry.use))
+    assert found is not None
+    assert found.t.tolist() == [40.0]
+    assert found.high[0].tolist() == entry.end
+    assert not references.make_missing(campaign, store, print)  # it lies there now
+
+
+@pytest.mark.parametrize("end", [[1.0], [1.0, 2.0, 3.0], [1.0, float("nan")]])
+def test_an_end_that_is_no_state_is_refused(end):
+    (entry,) = opened("van_der_pol").entries()
+    with pytest.raises(InputError, match="must be 2 finite numbers"):
+        solutions.of_end(make_problem(entry.use), end)
+
+
+def test_a_stiff_chain_runs_at_a_hundred_times_the_step_and_ends_where_the_slow_springs_are():
+    (entry,) = opened("stiff_chain").entries()
+    problem = make_problem(entry.use)
+    made = integrate(problem, HBVM(k=8, s=4, h=8e-2), [problem.t_end])
+    assert abs(made.y[0, :3] - entry.end[:3]).max() < 1e-6  # measured 8.6e-8
+
+
+def test_a_quick_run_shortens_no_span_of_a_file_and_keeps_no_end_of_another_span(tmp_path):
+    shorter = quick_run(campaigns.load("general"), 3)
+    ends = {campaigns.name_of(entry): entry.end for entry in shorter.entries()}
+    assert len(ends["robertson"]) == 3
+    assert ends["stiff_chain"] == []
+
+
+def test_the_command_runs_a_part_of_it(tmp_path, monkeypatch, capsys):
+    declared = campaigns.load("general")
+    alone = replace(declared, methods=declared.methods[:1], timing=replace(declared.timing, rounds=0))
+    monkeypatch.setattr(automatic, "load", lambda name: alone)
+    monkeypatch.chdir(tmp_path)
+    assert main(["automatic", "--general", "driven_pendulum"]) == 0
+    (ours,) = reading.records(Store(Path("runs/general")))
+    assert ours.case.method == "HBVM(tol=3e-16)"
+    assert ours.result.metrics["position_end"].value < 1e-11  # measured 2.2e-15
+    assert "time of Radau over ours" in capsys.readouterr().out
+    assert main(["automatic", "--general", "robertsen"]) == 2
+    assert "did you mean 'robertson'" in capsys.readouterr().err
