@@ -61,6 +61,28 @@ class Group(Memory):
     begin = Array("lanes")  # where on that step this one begins: at its end, 1, or at its start, 0
     next_state = Array("dim", "lanes")
     next_error = Array("dim", "lanes")
+    # what such a step is judged by, as in `Context`, and its end; see `ensemble.control`
+    estimators = Array()
+    allowed_error = Real()
+    allowed_defect = Real()
+    error_power = Real()  # one over the order of the error,
+    defect_power = Real()  # and of the defect
+    error_aim = Real()
+    defect_aim = Real()
+    error_decay = Real()
+    defect_decay = Real()
+    least_slope = Real()
+    doubt = Real()
+    busy = Real()  # sweeps to aim at, at most
+    worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
+    length_behind = Array("lanes")
+    error_behind = Array("lanes")
+    defect_behind = Array("lanes")
+    length_limit = Array("lanes")
+    stop = Array("lanes")  # time of the next sample
+    unwatched = Array("lanes")  # fewer steps than this may follow one another without a look at the lane
+    since = Array("lanes")  # steps without one
+    ordinary = Array("lanes")  # 1: the last step was one of these
 
     # --- trajectories, one group after another; see `ensemble.loop` ---
     starts = Array()  # (n, dim)

@@ -1,12 +1,15 @@
 """Trajectories in lanes, each with steps of its own length, and the next one where one has ended.
 
-Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`. Whether a
-step is good enough and how long the next one is follows, lane by lane, as it does for a single
-trajectory (`integrators.kernel.step.vary`): each lane has a `Context` of its own. A step does not pass
-the time of the next sample, but ends there.
+Steps are done on all lanes at once by the code of `integrators.kernel.ensemble.steps`, and most of them
+are judged and followed there too (`integrators.kernel.ensemble.control`). Elsewhere, whether a step is
+good enough and how long the next one is follows as it does for a single trajectory
+(`integrators.kernel.step.vary`): each lane has a `Context` of its own, which catches up then. A step does
+not pass the time of the next sample, but ends there.
 """
 
-from integrators.kernel.context import DIVERGED, DONE, Context
+from math import log
+
+from integrators.kernel.context import DIVERGED, DONE, FIXED_POINT, Context
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
@@ -15,7 +18,16 @@ from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import SMALLEST
-from integrators.kernel.step.vary import HELD_BACK_STEPS, accepts, begin_attempts, remaining, take, within
+from integrators.kernel.step.vary import (
+    BUSY,
+    HELD_BACK_STEPS,
+    accepts,
+    begin_attempts,
+    log_worth,
+    remaining,
+    take,
+    within,
+)
 from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
 
 group_at = view(Group)
@@ -112,6 +124,13 @@ def aim(group, lane):
     group.begin[lane] = 0.0 if ctx.rejected else 1.0
     group.before[lane] = group.sweeps[lane]
     group.alive[lane] = 1.0
+    group.length_behind[lane], group.length_limit[lane] = ctx.length_behind, ctx.length_limit
+    group.error_behind[lane], group.defect_behind[lane] = ctx.error_behind, ctx.defect_behind
+    group.stop[lane] = ctx.stop
+    suspect = ctx.attempts > 0 or ctx.kinks > 0 or (ctx.t0 - ctx.doubt_end) * h < 0.0
+    first = ctx.length_behind == 0.0 or h != ctx.next_length
+    group.unwatched[lane] = 0.0 if suspect or first else float(CRAWL_STEPS - ctx.steps % CRAWL_STEPS)
+    group.since[lane] = 0.0
     return 1
 
 
@@ -131,10 +150,26 @@ def enter(group, lane):
 
 
 @compiled
+def catch_up(group, lane, ctx):
+    """Let a lane's context know of the steps that were taken without it."""
+    ctx.t0, ctx.time_low = group.t0[lane], group.time_low[lane]
+    ctx.next_length = group.h[lane]
+    ctx.length = ctx.length_behind = group.length_behind[lane]
+    ctx.error_behind, ctx.defect_behind = group.error_behind[lane], group.defect_behind[lane]
+    ctx.length_limit = group.length_limit[lane]
+    ctx.steps += int(group.since[lane])
+    ctx.slow = 0
+    for d in range(group.dim):
+        ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
+
+
+@compiled
 def settle(group, lane):
     """Take the step that was tried in a lane, if it is good enough."""
     lanes, dim, rows, k = group.lanes, group.dim, group.rows, group.k
     ctx = context_at(group.contexts[lane])
+    if group.since[lane] > 0.0:
+        catch_up(group, lane, ctx)
     ctx.h = group.h[lane]
     outcome = DONE if group.alive[lane] == 1.0 else DIVERGED
     if outcome == DONE:
@@ -191,6 +226,23 @@ def crawls(group, lane, ctx):
 
 
 @compiled
+def share(group, ctx):
+    """Let a group know what its steps are judged by."""
+    group.estimators = ctx.estimators
+    group.allowed_error, group.allowed_defect = ctx.allowed_error, ctx.allowed_defect
+    group.error_power = 1.0 / (2.0 * ctx.error_degree + 1.0)
+    group.defect_power = 1.0 / (2.0 * ctx.k - 1.0)
+    group.error_aim, group.defect_aim = ctx.error_aim, ctx.defect_aim
+    group.error_decay, group.defect_decay = ctx.error_decay, ctx.defect_decay
+    group.least_slope, group.doubt, group.busy = ctx.least_slope, ctx.doubt, BUSY
+    group.worth = INFINITY
+    if ctx.strategy != FIXED_POINT:
+        group.worth = log_worth(ctx)
+        if log(ctx.error_decay) > group.worth:
+            group.worth = -INFINITY
+
+
+@compiled
 def run(first, budget):
     """Integrate the trajectories from ``at`` to ``end``; return 1 at their end, or 0 after ``budget`` steps.
 
@@ -205,12 +257,14 @@ def run(first, budget):
     lanes = group.lanes
     if group.sample < 0:
         group.sample = 0
+        share(group, context_at(group.contexts[0]))
         for lane in range(lanes):
             group.member[lane] = -1
+            group.ordinary[lane] = 0.0
     while True:
         running = 0
         for lane in range(lanes):
-            running += enter(group, lane)
+            running += 1 if group.ordinary[lane] == 1.0 else enter(group, lane)
         if running == 0:
             return 1
         if budget <= 0:
@@ -219,5 +273,5 @@ def run(first, budget):
         group.n = 0
         call_steps(group.code, group, 1)
         for lane in range(lanes):
-            if group.member[lane] >= 0:
+            if group.member[lane] >= 0 and group.ordinary[lane] == 0.0:
                 settle(group, lane)

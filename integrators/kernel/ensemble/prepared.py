@@ -56,7 +56,7 @@ class Lanes:
         size = self.rows // len(starts)
         groups = tuple((start, size // width, width) for start in starts)
         self.k = constants.k
-        self.width = width_for(system, second, self.rows)
+        self.width = width_for(system, second, self.rows, varying)
         self._code = compile_steps(
             system,
             Form(self.width, self.k, self.rows, second, self.unit, varying, constants.modes, groups),
@@ -144,15 +144,16 @@ class Lanes:
         return group, side
 
 
-def width_for(system: System, second: bool, rows: int) -> int:
+def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     """Return how many trajectories go side by side.
 
     Eight, which fill a register; more where the field has few components and the results of
     divisions, roots or other functions are waited for (Kepler: 15 % faster with sixteen, an
-    exponential of one component twice as fast with 32).
+    exponential of one component twice as fast with 32). Steps of varying length wait for those
+    of their control (Henon and Heiles: 8 % faster with sixteen).
     """
     nodes = reachable(system.function("force" if second else "field").roots)
-    if rows > 4 or all(node.op in SOON for node in nodes):
+    if rows > 4 or (not varying and all(node.op in SOON for node in nodes)):
         return LANES
     return 4 * LANES if rows == 1 else 2 * LANES
 

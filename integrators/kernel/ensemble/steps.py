@@ -15,6 +15,7 @@ from typing import Any
 
 from llvmlite import ir
 
+from integrators.kernel.ensemble.control import Control
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.ensemble.writer import Index, Writer
 from integrators.kernel.native import binary, field, store
@@ -82,7 +83,7 @@ def compile_steps(system: System, form: Form) -> binary.Native:
     """
     what = "force" if form.second else "field"
     source = emit.source(system, what, "numba")
-    modules = binary.sources(*field.SOURCES, "ensemble", "step/rule")
+    modules = binary.sources(*field.SOURCES, "ensemble", "step")
     name = store.key("ensemble", source.text, repr(form), modules)
 
     def make() -> tuple[str, bytes]:
@@ -178,6 +179,8 @@ class Steps(Writer):
         self.predict()
         self.iterate()
         self.finish()
+        if self.form.varying:
+            Control(self).take()
 
     def each_row(self, body: Callable[[Any], None]) -> None:
         """Write ``body(d)`` for every component of a stage."""

@@ -139,13 +139,19 @@ def longer(ctx, error, defect, grow):
 
 
 @compiled
+def log_worth(ctx):
+    """Return the logarithm of how much longer steps must be for the implicit solver to be worth its while."""
+    gain = GAIN_LIGHT if ctx.second or ctx.fused else GAIN
+    return log(gain + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
+
+
+@compiled
 def watch(ctx, factor):
     """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
     room = ctx.error_aim - ctx.error_ahead
     if ctx.allowed_defect < INFINITY:
         room = min(room, ctx.defect_aim - ctx.defect_ahead)
-    gain = GAIN_LIGHT if ctx.second or ctx.fused else GAIN
-    worth = log(gain + GAIN_PER_ROW * min(ctx.rows, MOST_ROWS))
+    worth = log_worth(ctx)
     held_back = factor < HELD_BACK
     if held_back and room <= worth and ctx.rows <= MOST_ROWS:
         room = log(ctx.error_decay) - log_decay(ctx)
