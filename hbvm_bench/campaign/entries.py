@@ -172,8 +172,9 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     reference : bool
         Whether a reference is computed before the run, by two methods, where none comes with the
         package; see `hbvm_bench.run.references`.
-    end : list of float
+    end : list of float, optional
         The state at the end, where it is known, as from a publication: the reference is then that.
+        Of one problem: it goes with neither a sweep nor ``reference``.
     """
 
     use: str
@@ -182,7 +183,7 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     note: str = ""
     within: Accuracy = {}
     reference: bool = False
-    end: list[float] = []
+    end: Annotated[list[float], Meta(min_length=1)] | None = None
     values: dict[str, Scalar] = {}
     sweep: dict[str, Annotated[list[Scalar], Meta(min_length=1)]] = {}
     grid: Grid | None = None
@@ -192,6 +193,10 @@ class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             raise InputError(
                 f"problem name {self.name!r} must be a file name of letters, digits, '.', '_' and '-'."
             )
+        if self.end is not None and self.sweep:
+            raise InputError(f"end= of {self.use} is of one problem; write an entry for each of the sweep.")
+        if self.end is not None and self.reference:
+            raise InputError(f"end= of {self.use} is its reference; leave out reference = true, or end=.")
 
 
 class MethodEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -71,8 +71,8 @@ def _shortened(entry: ProblemEntry) -> ProblemEntry:
     problem, spec = make_problem(text), parse_spec(text)
     end = problem.t0 + QUICK_SHARE * (problem.t_end - problem.t0)
     known = solutions.find(problem)
-    if known is not None:
+    if known is not None and known.t.size > 1:
         end = float(known.t[1 + np.argmin(np.abs(known.t[1:] - end))])
     return replace(
-        entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry), end=[]
+        entry, use=str(Spec(spec.name, spec.arguments | {"t_end": end})), name=name_of(entry), end=None
     )

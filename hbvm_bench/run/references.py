@@ -42,10 +42,10 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
     """
     made = False
     for entry in campaign.entries():
-        for values in chosen(entry) if entry.reference or entry.end else []:
+        for values in chosen(entry) if entry.reference or entry.end is not None else []:
             text = fill(entry.use, values)
             problem = make_problem(text)
-            if entry.end:
+            if entry.end is not None:
                 given = solutions.of_end(problem, entry.end)
                 if given != solutions.find_file(problem):
                     solutions.know(solutions.encode(given))

@@ -71,6 +71,10 @@ PROBLEMS\nproblems = [{use = "kepler(e={e*2})", sweep = {e = ["a"]}}] => kepler(
 PROBLEMS\nproblems = [{use = "kepler(e={e+2})", sweep = {e = [0.1]}}] => kepler(e={e+2}): the sweep gives
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = [nan]}}] => cannot read 'kepler(e=nan)': a value
 PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = [inf]}}] => cannot read 'kepler(e=inf)': a value
+PROBLEMS\nproblems = [{use = "kepler()", end = []}]           => Expected `array` of length >= 1, at
+PROBLEMS\nproblems = [{use = "kepler()", end = 3}]            => Expected `array | null`, got `int`, at
+PROBLEMS\nproblems = [{use = "kepler()", end = [1], reference = true}] => end= of kepler() is its
+PROBLEMS\nproblems = [{use = "kepler(e={e})", end = [1], sweep = {e = [0.1]}}] => end= of kepler(e={e}) is of
 PROBLEMS\nproblems = [{use = "kepler(e={})"}]                => kepler(e={}): '' in a placeholder is neither
 PROBLEMS\nproblems = [{use = "kepler(e={e)", sweep = {e = [0.1]}}] => cannot read 'kepler(e={e)': this is not
 METHODS\nmethods = [{use = "HBVM(k={k},s={s},h={h})", sweep = {k = MANY, s = MANY, h = MANY}}] => the limit is

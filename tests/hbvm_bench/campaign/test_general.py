@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign import file as campaigns
 from hbvm_bench.campaign import own
+from hbvm_bench.campaign.entries import Limits
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.cli import main
@@ -17,6 +18,7 @@ from hbvm_bench.run import references
 from hbvm_bench.store.store import Store
 from integrators import HBVM, integrate
 from problems.errors import InputError
+from tests.hbvm_bench.conftest import run_case
 
 
 def opened(*names: str):
@@ -49,18 +51,42 @@ def test_an_end_that_is_no_state_is_refused(end):
         solutions.of_end(make_problem(entry.use), end)
 
 
+def test_a_stiff_chain_fails_by_the_fixed_point():
+    (entry,) = opened("stiff_chain").entries()
+    problem = make_problem(entry.use)
+    made = integrate(problem, HBVM(k=8, s=4, h=8e-4, solver="fixed_point"), [problem.t_end])
+    assert made.status == "nonlinear_divergence"
+    assert made.reason.startswith("the fixed-point iteration did not converge in the step from t = 0.0")
+
+
 def test_a_stiff_chain_runs_at_a_hundred_times_the_step_and_ends_where_the_slow_springs_are():
     (entry,) = opened("stiff_chain").entries()
     problem = make_problem(entry.use)
     made = integrate(problem, HBVM(k=8, s=4, h=8e-2), [problem.t_end])
+    assert (made.status, made.stats.solver, made.stats.steps) == ("finished", "Newton", 125)
+    assert abs(made.errors()["energy"]).max() < 1e-14  # measured 1.4e-15
     assert abs(made.y[0, :3] - entry.end[:3]).max() < 1e-6  # measured 8.6e-8
+
+
+def test_a_case_that_takes_too_long_is_given_up_and_says_so(tmp_path):
+    campaign = opened("stiff_chain")
+    explicit = next(case for case in campaign.cases() if case.method.startswith("DOP853"))
+    record = run_case(explicit, str(known(campaign, tmp_path).directory), Limits(wall_seconds=0.1))
+    assert (record.result.outcome, record.result.reason) == ("timeout", "did not end within 0.1 s")
+
+
+def test_a_quick_run_takes_no_time_of_a_reference_that_is_an_end_alone(tmp_path):
+    campaign = opened("stiff_chain")
+    known(campaign, tmp_path)
+    (entry,) = quick_run(campaign, 3).entries()
+    assert make_problem(entry.use).t_end == 1.0
 
 
 def test_a_quick_run_shortens_no_span_of_a_file_and_keeps_no_end_of_another_span(tmp_path):
     shorter = quick_run(campaigns.load("general"), 3)
     ends = {campaigns.name_of(entry): entry.end for entry in shorter.entries()}
     assert len(ends["robertson"]) == 3
-    assert ends["stiff_chain"] == []
+    assert ends["stiff_chain"] is None
 
 
 def test_the_command_runs_a_part_of_it(tmp_path, monkeypatch, capsys):
