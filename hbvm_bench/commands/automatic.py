@@ -80,8 +80,8 @@ def _publish(directory: Path) -> None:
 
 
 def _general(context: typer.Context, names: list[str], limit: float) -> None:
-    if not limit > 0.0:
-        raise InputError(f"limit must be positive, not {limit}.")
+    if not 0.0 < limit <= 1e300:
+        raise InputError(f"--limit={limit} must be above 0 and at most 1e300 seconds.")
     declared = load(GENERAL)
     limits = replace(declared.limits, wall_seconds=limit)
     campaign = opened(chosen(replace(declared, limits=limits), names), GENERAL)

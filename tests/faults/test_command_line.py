@@ -103,10 +103,10 @@ run -p "kepler()" -m "WHFast(h=-1)"                        | WHFast(h=-1): h=-1 
 run -p "kepler()" -m "sys.exit()"                          | cannot read 'sys.exit()': the name must be one
 run -p "expression(H='p^2/2 +')" -m "IAS15()"              | cannot read the formula 'p^2/2 +': this is not
 run -p "expression(H='q^10000000000')" -m "HBVM(k=4,s=2,h=0.1)" | cannot read the formula 'q^10000000000':
-run -p "kepler()"                                          | -m
-run -m "IAS15()"                                           | -p
-run -p "kepler(ee=0.6)" -m "IAS15()"                       | did you mean 'e'
-run -p "kepler()" -m "HBVM(k=2,s=3,h=0.1)"                 | k=2
+run -p "kepler()"                                          | give a campaign, or at least one -p
+run -m "IAS15()"                                           | give a campaign, or at least one -p
+run -p "kepler(ee=0.6)" -m "IAS15()"                       | unknown argument of kepler 'ee'; did you mean
+run -p "kepler()" -m "HBVM(k=2,s=3,h=0.1)"                 | HBVM(k=2, s=3, h=0.1): HBVM needs k >= s; k=2 is
 show                                                       | Missing argument 'directory'
 show nowhere                                               | the directory 'nowhere' does not exist; make
 show .                                                     | the directory '.' has no results; make some
@@ -133,9 +133,10 @@ automatic kepler --rounds 0                                | rounds must be at l
 automatic kepler --rounds a                                | Invalid value for '--rounds': Input should be a
 automatic kepler --rounds -5                               | rounds must be at least 2, not -5
 automatic --general nosuch                                 | unknown problem of general 'nosuch'; known: are
-automatic --general --limit -1                             | limit must be positive, not -1.0
-automatic --general --limit 0                              | limit must be positive, not 0.0
-automatic --general --limit nan                            | limit must be positive, not nan
+automatic --general --limit -1                             | --limit=-1.0 must be above 0 and at most 1e300
+automatic --general --limit 0                              | --limit=0.0 must be above 0 and at most 1e300
+automatic --general --limit nan                            | --limit=nan must be above 0 and at most 1e300
+automatic --general --limit inf                            | --limit=inf must be above 0 and at most 1e300
 automatic --general --limit a                              | Invalid value for '--limit': Input should be a
 race -p nosuch                                             | unknown problem of race 'nosuch'; known:
 race --rounds 1                                            | Invalid value for '--rounds': Input should be
