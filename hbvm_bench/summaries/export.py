@@ -88,11 +88,16 @@ def as_json(records: Sequence[Record]) -> dict[str, Any]:
 
 def _as_json(record: Record) -> dict[str, Any]:
     fields = msgspec.to_builtins(record)
-    words = {key: fields["case"].get(key, "") for key in ("problem", "method", "note")}
-    settings, timing, result = record.case.settings, record.timing, fields.pop("result")
-    del fields["case"]
+    timing, result = record.timing, fields.pop("result")
+    del fields["case"]  # without what is as by default
     timed = None if timing is None else timing.summary | fields["timing"]
-    return {**words, "settings": settings, **result, **fields, "timing": timed}
+    return {**_whole(record.case), **result, **fields, "timing": timed}
+
+
+def _whole(declared: msgspec.Struct) -> Row:
+    """Return a part of a campaign as JSON values with its defaults, which its file leaves out."""
+    values = msgspec.structs.asdict(declared)
+    return {key: _whole(v) if isinstance(v, msgspec.Struct) else v for key, v in values.items()}
 
 
 @contextmanager
@@ -132,6 +137,7 @@ def _case_row(record: Record) -> Row:
         "method_options": _json(parse_spec(case.method).arguments),
         "settings": case.settings,
         "note": case.note,
+        "ensemble": "" if case.ensemble is None else _json(_whole(case.ensemble)),
         "role": record.role,
         "library": record.library,
         "order": record.order,
@@ -200,8 +206,9 @@ def _json(value: Any) -> str:
 
 
 def _case_columns() -> dict[str, type]:
-    words = ("problem_name", "problem_arguments", "method_name", "method_options", "settings", "note", "role")
-    columns: dict[str, type] = dict.fromkeys(("id", "problem", "method", *words, "library"), str)
+    words = ("problem_name", "problem_arguments", "method_name", "method_options", "settings", "note")
+    keys = ("id", "problem", "method", *words, "ensemble", "role", "library")
+    columns: dict[str, type] = dict.fromkeys(keys, str)
     columns |= {"order": int} | dict.fromkeys(("outcome", "status", "reason", "violation", "warnings"), str)
     columns["t_stop"] = float
     for key in METRICS:
