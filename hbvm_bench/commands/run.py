@@ -13,6 +13,7 @@ from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
+from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
@@ -96,7 +97,8 @@ def show(campaign: Campaign, store: Store) -> None:
 def as_typed(context: typer.Context) -> str:
     """Return how to run a command again, without the options that change no number.
 
-    A path of this machine, which is nobody else's, is left out too.
+    An absolute path is nobody else's: one of an option is left out too, and of a campaign's or a
+    problem's file only what lies below the present directory is kept, or its name.
     """
     words = ["hbvm-bench", str(context.info_name)]
     for option in context.command.params:
@@ -108,8 +110,19 @@ def as_typed(context: typer.Context) -> str:
         elif not (isinstance(given, Path) and given.is_absolute()):
             name = [] if option.param_type_name == "argument" else [option.opts[-1]]
             for one in given if isinstance(given, list | tuple) else [given]:
-                words += [*name, str(one).removesuffix(".0") if isinstance(one, float) else str(one)]
+                words += [*name, str(one).removesuffix(".0") if isinstance(one, float) else _near(str(one))]
     return shlex.join(words)
+
+
+def _near(text: str) -> str:
+    """Return a word of a command line with the file that it names as seen from the present directory."""
+    named = python_file_of(text) or text
+    path = Path(named)
+    if not path.is_absolute():
+        return text
+    here = Path.cwd()
+    near = path.relative_to(here).as_posix() if path.is_relative_to(here) else path.name
+    return near + text.removeprefix(named)
 
 
 def carry_out(

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from hbvm_bench import cli
+from hbvm_bench.commands import run
 from hbvm_bench.measure.metrics import METRICS
 from tests.hbvm_bench.conftest import SHORT
 
@@ -102,6 +104,31 @@ def test_a_campaign_file_runs(toys, here, capsys):
     out = capsys.readouterr().out
     assert "not timed" not in out
     assert "<i>" in out
+
+
+@pytest.mark.parametrize(
+    ("typed", "kept"),
+    [
+        ("{here}/x.toml", "x.toml"),
+        ("{here}/in/x.toml", "in/x.toml"),
+        ("{other}/x.toml --out {other}/r", "x.toml"),
+        ("-m HBVM() -p {here}/in/m.py:f(a='/')", "--problem in/m.py:f(a='/') --method HBVM()"),
+        ("-m HBVM() -p {other}/m.py:f(a='/')", "--problem m.py:f(a='/') --method HBVM()"),
+        ("-m HBVM() -p ../m.py:f()", "--problem ../m.py:f() --method HBVM()"),
+    ],
+)
+def test_the_command_that_is_kept_has_no_folder_of_this_machine(
+    typed, kept, here, tmp_path_factory, monkeypatch
+):
+    other, commands = tmp_path_factory.mktemp("other"), []
+    monkeypatch.setattr(run, "carry_out", lambda campaign, out, command, **_: commands.append(command))
+    monkeypatch.setattr(run, "opened", lambda campaign, name: campaign)
+    monkeypatch.setattr(run, "show", lambda campaign, store: None)
+    (here / "in").mkdir()
+    for folder in (here, here / "in", other):
+        (folder / "x.toml").write_text('name = "x"\nproblems = ["kepler()"]\nmethods = [{use = "HBVM()"}]\n')
+    assert cli.main(["run", *typed.format(here=here, other=other).split()]) == 0
+    assert [shlex.split(command) for command in commands] == [["hbvm-bench", "run", *kept.split()]]
 
 
 def test_ctrl_c_keeps_what_is_finished_and_a_rerun_goes_on(toys, here):
