@@ -10,6 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Goal
+from hbvm_bench.commands.paper import PARTS
 from hbvm_bench.report import html, markdown
 from hbvm_bench.report.campaign import document
 from hbvm_bench.report.document import (
@@ -210,7 +211,7 @@ def stored_document(name: str) -> Document:
         return endure.document(read_endure(folder))
     if name == "automatic":
         return automatic.document(automatic_by_kind(folder))
-    return paper.document(kept.load(folder))
+    return paper.document(kept.load(folder), PARTS)
 
 
 @pytest.mark.parametrize("name", ["race", "endure", "automatic", "paper"])

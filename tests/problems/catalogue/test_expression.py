@@ -66,20 +66,35 @@ WORDS = "q1 p2 k pi sin sqrt( cos( log ** 0.5 1e3 1e400 3/2 == and if else lambd
 MORE = "__class__ import // 0x1F f'{q}' := await yield *q"
 SIGNS = "qpt2 +-*/^()[]{}'\",.:=<@\\#%|&~!j²é\x00_\n"
 PIECES = st.sampled_from([*WORDS.split(), *MORE.split(), *SIGNS])
-# 1,100 examples in all; measured: 1.5 s.
 FUZZ = settings(deadline=None, suppress_health_check=list(HealthCheck), database=None)
 
 
-@settings(FUZZ, max_examples=500)
-@given(st.lists(PIECES, max_size=14).map("".join))
-def test_any_mixture_of_pieces_is_read_or_refused_with_its_column(text):
-    _outcome(text)
+def fuzz(few, many):
+    """Parametrize a test by its number of examples: few, and many with the slow tests.
+
+    1,100 in all, measured 1.5 s, and 10,500, measured 14 s.
+    """
+    return pytest.mark.parametrize("examples", [few, pytest.param(many, marks=pytest.mark.slow)])
 
 
-@settings(FUZZ, max_examples=300)
-@given(st.text(max_size=60))
-def test_any_text_is_read_or_refused_with_its_column(text):
-    _outcome(text)
+@fuzz(500, 4500)
+def test_any_mixture_of_pieces_is_read_or_refused_with_its_column(examples):
+    @settings(FUZZ, max_examples=examples)
+    @given(st.lists(PIECES, max_size=14).map("".join))
+    def check(text):
+        _outcome(text)
+
+    check()
+
+
+@fuzz(300, 3000)
+def test_any_text_is_read_or_refused_with_its_column(examples):
+    @settings(FUZZ, max_examples=examples)
+    @given(st.text(max_size=60))
+    def check(text):
+        _outcome(text)
+
+    check()
 
 
 def _grown(children):
@@ -120,17 +135,21 @@ LEAVES = st.sampled_from(
 )
 
 
-@settings(FUZZ, max_examples=300)
-@given(st.recursive(LEAVES, _grown, max_leaves=8))
-def test_a_formula_means_what_it_says(pair):
-    text, value = pair
-    text = f"({text}) + q2*p2*k"
-    system = expression.hamiltonian(text, parameters={"k": 0.3})
-    y = np.array([0.4, -0.7, 1.1, 0.2])
-    found = emit.numpy(system, "hamiltonian")(0.0, y, system.pack())[0]
-    expected = value(y[:2], y[2:], 0.3) + y[1] * y[3] * 0.3
-    # Powers are expanded to products and half-integer ones to roots: measured 2e-14 relative.
-    assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
+@fuzz(300, 3000)
+def test_a_formula_means_what_it_says(examples):
+    @settings(FUZZ, max_examples=examples)
+    @given(st.recursive(LEAVES, _grown, max_leaves=8))
+    def check(pair):
+        text, value = pair
+        text = f"({text}) + q2*p2*k"
+        system = expression.hamiltonian(text, parameters={"k": 0.3})
+        y = np.array([0.4, -0.7, 1.1, 0.2])
+        found = emit.numpy(system, "hamiltonian")(0.0, y, system.pack())[0]
+        expected = value(y[:2], y[2:], 0.3) + y[1] * y[3] * 0.3
+        # Powers are expanded to products and half-integer ones to roots: measured 2e-14 relative.
+        assert found == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+    check()
 
 
 @pytest.mark.parametrize(
