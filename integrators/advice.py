@@ -29,7 +29,9 @@ SEARCH = 8  # lengths of steps tried for each method
 ROUNDS = 5  # timings of a candidate, of which the fastest counts
 SAFETY = 0.3  # the share of the accuracy that an expected error may take: a piece is not the whole
 NEIGHBOUR = 1e-9  # relative distance at which a neighbouring trajectory starts
-APART = 1e4  # growth of its distance beyond which motion counts as irregular, and pieces are halved
+# Growth of its distance beyond which motion counts as irregular, and pieces are halved: if it also is so many
+# times as far in the second half as in the first (twice where it grows with time), or as far as this.
+APART, STEEP, FAR = 1e4, 10.0, 1e-2
 SHORTEST = 12  # steps of a piece
 WIDTH = 16.0  # ratio of long to short own steps above which fixed steps are not tried
 KEPT = 1e-13  # error of an energy that is kept
@@ -199,7 +201,10 @@ class _Piece:
             raise InputError(f"HBVM() does not reach t={self.end!r}; integrate to there and see its status.")
         self._truth, self._size = self._positions(truth[0]), float(np.abs(self._positions(truth[0])).max())
         beside = self._states(HBVM(), problem.y0 * (1.0 + NEIGHBOUR * (-1.0) ** np.arange(problem.y0.size)))
-        return beside is not None and self._distance(beside[0])[0] > APART * NEIGHBOUR
+        if beside is None:
+            return False
+        far, early = self._distance(beside[0])
+        return far > APART * NEIGHBOUR and (far > STEEP * early or far > FAR)
 
     @property
     def varying(self) -> bool:

@@ -33,8 +33,8 @@ MOMENTS = 3
 PER_OCTAVE = 32
 _UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
 RATIOS = np.append(0.5 * _UP[:-1], _UP)
-"""Steps of varying length are so many times as long as the step before, where nothing else asks for more or
-less: there are tables for these ratios."""
+"""Steps of varying length are so many times as long as the step before, with up to 16 stages, where nothing
+else asks for more or less: there are tables for these ratios. Lanes do not use them."""
 
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move
 

@@ -19,7 +19,8 @@ COEFFICIENTS = 8  # that a step is judged by; see `Context.estimators`
 class Control:
     """Writes the end of a step.
 
-    Judging and aiming follow `estimate`, `longer` and `accepts` there line by line, but for the last bits.
+    Judging and aiming follow `estimate`, `longer` and `accepts` there line by line, but for the last bits
+    and for lengths that are not rounded to ratios with tables, of which lanes have none.
 
     Parameters
     ----------

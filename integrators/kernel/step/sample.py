@@ -119,6 +119,7 @@ def part_step(ctx, side, part, known):
     else:
         predict(side, ctx, ctx.length, 1.0)
     take_sizes(side)
+    side.rate = ctx.rate  # not that of another partial step: states depend on nothing but where they are
     outcome = settle_part(ctx, side)
     return finish(side) if outcome == DONE else outcome
 

@@ -9,7 +9,7 @@ from integrators import HBVM, Gauss, LineIntegral
 from integrators.protocol import Status
 from problems import Foreign, Problem
 
-STIFF = {"stiff_chain": {"omega": 1e3}, "henon_heiles": {}}
+OPTIONS = {"stiff_chain": {"omega": 1e3}}
 
 
 def robertson(t, y, dy):
@@ -25,6 +25,8 @@ CASES = [
     ("henon_heiles", Gauss(s=3, h=0.3, solver="blended")),
     ("henon_heiles", HBVM(tol=1e-10)),
     ("henon_heiles", HBVM(k=8, s=4, tol=1e-8)),
+    ("fput", HBVM(k=16, s=14, tol=1e-12)),
+    ("fput", HBVM(k=20, s=14, tol=1e-12)),
     ("robertson", HBVM(k=6, s=3, tol=1e-4)),  # Newton takes over, with a Jacobian by differences
     ("robertson", HBVM(k=6, s=3, tol=1e-4, solver="newton")),
     ("henon_heiles", LineIntegral(k=8, s=4, h=0.3, invariants=["energy"])),
@@ -36,7 +38,7 @@ TIMES = np.array([0.31, 0.9, 2.5, 2.6, 7.3])
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("name", "method"), CASES, ids=repr)
 def test_pieces_checkpoints_and_the_whole_are_the_same(name, method, sign):
-    problem = ROBERTSON if name == "robertson" else problems.load(name, **STIFF[name])
+    problem = ROBERTSON if name == "robertson" else problems.load(name, **OPTIONS.get(name, {}))
     program = method.compile(problem.system)
     times = sign * TIMES
     whole = program.start(problem.y0, problem.par).advance(times)
