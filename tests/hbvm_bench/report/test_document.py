@@ -3,6 +3,7 @@
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from shutil import copytree
 from typing import get_args
 
 import numpy as np
@@ -202,9 +203,9 @@ def test_the_goals_of_a_campaign_stand_in_its_report(tmp_path, undrawn):
     assert [row.split(" | ")[-1] for row in rows] == ["reached |", "missed |"]
 
 
-def stored_document(name: str) -> Document:
-    """Return a committed report, made again from what is stored beside it."""
-    folder = REPORTS / name
+def stored_document(folder: Path) -> Document:
+    """Return a report, made again from what is stored beside it."""
+    name = folder.name
     if name == "race":
         return race.document(results.load(folder), results.by_kind(folder))
     if name == "endure":
@@ -215,8 +216,9 @@ def stored_document(name: str) -> Document:
 
 
 @pytest.mark.parametrize("name", ["race", "endure", "automatic", "paper"])
-def test_a_stored_report_is_redrawn_with_the_same_markdown(name, undrawn):
-    made = stored_document(name)
+def test_a_stored_report_is_redrawn_with_the_same_markdown(name, undrawn, tmp_path):
+    folder = copytree(REPORTS / name, tmp_path / name)  # what is read may be evaluated anew and written
+    made = stored_document(folder)
     assert made.failed == []
     earlier = ", with an earlier version of this code"  # stands there where the code has changed since
     text = (REPORTS / name / made.name).read_text(encoding="utf-8").replace(earlier, "")
