@@ -182,6 +182,7 @@ def test_components_that_are_0_at_first_do_not_keep_steps_short():
     assert made.stats.steps < 50  # measured 24; 218 where each block is judged by its own size
 
 
+@pytest.mark.slow
 def test_robertsons_chemistry_to_its_published_end_at_1e11():
     # F. Mazzia, C. Magherini, Test Set for Initial Value Problem Solvers, release 2.4.
     published = np.array([0.2083340149701255e-07, 0.8333360770334713e-13, 0.9999999791665050])

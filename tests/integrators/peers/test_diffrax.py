@@ -142,7 +142,11 @@ def test_a_field_that_is_not_a_number_ends_in_underflow_too():
     assert solution.status is Status.NOT_FINITE
 
 
-@pytest.mark.parametrize("method", [ReversibleHeun(h=0.01), Dopri8(rtol=1e-9, atol=1e-11)], ids=repr)
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param(ReversibleHeun(h=0.01), marks=pytest.mark.slow), Dopri8(rtol=1e-9, atol=1e-11)],
+    ids=repr,
+)
 def test_time_runs_backwards_and_what_that_compiles_is_said(method):
     def H(t, q, p, m):
         return p[0] * p[0] / 2 - m.cos(q[0]) - q[0] * m.sin(t) / 3
@@ -164,7 +168,14 @@ def test_a_second_program_compiles_nothing():
     assert again.compile_seconds == 0.0
 
 
-@pytest.mark.parametrize("method", [Dopri8(rtol=1e-9, atol=1e-9), *(solver(h=0.3) for solver in FIXED[1:])])
+@pytest.mark.parametrize(
+    "method",
+    [
+        Dopri8(rtol=1e-9, atol=1e-9),
+        FIXED[1](h=0.3),
+        *(pytest.param(solver(h=0.3), marks=pytest.mark.slow) for solver in FIXED[2:]),
+    ],
+)
 def test_an_end_is_met_by_diffeqsolve_alone(method):
     problem = testing.pendulum()
     fixed = getattr(method, "h", None)
