@@ -314,7 +314,8 @@ def _why(piece: _Piece, proposals: tuple[Proposal, ...], reached: bool, accuracy
     end = piece.end if piece.chaotic else piece.problem.t_end
     words = [f"expected to be off by {first.position:.1g} at t={end:g}, and to take {first.seconds:.2g} s"]
     if not reached:
-        words[0] += f", the best that was found: {accuracy:g} is out of reach in double precision."
+        far = "out of reach" if first.position > accuracy else "hardly to be relied on"
+        words[0] += f", the best that was found: {accuracy:g} is {far} in double precision."
     elif len(proposals) > 1:
         words[0] += f", the fastest of {len(proposals)} settings that meet {accuracy:g}."
     else:
