@@ -76,15 +76,15 @@ def test_an_error_of_a_function_stays_in_its_thread(monkeypatch):
         system = problems.Foreign(f, dim=2)
         return HBVM(k=4, s=2, h=0.1).compile(system).start([1.0, 0.0]).advance([1.0])
 
-    alone, inner, others = run(good), engine.raise_error, []
+    alone, inner, others = run(good), engine.raise_kept, []
 
-    def raise_error():
+    def raise_kept():
         if raised:
             raised.clear()
             others.append(in_thread(lambda: run(good)))
         inner()
 
-    monkeypatch.setattr(engine, "raise_error", raise_error)
+    monkeypatch.setattr(engine, "raise_kept", raise_kept)
     made = run(bad)
     assert (made.status, len(others)) == (Status.USER_ERROR, 1)
     assert "LookupError (mine)" in made.reason

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from integrators.kernel.native import binary, store
+from integrators.kernel.native import binary, raised, store
 from integrators.kernel.native.field import SOURCES, build
 from problems import Problem, emit
 from problems.calculus.function import Function
@@ -50,6 +50,7 @@ class EventFunction:
         except InputError as refused:
             self._g, self._wanted = g, _wanted(g, refused)
             self._check(problem, refused)
+            raised.expect_callbacks()
             kind: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
             self._alive = kind(self._call)
             address = ctypes.cast(self._alive, ctypes.c_void_p).value
@@ -92,9 +93,12 @@ class EventFunction:
 
     def _call(self, t: int, states: int, par: int, values: int) -> None:
         """Evaluate state by state; equal ones that follow each other only once."""
-        found = _numbers(values, LANES + 1)
-        found[:LANES] = np.nan
         try:
+            found = _numbers(values, LANES + 1)
+            found[:LANES] = np.nan
+            if raised.kept() is not None:
+                found[LANES] = 1.0
+                return
             times, dim = _numbers(t, LANES).tolist(), self._system.dim
             columns = _numbers(states, LANES * dim).reshape(dim, LANES).T.copy()
             given = self._parameters(_numbers(par, self._system.n_par).copy())
@@ -106,7 +110,7 @@ class EventFunction:
                     found[i] = self._evaluate(times[i], columns[i].copy(), given)
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
-            found[LANES] = 1.0
+            _numbers(values, LANES + 1)[LANES] = 1.0
 
 
 class _Raised(threading.local):

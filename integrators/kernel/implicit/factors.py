@@ -6,6 +6,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from integrators.kernel.native.raised import expect_callbacks
+
 Complex = NDArray[np.complex128]
 
 FACTORIZE, SOLVE = range(2)
@@ -53,6 +55,7 @@ class Factors:
         self._dense = rows.size > DENSE * n * n
         if not self._dense:
             self._pattern = _Pattern(rows, columns, n)
+        expect_callbacks()
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._called)
         self.address: int = ctypes.cast(self._callback, ctypes.c_void_p).value or 0
 

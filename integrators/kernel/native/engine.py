@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from integrators.kernel.native import binary, store
-from integrators.kernel.native.foreign import raise_error
+from integrators.kernel.native.raised import Interrupts, raise_kept
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, WALK, PART = range(4)
@@ -57,9 +57,12 @@ class Engine:
     def __call__(self, *arguments: int, **named: int) -> int:
         """Call it; missing arguments are 0. The interpreter's lock is released meanwhile.
 
-        What a field in Python raised is raised here, as a `UserError`; the memory holds what was made before.
+        What a field in Python raised is raised here, as a `UserError`, and Ctrl-C as it is; the memory holds
+        what was made before.
         """
         rest = [named.get(name, 0) for name in self._arguments[len(arguments) :]]
-        outcome = self._function(*arguments, *rest)
-        raise_error()
+        function = self._function
+        with Interrupts():
+            outcome = function(*arguments, *rest)
+        raise_kept()
         return outcome

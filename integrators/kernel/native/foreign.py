@@ -1,32 +1,20 @@
 """Fields that are not traced, behind the kernel's ``void(t, stages, par, values)``.
 
 A numba function is wrapped by numba and called from machine code. Any other Python
-function is called back, under the interpreter's lock. Errors that a callback cannot
-let through are kept here until the kernel has returned.
+function is called back, under the interpreter's lock.
 """
 
 import ctypes
-import threading
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from integrators.kernel.native import binary
+from integrators.kernel.native import binary, raised
 from integrators.kernel.native.field import ONE_BY_ONE, compile_field
-from integrators.protocol import UserError
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
-
-
-class _Raised(threading.local):
-    """What a user's function has raised; a callback runs in the thread that has called the kernel."""
-
-    error: BaseException | None = None
-
-
-_raised = _Raised()
 
 
 def field_of(system: System, what: str, lanes: int) -> binary.Native:
@@ -48,21 +36,6 @@ def field_of(system: System, what: str, lanes: int) -> binary.Native:
             system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
         address, _ = system.native[lanes]
     return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
-
-
-def raise_error() -> None:
-    """Raise what a function of a user has raised in this thread since the last call.
-
-    Raises
-    ------
-    integrators.protocol.UserError
-        For its exceptions; Ctrl-C and the like are raised as they are.
-    """
-    error, _raised.error = _raised.error, None
-    if isinstance(error, Exception):
-        raise UserError(error) from error
-    if error is not None:
-        raise error
 
 
 def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
@@ -140,11 +113,11 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
         return np.frombuffer(kind.from_address(address))
 
     def field(t: int, stages: int, par: int, values: int) -> None:
-        out = view(block, values).reshape(dim, lanes)
-        out[:] = np.nan
-        if _raised.error is not None:
-            return
         try:
+            out = view(block, values).reshape(dim, lanes)
+            out[:] = np.nan
+            if raised.kept() is not None:
+                return
             times = view(line, t).tolist()
             states = view(block, stages).reshape(dim, lanes).T.copy()
             given = view(numbers, par).copy() if size else np.empty(0)
@@ -159,8 +132,9 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
                     behind = time, state, derivative
             out[:] = derivatives.T
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
-            _raised.error = error
+            raised.keep(error)
 
+    raised.expect_callbacks()
     kind: Callable[..., Any] = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
     made: Any = kind(field)
     address = ctypes.cast(made, ctypes.c_void_p).value

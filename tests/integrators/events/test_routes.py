@@ -229,13 +229,16 @@ print(made.status, made.reason, len(made.events["g"]))
 )
 def test_ctrl_c_is_heard(g):
     code = SLOW.format(g=g, events="Event(g, name='g')")
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
-    assert child.stdout is not None
-    child.stdout.readline()
-    with pytest.raises(subprocess.TimeoutExpired):
-        child.wait(0.5)
-    child.send_signal(signal.SIGINT)
-    out, _ = child.communicate(timeout=10)  # measured a tenth of a second on a quiet machine
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        with pytest.raises(subprocess.TimeoutExpired):
+            child.wait(0.5)
+        child.send_signal(signal.SIGINT)
+        try:
+            out, _ = child.communicate(timeout=60)  # measured a tenth of a second on a quiet machine
+        finally:
+            child.kill()
     words = out.split()
     assert words[0] == "interrupted"
     assert int(words[-1]) > 10
