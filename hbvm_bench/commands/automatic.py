@@ -29,7 +29,7 @@ def automatic(
     ] = False,
     limit: Annotated[
         float, typer.Option(help="With --general: seconds after which a case is given up.")
-    ] = 30.0,
+    ] = 120.0,
     avx2: Annotated[bool, typer.Option("--avx2", help=machine.AVX2)] = False,
     out: Annotated[
         Path | None,
@@ -42,9 +42,8 @@ def automatic(
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).
 
     The cases are kept in runs/automatic, and a rerun does only what is missing there.
-    With --general: the campaign general, or a part of it: van der Pol's equation, Robertson's chemistry,
-    a driven pendulum and Arenstorf's orbit against their known ends, HBVM() beside Radau and DOP853; and
-    a stiff chain at a step a hundred times as long as one at which the fixed-point iteration fails.
+    With --general: the campaign general, or a part of it: stiff, driven and decaying systems against their
+    known ends, HBVM() beside SciPy's Radau and DOP853 and heyoka.
     """
     if general and (avx2 or out is not None):
         raise InputError("--avx2 and --out do not go with --general; leave them out.")
