@@ -44,29 +44,15 @@ code grows with the term and not with the number of bodies. Processor seconds of
 
 @dataclass(frozen=True)
 class Times:
-    """What one system took, in processor seconds.
-
-    Attributes
-    ----------
-    problem : str
-        As it prints.
-    unknowns : int
-        Length of its state.
-    trace, emit : float
-        Seconds.
-    lines : int
-        Of the emitted source.
-    scalar, lanes : float
-        Seconds of numba for one state, and for `LANES` stages at once.
-    """
+    """What one system took, in processor seconds."""
 
     problem: str
     unknowns: int
     trace: float
     emit: float
-    lines: int
-    scalar: float
-    lanes: float
+    lines: int  # of the emitted source
+    scalar: float  # numba for one state
+    lanes: float  # and for `LANES` stages at once
 
 
 def measure(text: str) -> Times:

@@ -43,24 +43,12 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Attributes
-    ----------
-    what : str
-        In a word or two.
-    state : {"ok", "note", "bad"}
-        ``note`` is good to know; ``bad`` makes the results incomplete or their times doubtful.
-    found : str
-        What it is.
-    advice : str
-        What to do about it; empty where there is nothing to do.
-    """
-
-    what: str
-    state: State
-    found: str
-    advice: str = ""
+    what: str  # in a word or two
+    state: State  # ``note`` is good to know; ``bad`` makes the results incomplete or their times doubtful
+    found: str  # what it is
+    advice: str = ""  # what to do about it; empty where there is nothing to do
 
 
 def examine(*, calibration: bool = True) -> dict[str, list[Finding]]:

@@ -34,28 +34,14 @@ WARM_UP = 16  # trajectories
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """What a batch returned of its members.
+    """What a batch returned of its members."""
 
-    Attributes
-    ----------
-    y : ndarray, shape (n, dim)
-        States at the end; NaN where a trajectory did not arrive.
-    status : list of Status
-        How each ended.
-    reason : str
-        That of the first that failed.
-    steps, evaluations : int or None
-        Over all.
-    seconds : float
-        Of integrating; preparing the batch, or making a stepper for each start, is left out.
-    """
-
-    y: Array
-    status: list[Status]
-    reason: str
-    steps: int
+    y: Array  # states at the end, shape (n, dim); NaN where a trajectory did not arrive
+    status: list[Status]  # of each
+    reason: str  # that of the first that failed
+    steps: int  # over all, as the next
     evaluations: int | None
-    seconds: float
+    seconds: float  # of integrating; preparing the batch, or making a stepper for each start, is left out
 
 
 def prepared(
@@ -183,27 +169,13 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
 
 @dataclass(frozen=True, eq=False)
 class EnsembleRun:
-    """An ensemble, ready to be timed.
-
-    Attributes
-    ----------
-    program : Program
-        Compiled.
-    starts : ndarray, shape (n, dim)
-        Where the trajectories start.
-    problem : Problem
-        Parameters and span.
-    sample : str or None
-        How one trajectory meets the end.
-    par : ndarray, shape (n, n_par), optional
-        Parameters of each; the problem's own by default.
-    """
+    """An ensemble, ready to be timed."""
 
     program: Program
-    starts: Array
-    problem: Problem
-    sample: str | None
-    par: Array | None = None
+    starts: Array  # where the trajectories start, shape (n, dim)
+    problem: Problem  # its parameters and span
+    sample: str | None  # how one trajectory meets the end
+    par: Array | None = None  # parameters of each, shape (n, n_par); the problem's own by default
 
     @classmethod
     def of(cls, problem: Problem, method: MethodBase, program: Program, asked: Ensemble) -> "EnsembleRun":

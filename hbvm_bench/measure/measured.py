@@ -18,65 +18,30 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Measured:
-    """Everything that a metric may look at.
-
-    Attributes
-    ----------
-    problem : Problem
-        What was integrated.
-    t, y : ndarray, shapes (n,) and (n, dim)
-        The samples.
-    errors : dict of ndarray, shape (n,)
-        Errors of the invariants by name, relative where that has a meaning.
-    guards : dict of ndarray, shape (n,)
-        Quantities that a symmetry keeps at exactly zero.
-    distance : ndarray, shape (n,)
-        Largest distance of a body (or of q) from the origin.
-    position_t, position, phase : ndarray, shape (m,)
-        Times of the reference that were reached, the error of the position there, and how
-        far in time the run is ahead of the reference along its trajectory.
-    reference : Reference or None
-        The trusted solution, where there is one.
-    complete : bool
-        Whether the end time was reached.
-    t_stop : float
-        Where the method stopped.
-    counters, compile, timing
-        Work and time.
-    trajectories : int
-        More than one for an ensemble: ``y`` then has the end state of each, and the errors
-        are those of each against its own start.
-    peak_gib : float or None
-        Largest resident memory of the process.
-    laws : dict of Law
-        How the error of each invariant grows.
-    drift : dict of ndarray
-        What the laws were found from: ``t`` of shape (n,), and the errors by invariant, of
-        shape (starts, n).
-    reversal : float or str
-        Distance from the start after integrating there and back, or why there is none.
-    """
+    """Everything that a metric may look at."""
 
     problem: Problem
-    t: Array
-    y: Array
-    errors: dict[str, Array]
-    guards: dict[str, Array]
-    distance: Array
-    position_t: Array
-    position: Array
-    phase: Array
-    reference: Reference | None
-    complete: bool
+    t: Array  # of the samples, shape (n,)
+    y: Array  # shape (n, dim)
+    errors: dict[str, Array]  # of the invariants by name, relative where that has a meaning, shape (n,)
+    guards: dict[str, Array]  # what a symmetry keeps at exactly zero, shape (n,)
+    distance: Array  # largest of a body (or of q) from the origin, shape (n,)
+    position_t: Array  # times of the reference that were reached, shape (m,)
+    position: Array  # the error of the position there
+    phase: Array  # how far in time the run is ahead of the reference along its trajectory
+    reference: Reference | None  # the trusted solution, where there is one
+    complete: bool  # whether the end time was reached
     t_stop: float
     counters: Counters = field(default_factory=Counters)
     compile: Compile | None = None
     timing: Timing | None = None
+    # of an ensemble more than one: ``y`` has the end of each, and its errors are those against its own start
     trajectories: int = 1
-    peak_gib: float | None = None
-    laws: dict[str, Law] = field(default_factory=dict)
+    peak_gib: float | None = None  # largest resident memory of the process
+    laws: dict[str, Law] = field(default_factory=dict)  # how the error of each invariant grows
+    # what the laws were found from: ``t`` of shape (n,), and the errors by invariant, of shape (starts, n)
     drift: dict[str, Array] = field(default_factory=dict)
-    reversal: float | str = "not asked for"
+    reversal: float | str = "not asked for"  # distance from the start after integrating there and back
     extra: dict[str, Array] = field(default_factory=dict)
 
     def series(self) -> dict[str, Array]:

@@ -18,43 +18,19 @@ GUARD_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Metric:
-    """One thing that is measured on every case.
+    """One thing that is measured on every case."""
 
-    Attributes
-    ----------
-    key : str
-        The name on the command line and in JSON.
-    label, short, unit : str
-        For sentences and axes, for column heads.
-    better : {"lower", None}
-        Which way is better; ``None`` where neither is.
-    scale : {"log", "linear"}
-        For axes and number formats.
-    function : callable
-        From `Measured` to the number, or to the sentence that says why there is none.
-    description : str
-        One sentence for readers.
-    same_trajectory : bool
-        Whether the number means something only on the trajectory that was asked
-        for, so that it is void where a symmetry guard is violated.
-    whole_span : bool
-        Whether the number needs the whole span, so that it is void for a case
-        that ended early.
-    problem : str or None
-        The only problem that has it, if it is not for all.
-    """
-
-    key: str
-    label: str
-    short: str
+    key: str  # the name on the command line and in JSON
+    label: str  # for sentences and axes
+    short: str  # for column heads
     unit: str
-    function: Quantity
-    description: str
-    better: Literal["lower"] | None = "lower"
-    scale: Literal["log", "linear"] = "log"
-    same_trajectory: bool = False
-    whole_span: bool = True
-    problem: str | None = None
+    function: Quantity  # from `Measured` to the number, or to the sentence that says why there is none
+    description: str  # one sentence for readers
+    better: Literal["lower"] | None = "lower"  # which way is better; ``None`` where neither is
+    scale: Literal["log", "linear"] = "log"  # for axes and number formats
+    same_trajectory: bool = False  # void where a symmetry guard is violated
+    whole_span: bool = True  # void for a case that ended early
+    problem: str | None = None  # the only problem that has it, if it is not for all
 
 
 METRICS: dict[str, Metric] = {}

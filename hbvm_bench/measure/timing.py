@@ -34,26 +34,14 @@ CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "thread": t
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A whole integration that returns its end state only, ready to be timed.
-
-    Attributes
-    ----------
-    program : Program
-        Compiled.
-    y0, par : ndarray
-        Where it starts, and the parameters.
-    t0, t_end : float
-        The span.
-    sample : str or None
-        How the end time is met; see `integrators.protocol.MethodBase.to_end`.
-    """
+    """A whole integration that returns its end state only, ready to be timed."""
 
     program: Program
     y0: NDArray[np.float64]
     par: NDArray[np.float64]
     t0: float
     t_end: float
-    sample: str | None
+    sample: str | None  # how the end time is met; see `integrators.protocol.MethodBase.to_end`
 
     @classmethod
     def of(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":

@@ -54,24 +54,12 @@ class Commands:
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of a publication beside what was measured.
-
-    Attributes
-    ----------
-    words : str
-        The claim.
-    paper : str
-        What the publication gives for it: a number, a figure.
-    here : str
-        What came out.
-    verdict : {"holds", "partly", "no"}
-        See `VERDICTS`.
-    """
+    """A sentence of a publication beside what was measured."""
 
     words: str
-    paper: str
-    here: str
-    verdict: str
+    paper: str  # what the publication gives for it: a number, a figure
+    here: str  # what was measured
+    verdict: str  # see `VERDICTS`
 
 
 @dataclass(frozen=True)
@@ -98,21 +86,11 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Results:
-    """Cases as rows, which a page sorts and filters.
-
-    Attributes
-    ----------
-    columns : sequence of Metric
-        What is shown of every case.
-    problems : sequence of Ranked
-        The rows; of the i-th, counted from 1, the section has the anchor ``problem-i``.
-    looks : mapping of str to Look
-        By method.
-    """
+    """Cases as rows, which a page sorts and filters."""
 
     columns: Sequence[Metric]
-    problems: Sequence[Ranked]
-    looks: Mapping[str, Look]
+    problems: Sequence[Ranked]  # the section of the i-th, counted from 1, has the anchor ``problem-i``
+    looks: Mapping[str, Look]  # by method
 
     @property
     def libraries(self) -> list[str]:
@@ -149,27 +127,13 @@ class Details:
 
 @dataclass(frozen=True)
 class Section:
-    """Blocks under a heading.
-
-    Attributes
-    ----------
-    title : str
-        The heading.
-    blocks : sequence of Block
-        What stands under it.
-    key : str
-        Its anchor.
-    code : str
-        What stands after the title as code, such as the problem.
-    nav : str
-        What a page's navigation calls it; empty for what is not in there.
-    """
+    """Blocks under a heading."""
 
     title: str
     blocks: Sequence["Block"]
-    key: str
-    code: str = ""
-    nav: str = ""
+    key: str  # its anchor
+    code: str = ""  # what stands after the title as code, such as the problem
+    nav: str = ""  # what a page's navigation calls it; empty for what is not in there
 
 
 Block = (
@@ -184,31 +148,15 @@ Maker = tuple[str, Callable[[], Block | Sequence[Block] | None]]
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report.
-
-    Attributes
-    ----------
-    title : str
-        Its heading.
-    lead : sequence of str
-        Paragraphs before everything else.
-    blocks : sequence of Block
-        The rest.
-    looks : sequence of Look
-        Of what has a colour in its figures; no two have one number.
-    names : mapping of int to str
-        What the legends of the page call a look by its number, where that is not what its curves
-        are called.
-    name : str
-        Of the file with the markdown.
-    """
+    """A whole report."""
 
     title: str
-    lead: Sequence[str]
+    lead: Sequence[str]  # paragraphs before everything else
     blocks: Sequence[Block]
-    looks: Sequence[Look] = ()
+    looks: Sequence[Look] = ()  # of what has a colour in its figures; no two have one number
+    # what the legends of the page call a look by its number, where that is not what its curves are called
     names: Mapping[int, str] = field(default_factory=dict)
-    name: str = "README.md"
+    name: str = "README.md"  # of the file with the markdown
 
     def walk(self) -> Iterator[Block]:
         """Yield every block, in order; what holds blocks comes before them."""

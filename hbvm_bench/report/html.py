@@ -35,21 +35,11 @@ MINUS = re.compile(r"(?<![\w.=(])-(?=\d)")
 
 @dataclass(frozen=True)
 class Place:
-    """Where in a page a block stands.
+    """Where in a page a block stands."""
 
-    Attributes
-    ----------
-    level : int
-        Of the next heading.
-    colours : mapping of str to str
-        From the colour of a case to the name of the page's variable.
-    inlined : collection of str
-        Keys of the figures that stand in the page itself; the others are beside it.
-    """
-
-    level: int
-    colours: Mapping[str, str]
-    inlined: Collection[str]
+    level: int  # of the next heading
+    colours: Mapping[str, str]  # from the colour of a case to the name of the page's variable
+    inlined: Collection[str]  # keys of the figures that stand in the page itself; the others are beside it
 
     @property
     def below(self) -> "Place":

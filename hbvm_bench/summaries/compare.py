@@ -29,63 +29,31 @@ LEAST_SHARE = 0.9  # of a core; a sample that had less tells what else was runni
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that differs between two runs of a case.
-
-    Attributes
-    ----------
-    problem, method : str
-        The case.
-    what : str
-        A metric's label, ``"outcome"`` or ``"time"``.
-    before, after : str
-        Formatted.
-    """
+    """One thing that differs between two runs of a case."""
 
     problem: str
     method: str
-    what: str
+    what: str  # a metric's label, ``"outcome"`` or ``"time"``
     before: str
     after: str
 
 
 @dataclass
 class Comparison:
-    """What changed from a first run to a second one.
+    """What changed from a first run to a second one."""
 
-    Attributes
-    ----------
-    cases : int
-        Those that both have.
-    only_first, only_second : list of str
-        Cases that one of them lacks.
-    behind : list of str
-        Versions, sources and machines that differ.
-    equal, rounded : int
-        Metrics that are the same number, and that differ by rounding only.
-    changed : list of Change
-        Outcomes and metrics that differ by more.
-    timed : int
-        Times compared, each divided by the calibration beside it.
-    noise : float or None
-        Ratio of two times that is not told from 1 in a typical case; ``None`` without times.
-    slower, faster : list of Change
-        Times that differ by more than the samples' scatter explains.
-    untimed : list of str
-        Why times were not compared.
-    """
-
-    cases: int = 0
-    only_first: list[str] = field(default_factory=list)
+    cases: int = 0  # those that both have
+    only_first: list[str] = field(default_factory=list)  # cases that the other lacks
     only_second: list[str] = field(default_factory=list)
-    behind: list[str] = field(default_factory=list)
-    equal: int = 0
-    rounded: int = 0
-    changed: list[Change] = field(default_factory=list)
-    timed: int = 0
-    noise: float | None = None
-    slower: list[Change] = field(default_factory=list)
+    behind: list[str] = field(default_factory=list)  # versions, sources and machines that differ
+    equal: int = 0  # metrics that are the same number
+    rounded: int = 0  # and that differ by rounding only
+    changed: list[Change] = field(default_factory=list)  # outcomes and metrics that differ by more
+    timed: int = 0  # times compared, each divided by the calibration beside it
+    noise: float | None = None  # ratio of two times that is not told from 1 in a typical case
+    slower: list[Change] = field(default_factory=list)  # by more than the samples' scatter explains
     faster: list[Change] = field(default_factory=list)
-    untimed: list[str] = field(default_factory=list)
+    untimed: list[str] = field(default_factory=list)  # why times were not compared
 
     @property
     def unchanged(self) -> bool:

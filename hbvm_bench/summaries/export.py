@@ -26,17 +26,9 @@ FORMATS = (".csv", ".parquet")
 
 @dataclass(frozen=True)
 class Table:
-    """One of the tables.
+    """One of the tables."""
 
-    Attributes
-    ----------
-    columns : dict of type
-        ``str``, ``int``, ``float`` or ``bool`` by name; every column may be empty in a row.
-    rows : callable
-        From a record and its store to its rows.
-    """
-
-    columns: dict[str, type]
+    columns: dict[str, type]  # by name; every column may be empty in a row
     rows: Callable[[Record, Store], Iterator[Row]]
 
 

@@ -25,49 +25,21 @@ DEGREES = (1, 2, 3, 4, 5)  # of the methods for which k is given
 
 @dataclass(frozen=True)
 class Findings:
-    """What was found.
+    """What was found."""
 
-    Attributes
-    ----------
-    name : str
-        The formula, or the problem as it prints.
-    formula : str
-        The energy as LaTeX; empty where there is none, or none that can be read.
-    kind : str
-        ``"hamiltonian"``, ``"poisson"`` or ``"vector_field"``.
-    dimension : int
-        Length of the state.
-    separable : bool
-        Whether H = sum c_i p_i^2/2 + V(q, t).
-    degree : int or None
-        Of the energy as a polynomial in the state; ``None`` if it is none.
-    exact : tuple of (int, int)
-        Pairs s, k: HBVM(k, s) keeps the energy exactly; empty if it is not a polynomial.
-    cyclic : tuple of str
-        Positions that do not occur: their momenta are constant.
-    depends_on_time : bool
-        Whether the time occurs, so that the energy is not kept.
-    invariants, guards : tuple of str
-        What is known to be kept, and what stays exactly 0.
-    parameters : dict
-        Names and values.
-    engines : dict of str
-        ``None`` for each engine that accepts it, otherwise the reason.
-    """
-
-    name: str
-    formula: str
-    kind: str
-    dimension: int
-    separable: bool
-    degree: int | None
-    exact: tuple[tuple[int, int], ...]
-    cyclic: tuple[str, ...]
-    depends_on_time: bool
+    name: str  # the formula, or the problem as it prints
+    formula: str  # the energy as LaTeX; empty where there is none, or none that can be read
+    kind: str  # ``"hamiltonian"``, ``"poisson"`` or ``"vector_field"``
+    dimension: int  # length of the state
+    separable: bool  # whether H = sum c_i p_i^2/2 + V(q, t)
+    degree: int | None  # of the energy as a polynomial in the state; ``None`` if it is none
+    exact: tuple[tuple[int, int], ...]  # pairs s, k: HBVM(k, s) keeps the energy, a polynomial, exactly
+    cyclic: tuple[str, ...]  # positions that do not occur: their momenta are constant
+    depends_on_time: bool  # whether the time occurs, so that the energy is not kept
     invariants: tuple[str, ...]
-    guards: tuple[str, ...]
+    guards: tuple[str, ...]  # what stays exactly 0
     parameters: dict[str, Any]
-    engines: dict[str, str | None]
+    engines: dict[str, str | None]  # ``None`` for each engine that accepts it, otherwise the reason
 
 
 def inspect(text: str, parameters: str = "") -> Findings:

@@ -22,35 +22,17 @@ PLACE = ("position", "phase", "z_error")
 
 @dataclass(frozen=True)
 class Verdict:
-    """A goal, what was measured, and whether that reaches it.
-
-    Attributes
-    ----------
-    goal : Goal
-        As declared.
-    entry : ProblemEntry
-        The problem it is judged on.
-    words, asked, measured : str
-        What it is about, the number that was asked for, and the one that was found.
-    verdict : {"reached", "missed", "void"}
-        Void: energies are compared without positions.
-    why : str
-        Why nothing was measured, or why it is void.
-    comparison : Comparison
-        The cases that decide; for a goal without a peer it has only ours.
-    records : sequence of Record
-        Of all cases on the problem.
-    """
+    """A goal, what was measured, and whether that reaches it."""
 
     goal: Goal
-    entry: ProblemEntry
-    words: str
+    entry: ProblemEntry  # the problem it is judged on
+    words: str  # what it is about
     asked: str
     measured: str
-    verdict: Literal["reached", "missed", "void"]
-    why: str
-    comparison: Comparison
-    records: Sequence[Record]
+    verdict: Literal["reached", "missed", "void"]  # void: energies are compared without positions
+    why: str  # why nothing was measured, or why it is void
+    comparison: Comparison  # the cases that decide; for a goal without a peer it has only ours
+    records: Sequence[Record]  # of all cases on the problem
 
     @property
     def reached(self) -> bool:

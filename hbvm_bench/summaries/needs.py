@@ -21,27 +21,13 @@ ROUND_OFF = 1e-15  # an error below this is as good as any other
 
 
 class Need(NamedTuple):
-    """What somebody wants of an integrator.
-
-    Attributes
-    ----------
-    title : str
-        For readers.
-    serves : callable
-        Whether a case serves the need.
-    cost : str
-        Key of the metric that is then to be small.
-    near : float
-        Up to this factor a cost is near the best.
-    floor : float
-        Costs below it are equal.
-    """
+    """What somebody wants of an integrator."""
 
     title: str
     serves: Callable[[Record], bool]
-    cost: str
-    near: float = 2.0
-    floor: float = 0.0
+    cost: str  # key of the metric that is then to be small
+    near: float = 2.0  # up to this factor a cost is near the best
+    floor: float = 0.0  # costs below it are equal
 
 
 def table(records: Sequence[Record]) -> Table | None:

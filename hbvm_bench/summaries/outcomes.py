@@ -15,22 +15,12 @@ SIGNS: dict[State, str] = {"on": "●", "off": "◐", "ended": "○", "refused":
 
 
 class Outcome(NamedTuple):
-    """What became of all settings of a family on a problem.
+    """What became of all settings of a family on a problem."""
 
-    Attributes
-    ----------
-    state : str
-        The best that any of them did, a key of `SIGNS`.
-    reached, settings : int
-        How many of how many reached the end on the trajectory.
-    reasons : list of str
-        Why the others did not, each once, with the setting it is said of.
-    """
-
-    state: State
-    reached: int
+    state: State  # the best that any of them did, a key of `SIGNS`
+    reached: int  # settings that reached the end on the trajectory
     settings: int
-    reasons: list[str]
+    reasons: list[str]  # why the others did not, each once, with the setting it is said of
 
 
 def matrix(records: Sequence[Record]) -> tuple[list[str], dict[str, dict[str, Outcome]]]:

@@ -32,28 +32,16 @@ COMMAND = "hbvm-bench doctor --peers"
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True):
-    """One method through the harness and alone.
-
-    Attributes
-    ----------
-    problem, method, call : str
-        What was integrated, how, and what the library alone is called by.
-    seconds, alone : list of float
-        Of the processor's time: of a run through the harness, and of the library alone, one of each round.
-    steps, alone_steps : int
-        That each took.
-    difference : float
-        Largest difference of the states at the end, over the largest component.
-    """
+    """One method through the harness and alone."""
 
     problem: str
     method: str
-    call: str
-    seconds: list[float]
-    alone: list[float]
+    call: str  # what the library alone is called by
+    seconds: list[float]  # of the processor's time through the harness, one of each round
+    alone: list[float]  # and of the library alone
     steps: int
     alone_steps: int
-    difference: float
+    difference: float  # largest difference of the states at the end, over the largest component
 
     @property
     def ratio(self) -> Spread:
@@ -69,28 +57,14 @@ class Row(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PeerCheck(msgspec.Struct, frozen=True, kw_only=True):
-    """The result.
+    """The result."""
 
-    Attributes
-    ----------
-    rows : list of Row
-        In the order of `PAIRS`.
-    refused : dict of str
-        Why a pair did not run, by its method and problem.
-    machine, versions : dict
-        Where, and with what.
-    measured : str
-        When.
-    sources : str
-        The `digest` of the code that was measured.
-    """
-
-    rows: list[Row]
-    refused: dict[str, str]
+    rows: list[Row]  # in the order of `PAIRS`
+    refused: dict[str, str]  # why a pair did not run, by its method and problem
     machine: dict[str, str | int]
     versions: dict[str, str]
-    measured: str
-    sources: str = ""
+    measured: str  # the time
+    sources: str = ""  # the `digest` of the code that was measured
 
 
 def digest(methods: Iterable[str]) -> str:

@@ -26,18 +26,10 @@ ACCURACIES = (
 
 @dataclass(frozen=True)
 class Profile:
-    """The profiles of all families for one accuracy.
+    """The profiles of all families for one accuracy."""
 
-    Attributes
-    ----------
-    words : str
-        The accuracy that was asked for.
-    ratios : dict of list of float
-        By family: its work over the least, problem by problem of those that any family solves;
-        infinite where it does not reach the accuracy.
-    """
-
-    words: str
+    words: str  # the accuracy that was asked for
+    # of each family its work over the least, by problem that any family solves; infinite where it does not
     ratios: dict[str, list[float]]
 
     @property

@@ -35,24 +35,12 @@ GROUPS = {
 
 @dataclass(frozen=True)
 class Cell:
-    """One metric of one case, formatted.
-
-    Attributes
-    ----------
-    text : str
-        The number, or a dash.
-    void : bool
-        Whether the number must not be compared.
-    why : str
-        Why it is void or missing.
-    sort : float
-        For sorting; infinite where there is no number.
-    """
+    """One metric of one case, formatted."""
 
     text: str
-    void: bool
-    why: str
-    sort: float
+    void: bool  # whether the number must not be compared
+    why: str  # why it is void or missing
+    sort: float  # for sorting; infinite where there is no number
 
     @property
     def shown(self) -> str:
@@ -62,24 +50,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """One case.
-
-    Attributes
-    ----------
-    record : Record
-        As stored.
-    group : str
-        Key of `GROUPS`.
-    cells : dict of Cell
-        By metric key.
-    remark : str
-        What went otherwise than asked, what the solution warns of, and the campaign's note.
-    """
+    """One case."""
 
     record: Record
-    group: str
-    cells: dict[str, Cell]
-    remark: str
+    group: str  # key of `GROUPS`
+    cells: dict[str, Cell]  # by metric key
+    remark: str  # what went otherwise than asked, what the solution warns of, and the campaign's note
 
 
 def columns(records: Sequence[Record], keys: Sequence[str] | None = None) -> list[Metric]:

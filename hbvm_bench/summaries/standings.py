@@ -19,19 +19,11 @@ TIME = "warm_seconds"
 
 @dataclass(frozen=True)
 class Comparison:
-    """A peer's best setting beside our best one.
+    """A peer's best setting beside our best one."""
 
-    Attributes
-    ----------
-    ours, theirs : Record or None
-        Those that take least of the settings that are accurate enough; ``None`` where none is.
-    ratio : Spread or None
-        Theirs over ours; of times within each round of the timing pass.
-    """
-
-    ours: Record | None
+    ours: Record | None  # what takes least of the settings that are accurate enough
     theirs: Record | None
-    ratio: Spread | None = None
+    ratio: Spread | None = None  # theirs over ours; of times within each round of the timing pass
 
 
 def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:

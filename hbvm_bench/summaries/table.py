@@ -8,33 +8,15 @@ NONE = "–"  # in a cell: there is no such number
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text.
-
-    Attributes
-    ----------
-    title : str
-        One line.
-    head : tuple of str
-        Column heads.
-    rows : sequence of tuple of str
-        Cells.
-    note : str
-        What the columns mean, under the table.
-    words : collection of int
-        Which columns hold words; the others hold numbers.
-    key : str
-        Anchor and file name, where it has one.
-    groups : tuple of (str, int)
-        Labels over columns, each with how many it is over; may be empty.
-    """
+    """A table of text."""
 
     title: str
     head: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    note: str = ""
-    words: Collection[int] = (0,)
-    key: str = ""
-    groups: tuple[tuple[str, int], ...] = ()
+    note: str = ""  # what the columns mean, under the table
+    words: Collection[int] = (0,)  # which columns hold words; the others hold numbers
+    key: str = ""  # anchor and file name, where it has one
+    groups: tuple[tuple[str, int], ...] = ()  # labels over columns, each with how many it is over
 
     @property
     def flat_head(self) -> list[str]:

@@ -62,37 +62,17 @@ _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of a report.
+    """A figure of a report."""
 
-    Attributes
-    ----------
-    key : str
-        Its file name without the ending, and its anchor.
-    title, caption : str
-        For readers.
-    summary : str
-        What it shows, for those who do not see it.
-    svg : str
-        Self-contained.
-    png : bytes
-        The same picture.
-    plot : Plot or None
-        What it shows, as numbers.
-    motion : dict or None
-        What the page's moving view of it is made of.
-    values : bool
-        Whether its colours mean values, so that no theme may brighten them.
-    """
-
-    key: str
+    key: str  # its file name without the ending, and its anchor
     title: str
     caption: str
-    summary: str
+    summary: str  # what it shows, for those who do not see it
     svg: str
-    png: bytes
-    plot: Plot | None = None
-    motion: dict[str, Any] | None = None
-    values: bool = False
+    png: bytes  # the same picture
+    plot: Plot | None = None  # what it shows, as numbers
+    motion: dict[str, Any] | None = None  # what the page's moving view of it is made of
+    values: bool = False  # whether its colours mean values, so that no theme may brighten them
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[\w-]+", self.key):

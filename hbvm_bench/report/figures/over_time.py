@@ -52,32 +52,18 @@ class Drawn:
 
 @dataclass(frozen=True)
 class OverTime:
-    """What a figure of an error over time shows.
-
-    Attributes
-    ----------
-    key, title, caption, label : str
-        The label is the axis's.
-    values, t : str
-        Names of the series that are drawn; a name that ends in a dot is the first that begins so.
-    low, high : int
-        Powers of ten of the axis.
-    zero : bool
-        Whether "exactly 0" is a place on the axis.
-    joined : bool
-        Whether the samples are joined and binned (else: drawn as markers).
-    """
+    """What a figure of an error over time shows."""
 
     key: str
     title: str
     caption: str
-    label: str
-    values: str
-    low: int
+    label: str  # of the axis
+    values: str  # name of the series that is drawn; one that ends in a dot is the first that begins so
+    low: int  # powers of ten of the axis
     high: int
     t: str = "t"
-    zero: bool = False
-    joined: bool = True
+    zero: bool = False  # whether "exactly 0" is a place on the axis
+    joined: bool = True  # whether the samples are joined and binned (else: drawn as markers)
 
     def get(self, series: dict[str, Array]) -> tuple[Array, Array] | None:
         """Return times and values of a case; ``None`` where it has none."""

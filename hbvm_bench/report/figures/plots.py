@@ -34,31 +34,15 @@ class Axis:
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve or one cloud of points.
+    """One curve or one cloud of points."""
 
-    Attributes
-    ----------
-    case : int
-        Number of the case in the tables; 0 for what belongs to no case.
-    name : str
-        Of the case, or of what else it is.
-    x, y : ndarray, shape (n,)
-        Where it goes; what is not finite is a gap.
-    role : {"case", "law", "truth"}
-        A law is drawn thin over its case; the truth is neutral.
-    note : str
-        What the law says.
-    joined : bool
-        Whether a line goes through the points.
-    """
-
-    case: int
-    name: str
-    x: Array
+    case: int  # number of the case in the tables; 0 for what belongs to no case
+    name: str  # of the case, or of what else it is
+    x: Array  # shape (n,); what is not finite is a gap
     y: Array
-    role: Literal["case", "law", "truth"] = "case"
-    note: str = ""
-    joined: bool = True
+    role: Literal["case", "law", "truth"] = "case"  # a law is drawn thin over its case; the truth is neutral
+    note: str = ""  # what the law says
+    joined: bool = True  # whether a line goes through the points
 
 
 @dataclass(frozen=True)
@@ -74,17 +58,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Plot:
-    """All that a figure shows.
+    """All that a figure shows."""
 
-    Attributes
-    ----------
-    panels : sequence of Panel
-        Side by side.
-    kind : {"lines", "points", "paths", "dots"}
-        Curves over x, one point per case, paths in a plane, or many points per case.
-    """
-
-    panels: Sequence[Panel] = field(default_factory=list)
+    panels: Sequence[Panel] = field(default_factory=list)  # side by side
+    # curves over x, one point per case, paths in a plane, or many points per case
     kind: Literal["lines", "points", "paths", "dots"] = "lines"
 
 

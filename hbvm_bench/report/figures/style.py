@@ -79,25 +79,13 @@ DARK_NEUTRALS = {
 
 @dataclass(frozen=True)
 class Look:
-    """How one case looks.
+    """How one case looks."""
 
-    Attributes
-    ----------
-    number : int
-        Its number in the tables and figures, from 1 in the order of the campaign.
-    light, dark : str
-        Its colour in the two themes.
-    dash : tuple of float
-        On-off lengths in points; empty for a solid line.
-    marker : str
-        Of matplotlib.
-    """
-
-    number: int
-    light: str
+    number: int  # its number in the tables and figures, from 1 in the order of the campaign
+    light: str  # its colour in the two themes
     dark: str
-    dash: tuple[float, ...]
-    marker: str
+    dash: tuple[float, ...]  # on-off lengths in points; empty for a solid line
+    marker: str  # of matplotlib
 
 
 def looks(methods: Iterable[str]) -> dict[str, Look]:
