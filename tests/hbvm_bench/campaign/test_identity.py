@@ -78,7 +78,6 @@ EDITED = {
     "problems/picture.py": [False, False],
     "integrators/plugins/scipy/__init__.py": [False, False],
     "integrators/testing/rules.py": [False, False],
-    "hbvm_bench/measure/metric.py": [False, False],
     "hbvm_bench/measure/metrics.py": [False, False],
     "hbvm_bench/measure/measured.py": [True, True],
     "hbvm_bench/measure/drift.py": [True, True],
