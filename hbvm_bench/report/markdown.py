@@ -1,27 +1,11 @@
 """A document as markdown, for a code forge."""
 
 import re
-from collections.abc import Sequence
-from functools import singledispatch
+from collections.abc import Collection, Iterable, Sequence
 
 from hbvm_bench.measure.metrics import Metric
-from hbvm_bench.report.document import (
-    VERDICTS,
-    Block,
-    Claims,
-    Commands,
-    Details,
-    Document,
-    Failed,
-    Files,
-    Items,
-    Note,
-    Notice,
-    Results,
-    Section,
-    is_call,
-    pieces,
-)
+from hbvm_bench.report import document as blocks
+from hbvm_bench.report.document import VERDICTS, Block, Document, is_call, pieces
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.summaries.rows import Row, seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -30,85 +14,96 @@ from hbvm_bench.summaries.table import NONE, Table
 def markdown(document: Document) -> str:
     """Return a document as markdown with relative links to its files."""
     parts = [f"# {words(document.title)}", *map(words, document.lead)]
-    parts += [printed(block, 2) for block in document.blocks]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    return joined([*parts, *(printed(block) for block in document.blocks)]) + "\n"
 
 
-@singledispatch
 def printed(block: Block, level: int = 2) -> str:
     """Return a block as markdown; ``level`` is that of the next heading in it."""
-    raise TypeError(f"{type(block).__name__} is no block of a document.")
+    heading = "#" * level
+    match block:
+        case str():
+            return words(block)
+        case blocks.Note():
+            return words(block.text)
+        case blocks.Notice():
+            return f"**{words(block.head)}** {words(block.text)}"
+        case blocks.Items():
+            signs = (f"{i}." if block.kind == "numbered" else "-" for i in range(1, len(block.items) + 1))
+            return "\n".join(f"{sign} {words(item)}" for sign, item in zip(signs, block.items, strict=True))
+        case blocks.Commands():  # a block of code, which nothing in it can end
+            return "\n".join(f"    {one_line(line)}" for line in block.text.splitlines())
+        case blocks.Claims():
+            return _claims(block, heading)
+        case blocks.Results():
+            return _results(block, level)
+        case blocks.Files():
+            links = ", ".join(f"[{path.rpartition('/')[2]}]({path})" for path in block.files)
+            return f"{words(block.text)}: {links}."
+        case blocks.Failed():
+            return f"**Not made: {words(block.title)}** ({words(block.reason)})"
+        case blocks.Details():
+            inner = "\n\n".join(printed(one, level) for one in block.blocks)
+            return f"<details>\n<summary>{plain(block.summary)}</summary>\n\n{inner}\n\n</details>"
+        case blocks.Section():
+            title = words(block.title) + (f": {code(block.code)}" if block.code else "")
+            return joined([f"{heading} {title}", *(printed(one, level + 1) for one in block.blocks)])
+        case Table():
+            note = words(block.note) + (f" [CSV](data/{block.key}.csv)" if block.key else "")
+            rows = [[cell(text) for text in row] for row in block.rows]
+            table = lined([words(head) for head in block.flat_head], rows, block.words)
+            return joined((f"**{words(block.title)}**" * bool(block.title), table, note))
+        case Picture():
+            title, links = words(block.title), f"[SVG](figures/{block.key}.svg)"
+            links += f", [its data](data/{block.key}.csv)" if block.plot is not None else ""
+            image = f"![{title}](figures/{block.key}.png)"
+            caption = f"{words(block.caption)} {links}"
+            return "\n\n".join((f"{heading} {title}", image, words(block.summary), caption))
 
 
-@printed.register
-def _(block: str, level: int = 2) -> str:
-    return words(block)
+def joined(parts: Iterable[str]) -> str:
+    """Return those of the paragraphs that are not empty."""
+    return "\n\n".join(part for part in parts if part)
 
 
-@printed.register
-def _(block: Note, level: int = 2) -> str:
-    return words(block.text)
-
-
-@printed.register
-def _(block: Notice, level: int = 2) -> str:
-    return f"**{words(block.head)}** {words(block.text)}"
-
-
-@printed.register
-def _(block: Items, level: int = 2) -> str:
-    signs = (f"{i}." if block.kind == "numbered" else "-" for i in range(1, len(block.items) + 1))
-    return "\n".join(f"{sign} {words(item)}" for sign, item in zip(signs, block.items, strict=True))
-
-
-@printed.register
-def _(block: Commands, level: int = 2) -> str:
-    """Return a block of code, which nothing in it can end."""
-    return "\n".join(f"    {one_line(line)}" for line in block.text.splitlines())
-
-
-@printed.register
-def _(block: Claims, level: int = 2) -> str:
+def _claims(block: blocks.Claims, heading: str) -> str:
     parts = [" · ".join(f"**{count}** {VERDICTS[key]}" for key, count in block.counts.items())]
     for title, _, claims in block.groups:
         rows = [
-            (words(claim.words), words(claim.paper), words(claim.here), VERDICTS[claim.verdict])
-            for claim in claims
+            (words(one.words), words(one.paper), words(one.here), VERDICTS[one.verdict]) for one in claims
         ]
-        parts += [
-            f"{'#' * level} {words(title)}",
-            lined(("claim", "paper", "here", "verdict"), rows, range(4)),
-        ]
+        parts += [f"{heading} {words(title)}", lined(("claim", "paper", "here", "verdict"), rows, range(4))]
     return "\n\n".join(parts)
 
 
-@printed.register
-def _(block: Results, level: int = 2) -> str:
+def _results(block: blocks.Results, level: int) -> str:
     parts = []
+    several = len(block.problems) > 1
+    head = ("#", "method", "settings", *(words(metric.short) for metric in block.columns))
     for problem in block.problems:
-        several = len(block.problems) > 1
         if several:
             parts.append(f"{'#' * level} {words(problem.title)}: {code(problem.problem)}")
         for title, rows in problem.groups:
-            parts.append(f"{'#' * (level + several)} {words(title)}")
-            head = ("#", "method", "settings", *(words(metric.short) for metric in block.columns))
+            cases = [row.record.case for row in rows]
             lines = [
                 (
-                    str(block.looks[row.record.case.method].number),
-                    code(row.record.case.method),
-                    words(row.record.case.settings),
+                    str(block.looks[case.method].number),
+                    code(case.method),
+                    words(case.settings),
                     *row_cells(block.columns, row),
                 )
-                for row in rows
+                for case, row in zip(cases, rows, strict=True)
             ]
-            parts.append(lined(head, lines, (1, 2)))
             remarks = [row for row in rows if row.remark]
-            parts.append("\n".join(f"- {code(r.record.case.method)}: {words(r.remark)}." for r in remarks))
+            parts += [
+                f"{'#' * (level + several)} {words(title)}",
+                lined(head, lines, (1, 2)),
+                "\n".join(f"- {code(r.record.case.method)}: {words(r.remark)}." for r in remarks),
+            ]
     parts.append(
         "Times are medians with their quartiles. In round brackets: void, because the row is another "
         "trajectory, or only a part of the one that was asked for."
     )
-    return "\n\n".join(part for part in parts if part)
+    return joined(parts)
 
 
 def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
@@ -124,59 +119,9 @@ def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
     return made
 
 
-@printed.register
-def _(block: Files, level: int = 2) -> str:
-    links = ", ".join(f"[{path.rpartition('/')[2]}]({path})" for path in block.files)
-    return f"{words(block.text)}: {links}."
-
-
-@printed.register
-def _(block: Failed, level: int = 2) -> str:
-    return f"**Not made: {words(block.title)}** ({words(block.reason)})"
-
-
-@printed.register
-def _(block: Details, level: int = 2) -> str:
-    inner = "\n\n".join(printed(one, level) for one in block.blocks)
-    return f"<details>\n<summary>{plain(block.summary)}</summary>\n\n{inner}\n\n</details>"
-
-
-@printed.register
-def _(block: Section, level: int = 2) -> str:
-    title = words(block.title) + (f": {code(block.code)}" if block.code else "")
-    parts = [f"{'#' * level} {title}", *(printed(one, level + 1) for one in block.blocks)]
-    return "\n\n".join(part for part in parts if part)
-
-
-@printed.register
-def _(block: Table, level: int = 2) -> str:
-    """Return a table with its title before and its note after it."""
-    note = words(block.note) + (f" [CSV](data/{block.key}.csv)" if block.key else "")
-    rows = [[cell(text) for text in row] for row in block.rows]
-    table = lined([words(head) for head in block.flat_head], rows, block.words)
-    return "\n\n".join(
-        part for part in (f"**{words(block.title)}**" * bool(block.title), table, note) if part
-    )
-
-
-@printed.register
-def _(block: Picture, level: int = 2) -> str:
-    links = f"[SVG](figures/{block.key}.svg)"
-    links += f", [its data](data/{block.key}.csv)" if block.plot is not None else ""
-    title = words(block.title)
-    return "\n\n".join(
-        (
-            f"{'#' * level} {title}",
-            f"![{title}](figures/{block.key}.png)",
-            words(block.summary),
-            f"{words(block.caption)} {links}",
-        )
-    )
-
-
-def lined(head: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] | object) -> str:
+def lined(head: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[int]) -> str:
     """Return a table of cells that are markdown already; the columns ``left`` are words."""
-    rule = [":--" if index in left else "--:" for index in range(len(head))]  # type: ignore[operator]
+    rule = [":--" if index in left else "--:" for index in range(len(head))]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, rule, *rows))
 
 

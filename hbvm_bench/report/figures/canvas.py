@@ -150,22 +150,18 @@ def _rounded(match: re.Match[str]) -> str:
     return f'{match[1]}="{value}"'
 
 
-def small(png: bytes) -> bytes:
-    """Return a picture with a palette of its own: a third of the bytes, and no difference to the eye."""
-    return _with_palette(png, "RGB")
-
-
 def with_small_images(svg: str) -> str:
     """Return a drawing whose embedded images have palettes: a third of the characters."""
-    return re.sub(r"(?<=data:image/png;base64,)[^\"]+", _smaller, svg)
+
+    def smaller(found: re.Match[str]) -> str:
+        before = base64.b64decode(found[0])
+        return base64.b64encode(min(before, small(before, "RGBA"), key=len)).decode("ascii")
+
+    return re.sub(r"(?<=data:image/png;base64,)[^\"]+", smaller, svg)
 
 
-def _smaller(found: re.Match[str]) -> str:
-    before = base64.b64decode(found[0])
-    return base64.b64encode(min(before, _with_palette(before, "RGBA"), key=len)).decode("ascii")
-
-
-def _with_palette(png: bytes, mode: str) -> bytes:
+def small(png: bytes, mode: str = "RGB") -> bytes:
+    """Return a picture with a palette of its own: a third of the bytes, and no difference to the eye."""
     from PIL import Image  # comes with matplotlib
 
     method = Image.Quantize.MEDIANCUT if mode == "RGB" else Image.Quantize.FASTOCTREE  # with transparency
@@ -175,15 +171,7 @@ def _with_palette(png: bytes, mode: str) -> bytes:
 
 
 def inline_svg(picture: Picture, colours: Mapping[str, str]) -> str:
-    """Return the SVG for a page: its colours are the page's variables, its size is the page's.
-
-    Parameters
-    ----------
-    picture : Picture
-        A rendered figure.
-    colours : mapping of str to str
-        From colour to name of the variable, for the cases.
-    """
+    """Return the SVG for a page; ``colours`` are its variables by colour, and it has the page's size."""
     variables = {**NEUTRALS, **colours}
     text = re.sub(
         r"#[0-9a-f]{6}\b",
@@ -218,21 +206,7 @@ def say(
 def log_axis(
     axes: Axes, which: str, low: int, high: int, *, most: int = 7, zero: float | None = None
 ) -> None:
-    """Make an axis logarithmic from 10^low to 10^high with its labels written as powers.
-
-    Parameters
-    ----------
-    axes : Axes
-        Whose axis.
-    which : {"x", "y"}
-        Which axis.
-    low, high : int
-        Powers of ten.
-    most : int
-        At most this many labels.
-    zero : float, optional
-        Where values that are exactly 0 are drawn; labelled so.
-    """
+    """Give an axis powers of ten from 10^low to 10^high and at most so many labels; 0 stands at ``zero``."""
     stride = max(1, -(-(high - low) // most))
     ticks = [10.0**power for power in range(low, high + 1) if (power - high) % stride == 0]
     labels = {tick: power_label(tick) for tick in ticks}

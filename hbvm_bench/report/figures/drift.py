@@ -30,8 +30,9 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
     shown = [case for case in cases if case.record.id in found and _visible(found[case.record.id][1])]
     if not shown:
         return None
-    laws = {number: law for number, (_, _, law) in found.items()}
-    curves = {number: _windows(t, rows) for number, (t, rows, _) in found.items()}
+    laws = {key: law for key, (_, _, law) in found.items()}
+    said = {key: text(law) for key, law in laws.items()}
+    curves = {key: _windows(t, rows) for key, (t, rows, _) in found.items()}
     label = "error of energy, rms"
     figure, grid = family_panels(shown, label)
     low, high = power_range([y for _, y in curves.values()], *POWERS)
@@ -43,21 +44,14 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         log_axis(axes, "x", left, right, most=4)
         axes.set_xlim(times.min() / 1.3, times.max() * 1.3)
         for case in members:
-            t, error = curves[case.record.id]
-            law = laws[case.record.id]
-            at, fitted = _law(law, t)
-            axes.plot(t, error, case.look.marker, color=case.look.light, markersize=2.4, linestyle="")
-            axes.plot(at, fitted, color=case.look.light, linewidth=1.1, dashes=case.look.dash)
-            traces += [
-                trace(case, t, error),
-                Trace(case.look.number, case.record.case.method, at, fitted, "law", text(law)),
-            ]
-        panel_legend(
-            axes,
-            members,
-            markers=True,
-            notes={case.record.id: text(laws[case.record.id]).replace(" to ", "–") for case in members},
-        )
+            key, look = case.record.id, case.look
+            t, error = curves[key]
+            at, fitted = _law(laws[key], t)
+            axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="")
+            axes.plot(at, fitted, color=look.light, linewidth=1.1, dashes=look.dash)
+            traces += [trace(case, t, error), trace(case, at, fitted, role="law", note=said[key])]
+        notes = {case.record.id: said[case.record.id].replace(" to ", "–") for case in members}
+        panel_legend(axes, members, markers=True, notes=notes)
     starts = max(law.starts for law in laws.values())
     over = (
         f"{starts} starts (the problem's own, the others changed in their last digits)"
@@ -73,9 +67,7 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         "a floor with a growth; its power of t stands with its 95 % interval. Bounded or t^1/2 is the best "
         "there is; a law is what these samples show, not a proof."
         + (f" {drift.told(starts)}." if starts > 1 else ""),
-        "Law of each case. "
-        + "; ".join(f"{c.record.case.method}: {text(laws[c.record.id])}" for c in shown)
-        + ".",
+        "Law of each case. " + "; ".join(f"{c.record.case.method}: {said[c.record.id]}" for c in shown) + ".",
         Plot([Panel("", Axis("time", log=True, both=True), Axis(label, log=True), traces)]),
     )
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -85,32 +86,24 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
         for case in members:
             _draw_error(axes, case, what)
         panel_legend(axes, members, markers=not what.joined)
-    plot = Plot(
-        [
-            Panel(
-                "",
-                Axis("time", both=True),
-                Axis(what.label, log=True, low=what.low, high=what.high),
-                _curves(shown, what),
-            )
-        ]
-    )
-    return picture(figure, what.key, what.title, what.caption, _error_summary(shown, what), plot)
-
-
-def trace(case: Drawn, x: Array, y: Array) -> Trace:
-    """Return a curve of a case for the page."""
-    return Trace(case.look.number, case.record.case.method, x, y)
-
-
-def _curves(cases: Sequence[Drawn], what: OverTime) -> list[Trace]:
-    made = []
-    for case in cases:
+    curves, largest = [], []
+    for case in shown:
         t, values = _finite(case, what)
+        largest.append(
+            f"{case.record.case.method}: {f'{values.max():.1e}' if values.size else 'none finite'}"
+        )
         if what.joined:
             t, values = envelope(t, values, FINE_BINS)
-        made.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
-    return made
+        curves.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
+    summary = f"{what.title}, largest values. {'; '.join(largest)}."
+    y = Axis(what.label, log=True, low=what.low, high=what.high)
+    plot = Plot([Panel("", Axis("time", both=True), y, curves)])
+    return picture(figure, what.key, what.title, what.caption, summary, plot)
+
+
+def trace(case: Drawn, x: Array, y: Array, **more: Any) -> Trace:
+    """Return a curve of a case for the page."""
+    return Trace(case.look.number, case.record.case.method, x, y, **more)
 
 
 def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
@@ -122,15 +115,7 @@ def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
 
 
 def family_panels(cases: Sequence[Drawn], label: str) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
-    """Return a figure with a panel per family, all of one size, with room for a legend under each.
-
-    Parameters
-    ----------
-    cases : sequence of Drawn
-        Divided as `style.panels` does.
-    label : str
-        Of the vertical axes.
-    """
+    """Return a figure with a panel for each of `style.panels`, of one size, with room for legends."""
     by_id = {case.record.id: case for case in cases}
     groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
     rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
@@ -165,24 +150,14 @@ def panel_legend(
 ) -> None:
     """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
     named = len({family_of(case.record) for case in cases}) > 1
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=case.look.light,
-            dashes=case.look.dash,
-            marker=case.look.marker if markers else "",
-            markersize=4,
-            label=shortened(case.legend(named=named), notes.get(case.record.id, "")),
-        )
-        for case in cases
-    ]
+    handles = []
+    for case in cases:
+        label = shortened(case.legend(named=named), notes.get(case.record.id, ""))
+        look, marker = case.look, case.look.marker if markers else ""
+        handles.append(Line2D([], [], color=look.light, dashes=look.dash, marker=marker, ms=4, label=label))
+    size = 6.8 if notes else 7.5
     axes.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(-0.03, -0.23),
-        borderaxespad=0.0,
-        fontsize=6.8 if notes else 7.5,
+        handles=handles, loc="upper left", bbox_to_anchor=(-0.03, -0.23), borderaxespad=0, fontsize=size
     )
 
 
@@ -220,12 +195,3 @@ def _draw_error(axes: Axes, case: Drawn, what: OverTime) -> None:
     (line,) = axes.plot(t, drawn, color=case.look.light, dashes=case.look.dash, clip_on=False)
     if not what.joined:
         line.set(linewidth=0.7, marker=case.look.marker, markersize=2.6, markevery=max(1, t.size // 10))
-
-
-def _error_summary(cases: Sequence[Drawn], what: OverTime) -> str:
-    parts = []
-    for case in cases:
-        _, values = _finite(case, what)
-        worst = f"{values.max():.1e}" if values.size else "none finite"
-        parts.append(f"{case.record.case.method}: {worst}")
-    return f"{what.title}, largest values. " + "; ".join(parts) + "."

@@ -104,40 +104,27 @@ def as_csv(plot: Plot) -> bytes:
 
 def numbers(plot: Plot) -> Table:
     """Return a table of what a figure shows, short enough to be read aloud."""
-    traces = [(panel, trace) for panel in plot.panels for trace in panel.traces if trace.role == "case"]
+    traces = [(panel, trace) for panel in plot.panels for trace in panel.traces]
+    cases = [(panel, trace) for panel, trace in traces if trace.role == "case"]
     many = len(plot.panels) > 1
+    firsts = [(str(trace.case or ""), trace.name, panel.title * many) for panel, trace in cases]
+    head: tuple[str, ...] = ("#", "case", "panel")
     if plot.kind == "lines":
-        ends = [trace.x[np.isfinite(trace.x)] for _, trace in traces if trace.x.size]
+        ends = [trace.x[np.isfinite(trace.x)] for _, trace in cases if trace.x.size]
         places = _places(ends, log=bool(plot.panels) and plot.panels[0].x.log)
-        laws = {
-            (panel.title, trace.case): trace.note
-            for panel in plot.panels
-            for trace in panel.traces
-            if trace.role == "law"
-        }
-        head = ("#", "case", "panel", *(f"at {place:.3g}" for place in places), "largest", "law")
-        rows = [
-            (
-                str(trace.case or ""),
-                trace.name,
-                panel.title if many else "",
-                *(_at(trace, place) for place in places),
-                _range(np.abs(trace.y))[1],
-                laws.get((panel.title, trace.case), ""),
-            )
-            for panel, trace in traces
+        laws = {(panel.title, trace.case): trace.note for panel, trace in traces if trace.role == "law"}
+        head = (*head, *(f"at {place:.3g}" for place in places), "largest", "law")
+        found = [
+            [(*(_at(trace, place) for place in places), _range(np.abs(trace.y))[1], laws.get(key, ""))]
+            for key, trace in (((panel.title, trace.case), trace) for panel, trace in cases)
         ]
-        return Table("", head, rows, words=range(3))
-    head = ("#", "case", "panel", "points", "x from", "to", "y from", "to")
-    if plot.kind == "points":
-        head = ("#", "case", "panel", "x", "y")
-    rows = []
-    for panel, trace in traces:
-        first = (str(trace.case or ""), trace.name, panel.title if many else "")
-        if plot.kind == "points":
-            rows += [(*first, _text(x), _text(y)) for x, y in zip(trace.x, trace.y, strict=True)]
-        else:
-            rows.append((*first, str(trace.x.size), *_range(trace.x), *_range(trace.y)))
+    elif plot.kind == "points":
+        head = (*head, "x", "y")
+        found = [[(_text(x), _text(y)) for x, y in zip(t.x, t.y, strict=True)] for _, t in cases]
+    else:
+        head = (*head, "points", "x from", "to", "y from", "to")
+        found = [[(str(trace.x.size), *_range(trace.x), *_range(trace.y))] for _, trace in cases]
+    rows = [(*first, *one) for first, each in zip(firsts, found, strict=True) for one in each]
     return Table("", head, rows, words=range(3))
 
 

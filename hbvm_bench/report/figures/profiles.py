@@ -9,10 +9,10 @@ from hbvm_bench.measure.metrics import find
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.over_time import WIDTH
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import DASHES, INK, MARKERS, UNKNOWN_MARKER, base_colours
+from hbvm_bench.report.figures.style import DASHES, INK, base
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import work_of
-from hbvm_bench.summaries.profiles import ACCURACIES, Profile, profile
+from hbvm_bench.summaries.profiles import ACCURACIES, profile
 
 FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
 NEVER = 6.0  # decades: the end of the axis where a family is not within any factor
@@ -20,15 +20,7 @@ NEVER = 6.0  # decades: the end of the axis where a family is not within any fac
 
 @styled
 def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture | None:
-    """Draw the performance profiles; ``None`` for too few problems.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        All cases.
-    numbers : dict of int
-        By family, the number of its first case: its colour in the page.
-    """
+    """Draw the profiles, ``None`` for too few problems; ``numbers`` are the looks of the families."""
     work = work_of(records)
     found = [profile(records, accuracy, work) for accuracy in ACCURACIES]
     found = [one for one in found if one.problems >= FEWEST_PROBLEMS]
@@ -42,7 +34,8 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
     handles = {}
     for axes, one in zip(grid, found, strict=True):
         traces = []
-        end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(_worst(one)))))
+        worst = max((r for ratios in one.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)
+        end = 10.0 ** min(NEVER, max(1.0, np.ceil(np.log10(worst))))
         for index, family in enumerate(one.ratios):
             taus, shares = one.curve(family)
             if not one.solved(family):
@@ -50,12 +43,13 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
             x = np.repeat([*taus, end], 2)[1:]
             y = np.repeat(shares, 2)
             x, y = x[: y.size], y[: x.size]
-            same = [name for name in list(one.ratios)[:index] if base_colours(name) == base_colours(family)]
+            colour, _, marker = base(family)
+            same = [name for name in list(one.ratios)[:index] if base(name)[0] == colour]
             (line,) = axes.plot(
                 x,
                 y,
-                color=base_colours(family)[0],
-                marker=MARKERS.get(family, UNKNOWN_MARKER),
+                color=colour,
+                marker=marker,
                 markevery=(index % 3, max(3, x.size // 6)),
                 markersize=4,
                 linewidth=1.6,
@@ -69,20 +63,12 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_title(one.words, color=INK, fontsize=8)
         axes.set_xlabel("factor behind the fastest")
-        panels.append(
-            Panel(
-                one.words,
-                Axis("factor behind the best", log=True),
-                Axis("share of problems"),
-                traces,
-            )
-        )
+        behind, share = Axis("factor behind the best", log=True), Axis("share of problems")
+        panels.append(Panel(one.words, behind, share, traces))
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
         f"{one.words}, {one.problems} problems: "
-        + ", ".join(
-            f"{family} best on {one.wins(family)}, solves {one.solved(family)}" for family in one.ratios
-        )
+        + ", ".join(f"{name} best on {one.wins(name)}, solves {one.solved(name)}" for name in one.ratios)
         + "."
         for one in found
     )
@@ -96,7 +82,3 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         said,
         Plot(panels),
     )
-
-
-def _worst(one: Profile) -> float:
-    return max((r for ratios in one.ratios.values() for r in ratios if np.isfinite(r)), default=10.0)

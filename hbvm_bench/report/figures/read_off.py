@@ -20,19 +20,11 @@ FEWEST = 2  # points that say something
 
 
 def read_off(figure: Figure, numbers: Mapping[str, int], names: Mapping[int, str]) -> Plot | None:
-    """Return what the lines and markers of a figure show; ``None`` where it has none.
+    """Return what the lines and markers of a finished figure show; ``None`` where it has none.
 
-    Maps, bars and level curves are not among them.
-
-    Parameters
-    ----------
-    figure : Figure
-        Finished.
-    numbers : mapping of str to int
-        From the colour of a curve to the number of its look; other curves belong to none.
-    names : mapping of int to str
-        What a curve without a label is called, by that number. An underscore before a
-        label keeps it out of the figure's own legend.
+    Maps, bars and level curves are not among them. ``numbers`` are those of the looks by colour, other
+    curves belong to none; ``names`` say by that number what a curve without a label is called. An
+    underscore before a label keeps it out of the figure's own legend.
     """
     panels = [_panel(axes, numbers, names) for axes in figure.axes if axes.axison]
     panels = [panel for panel in panels if panel.traces]
@@ -58,24 +50,19 @@ def _panel(axes: Axes, numbers: Mapping[str, int], names: Mapping[int, str]) -> 
         else:
             name = names.get(number, "reference")
         traces.append(Trace(number, name, *_thinned(x, y), joined=_joined(line)))
-    return Panel(axes.get_title(loc="left"), _axis(axes, "x"), _axis(axes, "y"), traces, _square(axes))
+    return Panel(
+        axes.get_title(loc="left"), _axis(axes, "x"), _axis(axes, "y"), traces, axes.get_aspect() == 1.0
+    )
 
 
 def _axis(axes: Axes, which: str) -> Axis:
-    label, scale = (
-        (axes.get_xlabel(), axes.get_xscale()) if which == "x" else (axes.get_ylabel(), axes.get_yscale())
-    )
     shared = (axes.get_shared_x_axes() if which == "x" else axes.get_shared_y_axes()).get_siblings(axes)
-    labels = [a.get_xlabel() if which == "x" else a.get_ylabel() for a in shared]
-    return Axis(label or next(filter(None, labels), which), log=scale == "log")
+    labels = [getattr(one, f"get_{which}label")() for one in (axes, *shared)]
+    return Axis(next(filter(None, labels), which), log=getattr(axes, f"get_{which}scale")() == "log")
 
 
 def _joined(line: Line2D) -> bool:
     return line.get_linestyle() not in ("None", "none", "", " ")
-
-
-def _square(axes: Axes) -> bool:
-    return axes.get_aspect() == 1.0
 
 
 def _thinned(x: Array, y: Array) -> tuple[Array, Array]:

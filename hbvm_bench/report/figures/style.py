@@ -14,52 +14,31 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import by_family
 
-# Base colour of each method: light theme, dark theme.
-FAMILIES = {
-    "HBVM": ("#0a58b5", "#62b0ff"),
-    "Gauss": ("#0a8f9c", "#4fd3de"),
-    "LineIntegral": ("#7a4a1e", "#e0a46a"),
-    "Taylor": ("#c8500a", "#ff9a57"),
-    "IAS15": ("#17753a", "#5fcf86"),
-    "Leapfrog": ("#86720c", "#dcc44a"),
-    "WHFast": ("#8a2160", "#ec86bf"),
-    "WHFast512": ("#8a2160", "#ec86bf"),
-    "SemiImplicitEuler": ("#6b4bb8", "#b79cff"),
-    "LeapfrogMidpoint": ("#6b4bb8", "#b79cff"),
-    "ReversibleHeun": ("#6b4bb8", "#b79cff"),
-    "Dopri8": ("#6b4bb8", "#b79cff"),
-    "DOP853": ("#55606b", "#b4bfca"),
-    "Radau": ("#55606b", "#b4bfca"),
-    "Motion": ("#a8324a", "#ff8a9e"),  # what is a property of the motion, not of a method
+# Of each method: its colour in the light and in the dark theme, and its marker.
+METHODS = {
+    "HBVM": ("#0a58b5", "#62b0ff", "o"),
+    "Gauss": ("#0a8f9c", "#4fd3de", "D"),
+    "LineIntegral": ("#7a4a1e", "#e0a46a", "d"),
+    "Taylor": ("#c8500a", "#ff9a57", "s"),
+    "IAS15": ("#17753a", "#5fcf86", "^"),
+    "Leapfrog": ("#86720c", "#dcc44a", "v"),
+    "WHFast": ("#8a2160", "#ec86bf", "P"),
+    "WHFast512": ("#8a2160", "#ec86bf", "*"),
+    "SemiImplicitEuler": ("#6b4bb8", "#b79cff", "X"),
+    "LeapfrogMidpoint": ("#6b4bb8", "#b79cff", "<"),
+    "ReversibleHeun": ("#6b4bb8", "#b79cff", ">"),
+    "Dopri8": ("#6b4bb8", "#b79cff", "p"),
+    "DOP853": ("#55606b", "#b4bfca", "h"),
+    "Radau": ("#55606b", "#b4bfca", "H"),
+    "Motion": ("#a8324a", "#ff8a9e", "8"),  # what is a property of the motion, not of a method
 }
-OTHERS = (("#a8324a", "#ff8a9e"), ("#3d6b1f", "#a5d677"), ("#7a4a1e", "#e0a46a"))
+OTHERS = (("#a8324a", "#ff8a9e", "8"), ("#3d6b1f", "#a5d677", "8"), ("#7a4a1e", "#e0a46a", "8"))
 
 DASHES: tuple[tuple[float, ...], ...] = (
-    (),
-    (6, 2),
-    (2, 1.6),
-    (8, 2, 2, 2),
-    (5, 1.5, 1.5, 1.5, 1.5, 1.5),
-    (12, 3),
+    *((), (6, 2), (2, 1.6), (8, 2, 2, 2)),
+    *((5, 1.5, 1.5, 1.5, 1.5, 1.5), (12, 3)),
 )
-MARKERS = {
-    "HBVM": "o",
-    "Gauss": "D",
-    "LineIntegral": "d",
-    "Taylor": "s",
-    "IAS15": "^",
-    "Leapfrog": "v",
-    "WHFast": "P",
-    "WHFast512": "*",
-    "SemiImplicitEuler": "X",
-    "LeapfrogMidpoint": "<",
-    "ReversibleHeun": ">",
-    "Dopri8": "p",
-    "DOP853": "h",
-    "Radau": "H",
-}
 IN_A_PANEL = 6  # cases
-UNKNOWN_MARKER = "8"  # of a method that is not in the table
 
 # Neutral colours of the figures; each is unique so that it can be themed in the page.
 INK = "#1d2430"
@@ -89,19 +68,12 @@ class Look:
 
 
 def looks(methods: Iterable[str]) -> dict[str, Look]:
-    """Return the look of every method by its text; it is the same on every problem.
-
-    Parameters
-    ----------
-    methods : iterable of str
-        As they print, or only their names, in the order of declaration; they are counted from 1.
-    """
+    """Return the look of every method by its text or name, counted from 1; the same on every problem."""
     seen: dict[str, int] = {}
     taken: set[str] = set()
     made: dict[str, Look] = {}
     for number, method in enumerate(dict.fromkeys(methods), 1):
-        name = parse_spec(method).name
-        light, dark = base_colours(name)
+        light, dark, marker = base(parse_spec(method).name)
         # settings of one colour are told apart by shade and dash, whatever their method's name
         index = seen[light] = seen.get(light, -1) + 1
         made[method] = Look(
@@ -109,16 +81,14 @@ def looks(methods: Iterable[str]) -> dict[str, Look]:
             light=_unique(_shade(light, index, towards=0.0), taken),
             dark=_shade(dark, index, towards=1.0),
             dash=DASHES[index % len(DASHES)],
-            marker=MARKERS.get(name, UNKNOWN_MARKER),
+            marker=marker,
         )
     return made
 
 
-def base_colours(name: str) -> tuple[str, str]:
-    """Return the light and dark colour of a method by its name; unknown names get a steady one."""
-    if name in FAMILIES:
-        return FAMILIES[name]
-    return OTHERS[hashlib.sha256(name.encode()).digest()[0] % len(OTHERS)]
+def base(name: str) -> tuple[str, str, str]:
+    """Return the light and dark colour and the marker of a method; unknown names get steady ones."""
+    return METHODS.get(name) or OTHERS[hashlib.sha256(name.encode()).digest()[0] % len(OTHERS)]
 
 
 def options(record: Record) -> str:

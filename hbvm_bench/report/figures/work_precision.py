@@ -8,25 +8,26 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hbvm_bench.measure.metrics import METRICS
-from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture
-from hbvm_bench.report.figures.labels import number_points
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
 from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import MUTED
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, front, number
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.points import accurate, family_of, front, number
 
 MOST_NAMED = 30  # cases in the legend
+# Where a number may stand beside its point, in points; the first that is free is taken.
+SIDES = (
+    *((7, 4), (7, -4), (-7, 4), (-7, -4), (0, 9), (0, -9), (9, 0), (-9, 0)),
+    *((12, 9), (-12, 9), (12, -9), (-12, -9)),
+)
 
 
 def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     """Draw position error and energy error against time, side by side; energy is not shown alone."""
     keys = ("position_end", "energy_max")
     shown = [
-        case
-        for case in cases
-        if all(number(case.record, key) is not None for key in (*keys, "warm_seconds"))
-        and group_of(case.record) == "on"
+        case for case in cases if accurate(case.record, dict.fromkeys((*keys, "warm_seconds"), math.inf))
     ]
     if len(shown) < 2:
         return None
@@ -34,7 +35,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
     times = [_number(case.record, "warm_seconds") for case in shown]
-    plotted = []
+    plotted, seconds_ = [], "seconds for the whole span (median)"
     for axes, key in ((left, keys[0]), (right, keys[1])):
         values = [_number(case.record, key) for case in shown]
         floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
@@ -48,31 +49,23 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         for case, spot, value in zip(shown, spots, values, strict=True):
             marker = case.look.marker if value <= top else "^"
             axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
-        number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
-        axes.set(xlabel="seconds for the whole span (median)", title=METRICS[key].label)
+        _number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
+        axes.set(xlabel=seconds_, title=METRICS[key].label)
         clouds = [
             trace(case, np.array([seconds]), np.array([value]))
             for case, seconds, value in zip(shown, times, values, strict=True)
         ]
-        plotted.append(
-            Panel(
-                METRICS[key].label,
-                Axis("seconds for the whole span (median)", log=True),
-                Axis(METRICS[key].label, log=True, low=-18, high=3),
-                [*clouds, *_envelopes(axes, shown, spots)],
-            )
-        )
+        x, y = Axis(seconds_, log=True), Axis(METRICS[key].label, log=True, low=-18, high=3)
+        plotted.append(Panel(METRICS[key].label, x, y, [*clouds, *_envelopes(axes, shown, spots)]))
     side.set_axis_off()
-    handles = [
-        Line2D([], [], color=c.look.light, marker=c.look.marker, linestyle="", markersize=5.5, label=_full(c))
-        for c in sorted(shown, key=lambda case: case.look.number)[:MOST_NAMED]
-    ]
+    handles = []
+    for case in sorted(shown, key=lambda case: case.look.number)[:MOST_NAMED]:
+        look, name = case.look, f"{case.look.number}  {case.record.case.method}"
+        handles.append(Line2D([], [], ls="", color=look.light, marker=look.marker, ms=5.5, label=name))
     if len(shown) > MOST_NAMED:
-        handles.append(
-            Line2D([], [], linestyle="", label=f"and {len(shown) - MOST_NAMED} more, see the table")
-        )
+        handles.append(Line2D([], [], ls="", label=f"and {len(shown) - MOST_NAMED} more, see the table"))
     side.legend(
-        handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0.0, handlelength=1
+        handles=handles, loc="center left", bbox_to_anchor=(-0.1, 0.5), borderaxespad=0, handlelength=1
     )
     best = min(shown, key=lambda case: _number(case.record, "position_end"))
     left_out = len(cases) - len(shown)
@@ -106,8 +99,25 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
     return made
 
 
-def _full(case: Drawn) -> str:
-    return f"{case.look.number}  {case.record.case.method}"
+def _number_points(axes: Axes, points: Sequence[tuple[str, tuple[float, float]]]) -> None:
+    """Write a number beside each point, on the side where it covers the fewest points and numbers."""
+    scale = axes.get_figure(root=True).dpi / 72  # pyright: ignore[reportOptionalMemberAccess]
+    spots = axes.transData.transform([spot for _, spot in points]) / scale
+    taken = [(x, y, 7.0) for x, y in spots]
+    for (text, spot), (x, y) in zip(points, spots, strict=True):
+        width = 4.9 * len(text)
+        offset = min(
+            SIDES, key=lambda side: _crowding(x + side[0] + side[0] / 9 * width / 2, y + side[1], taken)
+        )
+        taken.append((x + offset[0] + offset[0] / 9 * width / 2, y + offset[1], 6.0 + width / 2))
+        align = "left" if offset[0] > 0 else "right" if offset[0] < 0 else "center"
+        arrow = {"arrowstyle": "-", "linewidth": 0.5, "color": MUTED, "shrinkA": 0, "shrinkB": 3}
+        look = {"ha": align, "va": "center", "fontsize": 7.5, "arrowprops": arrow}
+        say(axes, text, spot, offset, annotation_clip=False, **look)
+
+
+def _crowding(x: float, y: float, taken: Sequence[tuple[float, float, float]]) -> float:
+    return sum(max(0.0, 1.0 - math.hypot(x - a, y - b) / (reach + 4.0)) for a, b, reach in taken)
 
 
 def _number(record: Record, key: str) -> float:
