@@ -1,9 +1,11 @@
 """The report of a campaign: everything that its stores say, as one document."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from msgspec.structs import replace
@@ -27,7 +29,7 @@ from hbvm_bench.report.document import (
     attempt,
 )
 from hbvm_bench.report.figures.profiles import profiles
-from hbvm_bench.report.figures.style import looks
+from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
@@ -39,6 +41,7 @@ from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
 Series = dict[str, NDArray[np.float64]]
+Looks = dict[str, Look]
 
 # A report of more than these draws only its main figures.
 BRIEF_PROBLEMS = 3
@@ -47,6 +50,7 @@ DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure 
 
 FEW = 3  # problems whose summaries all stand at the top
 LISTED = 12  # cases without a rank that are listed at once; more are folded away
+CITE = "`hbvm-bench cite` prints how the authors of the methods ask to be cited."
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 
 
@@ -63,17 +67,12 @@ class Run:
         return self.index.campaign.title or self.index.campaign.name
 
 
-@dataclass(frozen=True)
-class Gathered:
-    """What the stores of one or more runs hold: the runs, and every case with its series."""
+class Gathered(NamedTuple):
+    """What the stores of one or more runs hold: the runs, all cases, and the series of each by its id."""
 
     runs: list[Run]
-    found: list[tuple[Record, Series]]
-
-    @property
-    def records(self) -> list[Record]:
-        """All cases."""
-        return [record for record, _ in self.found]
+    records: list[Record]
+    series: dict[str, Series]
 
 
 def gather(stores: Sequence[Store]) -> Gathered:
@@ -101,11 +100,11 @@ def gather(stores: Sequence[Store]) -> Gathered:
     runs = [
         Run(index, [case for number, case in index.listed() if number not in furthest]) for index in indices
     ]
-    found = [
-        _read(record, store) if number < DRAWN_CASES else (record, {})
-        for number, (record, store) in enumerate(furthest.values())
-    ]
-    return Gathered(runs, found)
+    made = Gathered(runs, [], {})
+    for number, (key, (record, store)) in enumerate(furthest.items()):
+        found, made.series[key] = _read(record, store) if number < DRAWN_CASES else (record, {})
+        made.records.append(found)
+    return made
 
 
 def document(stores: Store | Sequence[Store]) -> Document:
@@ -117,9 +116,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
         See `gather`.
     """
     stores = [stores] if isinstance(stores, Store) else stores
-    gathered = gather(stores)
-    runs, records = gathered.runs, gathered.records
-    series = {record.id: (record, series) for record, series in gathered.found}
+    runs, records, series = gather(stores)
     look = looks(record.case.method for record in records)
     missing = [case for run in runs for case in run.missing]
     printed = {case.problem: repr(make_problem(case.problem)) for case in missing}  # as the records have it
@@ -128,7 +125,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
     parts = [
         part(
             text,
-            [series[record.id] for record in members],
+            [(record, series[record.id]) for record in members],
             look,
             [case for case in missing if (printed[case.problem], case.ensemble) == (text, ensemble)],
             number,
@@ -139,34 +136,31 @@ def document(stores: Store | Sequence[Store]) -> Document:
     ]
     one = len(runs) == 1
     title = runs[0].title if one else f"{len(runs)} runs together: {'; '.join(run.title for run in runs)}"
-    overall = _overall(records, several=len(parts) > 1)
+    overall = _overall(records, look, several=len(parts) > 1)
+    files = partial(_files, title, runs, records)
+    references = [text for one in parts for text in one.problem.references]
     return Document(
         title,
         [runs[0].index.campaign.description] if one else [],
         [
-            *attempt(("the goals", partial(_goals, stores, records))),
+            *attempt(("the goals", partial(_goals, runs, records))),
             *(overall if len(parts) > 1 else []),
-            _results(parts, runs, records),
+            _results(parts, runs, records, look),
             *(overall if len(parts) == 1 else []),
             *(one.section for one in parts),
             _fairness(records),
-            Section(
-                "Raw data",
-                attempt(("the results as files", partial(_files, title, runs, records))),
-                "data-files",
-                nav="Data",
-            ),
+            Section("Raw data", attempt(("the results as files", files)), "data-files", nav="Data"),
             _again(runs, records),
-            Section("Sources", [Items(_sources(parts))], "sources"),
+            Section("Sources", [Items([*dict.fromkeys(references), CITE])], "sources"),
         ],
         list(look.values()),
         name="report.md",
     )
 
 
-def _goals(stores: Sequence[Store], records: Sequence[Record]) -> Table | None:
+def _goals(runs: Sequence[Run], records: Sequence[Record]) -> Table | None:
     """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
-    found = [one for store in stores for one in goals.verdicts(store.index().campaign, records)]
+    found = [one for run in runs for one in goals.verdicts(run.index.campaign, records)]
     return goals.table(found) if found else None
 
 
@@ -181,10 +175,9 @@ def _read(record: Record, store: Store) -> tuple[Record, Series]:
     return replace(record, case=replace(record.case, note=note)), {}
 
 
-def _overall(records: Sequence[Record], *, several: bool) -> list[Block]:
+def _overall(records: Sequence[Record], look: Looks, *, several: bool) -> list[Block]:
     """Return what the cases say together."""
     title = "Over all problems" if several else "Which integrator to take"
-    look = looks(record.case.method for record in records)
     numbers: dict[str, int] = {}
     for record in records:
         numbers.setdefault(family_of(record), look[record.case.method].number)
@@ -199,13 +192,14 @@ def _overall(records: Sequence[Record], *, several: bool) -> list[Block]:
 
 def _outcomes(records: Sequence[Record]) -> list[Block]:
     """Return which integrator reached the end of which problem, and why not; nothing for one problem."""
-    if (found := outcomes.table(records)) is None:
-        return []
-    table, reasons = found
-    return [table, *([Details(f"Why not: {len(reasons)} reasons", [Items(reasons)])] if reasons else [])]
+    table, reasons = outcomes.table(records) or (None, [])
+    folded = Details(f"Why not: {len(reasons)} reasons", [Items(reasons)])
+    return [*([table] if table else []), *([folded] if reasons else [])]
 
 
-def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequence[Record]) -> Section:
+def _results(
+    parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequence[Record], look: Looks
+) -> Section:
     """Return what came out: the sentences where there are few, and every case as a row."""
     blocks: list[Block] = [
         Notice(
@@ -223,25 +217,14 @@ def _results(parts: Sequence[ProblemPart], runs: Sequence[Run], records: Sequenc
             for i, one in enumerate(parts, 1)
         ]
     else:
-        counts: Counter[str] = Counter()
-        for one in parts:
-            for title, rows in one.ranked.groups:
-                counts[title.split(",")[0].split(":")[0].lower()] += len(rows)
+        titles = [title for one in parts for title, rows in one.ranked.groups for _ in rows]
+        counts = Counter(re.split("[,:]", title)[0].lower() for title in titles)
         said = ", ".join(f"{what}: {count}" for what, count in counts.items())
         blocks.append(f"{len(records)} cases on {len(parts)} problems; {said}.")
-    shown = columns(records)
-    meaning = Table(
-        "",
-        ("column", "unit", "meaning"),
-        [
-            (metric.short, metric.unit or "–", f"{metric.label}. {metric.description}")
-            for metric in METRICS.values()
-        ],
-        words=(0, 1, 2),
-    )
-    look = looks(record.case.method for record in records)
+    said = [(one.short, one.unit or "–", f"{one.label}. {one.description}") for one in METRICS.values()]
+    meaning = Table("", ("column", "unit", "meaning"), said, words=(0, 1, 2))
     blocks += [
-        Results(shown, [one.ranked for one in parts], look),
+        Results(columns(records), [one.ranked for one in parts], look),
         Details("What the columns mean", [meaning]),
     ]
     return Section("What came out", blocks, "results", nav="Results")
@@ -254,27 +237,18 @@ def _fairness(records: Sequence[Record]) -> Section:
         *([drawn] if len(records) > DRAWN_CASES else []),
         *(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
     )
-    settings = Table(
-        "How many settings each method has",
-        ("method", "library", "settings", *KINDS),
-        [
-            (name, library, str(kinds.total()), *(str(kinds[kind]) for kind in KINDS))
-            for name, library, kinds in words.settings_count(records)
-        ],
-        words=(0, 1),
-    )
-    excluded = words.excluded(records)
-    left_out = Details(
-        f"{len(excluded)} cases that take part in no ranking, and why",
-        [Items(excluded)],
-        open=len(excluded) <= LISTED,
-    )
-    return Section(
-        "Fairness: the rules, the settings, what was excluded",
-        [Items(rules, "numbered"), settings, *attempt(provenance.PEERS), *([left_out] if excluded else [])],
-        "fairness",
-        nav="Fairness",
-    )
+    counted: dict[tuple[str, str], Counter[str]] = {}
+    for record in records:
+        counted.setdefault((family_of(record), record.library), Counter())[record.case.settings] += 1
+    rows = [(*of, str(kinds.total()), *(str(kinds[kind]) for kind in KINDS)) for of, kinds in counted.items()]
+    head = ("method", "library", "settings", *KINDS)
+    settings = Table("How many settings each method has", head, rows, words=(0, 1))
+    blocks = [Items(rules, "numbered"), settings, *attempt(provenance.PEERS)]
+    if excluded := words.excluded(records):
+        title = f"{len(excluded)} cases that take part in no ranking, and why"
+        blocks.append(Details(title, [Items(excluded)], open=len(excluded) <= LISTED))
+    title = "Fairness: the rules, the settings, what was excluded"
+    return Section(title, blocks, "fairness", nav="Fairness")
 
 
 def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
@@ -293,18 +267,10 @@ def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
     )
 
 
-def _sources(parts: Sequence[ProblemPart]) -> list[str]:
-    references = dict.fromkeys(text for one in parts for text in one.problem.references)
-    return [*references, "`hbvm-bench cite` prints how the authors of the methods ask to be cited."]
-
-
 def _files(title: str, runs: Sequence[Run], records: Sequence[Record]) -> Files:
     commands = [{"command": run.index.command, "version": run.index.version} for run in runs]
-    made_by = {"title": title, "runs": commands}
+    made = json_of({"title": title, "runs": commands} | export.as_json(records))
     return Files(
         "Every case with every metric, every reason and every timing sample",
-        {
-            "data/results.csv": export.cases_csv(records),
-            "data/results.json": json_of(made_by | export.as_json(records)),
-        },
+        {"data/results.csv": export.cases_csv(records), "data/results.json": made},
     )

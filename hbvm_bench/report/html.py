@@ -51,25 +51,22 @@ def page(document: Document) -> str:
     """Return a document as HTML that asks nothing of the network and runs no script but its own."""
     looks = document.looks
     script = "".join(text(name) for name in SCRIPTS)
-    top = Place(2, {look.light: f"--m{look.number}" for look in looks}, _within(document.pictures))
-    return (
-        templates()
-        .get_template("base.html.j2")
-        .render(
-            document=document,
-            nav=[block for block in document.walk() if isinstance(block, Section) and block.nav],
-            main=printed(document.blocks, top),
-            css=Markup(text("style.css")),
-            script=Markup(script),
-            scripts=Markup(f"{_source(script)} {_source(get_plotlyjs())}"),
-            data=Markup(pack.data(document)),
-            library=Markup(pack.library()),
-            light=variables({v: k for k, v in NEUTRALS.items()}, {f"--m{x.number}": x.light for x in looks}),
-            dark=variables(DARK_NEUTRALS, {f"--m{x.number}": x.dark for x in looks}),
-            keys=[(look.number, key(look)) for look in looks],
-            symbols=symbols(looks),
-        )
-    )
+    light = {f"--m{look.number}": look.light for look in looks}
+    top = Place(2, {colour: name for name, colour in light.items()}, _within(document.pictures))
+    made = {
+        "nav": [block for block in document.walk() if isinstance(block, Section) and block.nav],
+        "main": printed(document.blocks, top),
+        "css": Markup(text("style.css")),
+        "script": Markup(script),
+        "scripts": Markup(f"{_source(script)} {_source(get_plotlyjs())}"),
+        "data": Markup(pack.data(document)),
+        "library": Markup(pack.library()),
+        "light": variables({name: colour for colour, name in NEUTRALS.items()} | light),
+        "dark": variables(DARK_NEUTRALS | {f"--m{look.number}": look.dark for look in looks}),
+        "keys": [(look.number, key(look)) for look in looks],
+        "symbols": symbols(looks),
+    }
+    return templates().get_template("base.html.j2").render(document=document, **made)
 
 
 def printed(blocks: Sequence[Block], at: Place) -> Markup:
@@ -81,12 +78,9 @@ def printed(blocks: Sequence[Block], at: Place) -> Markup:
 @cache
 def templates() -> Environment:
     """Return the templates, with what they call."""
+    loader = PackageLoader(HERE)
     made = Environment(
-        loader=PackageLoader(HERE),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
+        loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     functions = (printed, words, cell, drawing, chip, call, bar, spread, sort_key, minor_columns)
     made.globals |= {function.__name__: function for function in functions} | {"verdicts": VERDICTS}
@@ -110,12 +104,11 @@ def call(text: str) -> Markup:
 
 def bar(metric: Metric, cell: Cell, row: Row) -> int | None:
     """Return how many percent of a double's digits an error leaves right; ``None`` where not an error."""
-    value = row.record.result.metrics.get(metric.key)
-    if metric.better != "lower" or metric.unit not in ("relative", "length") or cell.void:
+    error = metric.better == "lower" and metric.unit in ("relative", "length")
+    number = row.record.result.metrics[metric.key].value
+    if not error or cell.void or number is None:
         return None
-    if value is None or value.value is None:
-        return None
-    right = DIGITS if value.value == 0 else -math.log10(value.value)
+    right = DIGITS if number == 0 else -math.log10(number)
     return round(100 * min(max(right / DIGITS, 0.0), 1.0))
 
 
@@ -193,9 +186,9 @@ def symbols(looks: Sequence[Look]) -> Markup:
     return Markup(f'<style>{colours}</style><svg class="symbols" aria-hidden="true">{shapes}</svg>')
 
 
-def variables(*groups: Mapping[str, str]) -> Markup:
+def variables(colours: Mapping[str, str]) -> Markup:
     """Return the colours of a theme as variables of the page."""
-    return Markup("".join(f"{name}:{value};" for group in groups for name, value in group.items()))
+    return Markup("".join(f"{name}:{value};" for name, value in colours.items()))
 
 
 def text(name: str) -> str:

@@ -6,7 +6,6 @@ repository, and the page unpacks it behind the static pictures.
 
 import base64
 import gzip
-from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -14,8 +13,8 @@ import msgspec
 from plotly.offline import get_plotlyjs
 
 from hbvm_bench.report.document import Document, Files
+from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.plots import as_json, numbers
-from hbvm_bench.report.figures.style import Look
 
 # By matplotlib's name of a marker: plotly's, and its drawing in a box of 12 by 12 as the figures have it.
 MARKERS = {
@@ -54,34 +53,18 @@ def library() -> str:
 
 def data(document: Document) -> str:
     """Return what the figures, tables and downloads of a page are made of, packed."""
-    plots: dict[str, Any] = {}
-    motions: dict[str, Any] = {}
-    for picture in document.pictures:
-        if picture.plot is not None:
-            table = numbers(picture.plot)
-            plots[picture.key] = as_json(picture.plot) | {
-                "numbers": {"head": table.head, "rows": table.rows, "words": len(table.words)}
-            }
-        if picture.motion is not None:
-            motions[picture.key] = picture.motion
-    carried = {
-        path: content.decode()
-        for block in document.walk()
-        if isinstance(block, Files)
-        for path, content in block.files.items()
-        if content is not None
-    }
-    made = {"looks": looks_json(document.looks, document.names), "plots": plots, "motions": motions}
-    return packed(msgspec.json.encode(made | {"files": carried}))
-
-
-def looks_json(looks: Iterable[Look], names: Mapping[int, str]) -> dict[str, dict[str, Any]]:
-    """Return the looks by number, for the page's script; colours are variables of the page."""
-    return {
-        str(look.number): {
-            "dash": ",".join(f"{1.3 * length:.3g}px" for length in look.dash) or "solid",
-            "symbol": MARKERS[look.marker][0],
-            **({"name": names[look.number]} if look.number in names else {}),
-        }
-        for look in looks
-    }
+    made: dict[str, dict[str, Any]] = {"looks": {}, "plots": {}, "motions": {}, "files": {}}
+    for look in document.looks:  # without colours, which are variables of the page
+        dash = ",".join(f"{1.3 * length:.3g}px" for length in look.dash) or "solid"
+        name = {"name": document.names[look.number]} if look.number in document.names else {}
+        made["looks"][str(look.number)] = {"dash": dash, "symbol": MARKERS[look.marker][0], **name}
+    for block in document.walk():
+        if isinstance(block, Picture) and block.plot is not None:
+            table = numbers(block.plot)
+            said = {"head": table.head, "rows": table.rows, "words": len(table.words)}
+            made["plots"][block.key] = as_json(block.plot) | {"numbers": said}
+        if isinstance(block, Picture) and block.motion is not None:
+            made["motions"][block.key] = block.motion
+        if isinstance(block, Files):
+            made["files"] |= {path: data.decode() for path, data in block.files.items() if data is not None}
+    return packed(msgspec.json.encode(made))

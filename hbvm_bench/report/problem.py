@@ -24,7 +24,7 @@ from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number
-from hbvm_bench.summaries.rows import GROUPS, at_once, group_of, rows, title_of
+from hbvm_bench.summaries.rows import at_once, group_of, grouped, rows
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -49,28 +49,14 @@ def part(
     missing: Sequence[Case],
     number: int,
     *,
-    brief: bool = False,
-    summarized: bool = False,
+    brief: bool,
+    summarized: bool,
 ) -> ProblemPart:
     """Make what the report says about one problem, or about an ensemble of it.
 
-    Parameters
-    ----------
-    text : str
-        The problem as it prints.
-    found : sequence of (Record, dict)
-        Its cases, at least one, and their series. An ensemble's are over its trajectories
-        and not over time: it has rows and no figures.
-    look : dict of Look
-        By method.
-    missing : sequence of Case
-        Those that have no result yet.
-    number : int
-        Of the section, from 1.
-    brief : bool
-        Whether only the main figures are drawn, of the most telling cases.
-    summarized : bool
-        Whether its summary stands in its own section.
+    ``found`` are its cases, at least one, with their series, and ``missing`` those that have no result yet.
+    An ensemble's series are over its trajectories and not over time: it has rows and no figures. ``brief``
+    draws only the main figures, of the most telling cases; ``summarized`` puts the summary into the section.
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
@@ -78,35 +64,23 @@ def part(
     ensemble = records[0].case.ensemble
     cases = [Drawn(record, look[record.case.method], series) for record, series in found if ensemble is None]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
-    table = rows(records)
-    groups = [
-        (title_of(key, members), members)
-        for key in GROUPS
-        if (members := [row for row in table if row.group == key])
-    ]
     ends = max((len(series.get("position_t", ())) for _, series in found), default=0)
     witnesses = [words.WITNESSES.format(ends)] if ensemble is not None and ends else []
     summary = attempt(
         (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
     )
+    wrong = attempt((f"our shortcomings on {text}", lambda: Items(words.shortcomings(records))))
     title = f"{problem.title}{at_once(ensemble)}"
-    unrun = Details(
-        f"{len(missing)} cases on this problem have no result yet",
-        [Items([f"`{case.method}`" for case in missing])],
-    )
+    unrun = Items([f"`{case.method}`" for case in missing])
     blocks: list[Block] = [
         *(summary if summarized else []),
         *attempt((f"the reference of {text}", lambda: _truth(problem, known))),
-        *([unrun] if missing else []),
+        *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
         *_figures(problem, drawn, known, number, brief=brief),
-        Section(
-            "What our own methods do wrong",
-            attempt((f"our shortcomings on {text}", lambda: Items(words.shortcomings(records)))),
-            f"wrong-{number}",
-        ),
+        Section("What our own methods do wrong", wrong, f"wrong-{number}"),
     ]
     section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
-    return ProblemPart(problem, Ranked(title, repr(problem), groups), summary, section)
+    return ProblemPart(problem, Ranked(title, repr(problem), grouped(rows(records))), summary, section)
 
 
 def _figures(
@@ -119,11 +93,10 @@ def _figures(
 
     @styled
     def finished(make: Callable[[], Any]) -> Picture | None:
-        made: Picture | None = make()
-        if made is None:
+        if (made := make()) is None:
             return None
-        caption = made.caption + ("" if made.key == "work-precision" else note)
-        return replace(made, key=made.key + suffix, caption=caption)
+        said = "" if made.key == "work-precision" else note
+        return replace(made, key=made.key + suffix, caption=made.caption + said)
 
     makers = _makers(problem, cases, main, known, brief=brief)
     return attempt(*((f"{title}, {problem!r}", partial(finished, make)) for title, make in makers))
@@ -137,12 +110,11 @@ def _makers(
     def errors(what: OverTime) -> Maker:
         return what.title, lambda: over_time.over_time(main, what)
 
-    sitnikov = problem.name == "sitnikov"
     made: list[Maker] = [
         ("Work and precision", lambda: work_precision(cases)),
         ("Drift of the energy", lambda: drift_figure(main)),
     ]
-    if sitnikov and not brief:
+    if problem.name == "sitnikov" and not brief:
         made.append(("The system in space", lambda: motion.still(cases, "The system in space")))
     made += [errors(what) for what in (OVER_TIME[:1] if brief else (*OVER_TIME, *_other_invariants(cases)))]
     made += [
@@ -160,14 +132,12 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
     """Return the cases to draw where there are many: of each method the most accurate and the default."""
     if len(cases) <= MOST_DRAWN:
         return list(cases)
-    kept: dict[str, Drawn] = {}
-    by_name: dict[str, list[Drawn]] = {}
-    for case in cases:
-        by_name.setdefault(family_of(case.record), []).append(case)
-    for members in by_name.values():
+    kept: set[str] = set()
+    for family in dict.fromkeys(family_of(case.record) for case in cases):
+        members = [case for case in cases if family_of(case.record) == family]
         best = min(members, key=_rank)
         default = next((case for case in members if case.record.case.settings == "default"), best)
-        kept |= {case.record.id: case for case in (best, default)}
+        kept |= {best.record.id, default.record.id}
     return [case for case in cases if case.record.id in kept][:MOST_DRAWN]
 
 
@@ -177,82 +147,46 @@ def _rank(case: Drawn) -> tuple[bool, float]:
     return group_of(case.record) != "on", least
 
 
+# fmt: off
 OVER_TIME = (
     OverTime(
-        key="energy",
-        title="Energy error over time",
-        caption="Relative error of the energy. A line is the largest value in each of "
+        "energy", "Energy error over time", "|H − H₀| / |H₀|", "error.energy", -17, 2,
+        "Relative error of the energy. A line is the largest value in each of "
         f"{over_time.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
-        label="|H − H₀| / |H₀|",
-        values="error.energy",
-        low=-17,
-        high=2,
     ),
     OverTime(
-        key="position",
-        title="Position error over time",
-        caption="Position error at the times of the stored 128-bit reference.",
-        label="position error",
-        values="position",
-        t="position_t",
-        low=-17,
-        high=4,
-        joined=False,
+        "position", "Position error over time", "position error", "position", -17, 4,
+        "Position error at the times of the stored 128-bit reference.", t="position_t", joined=False,
     ),
     OverTime(
-        key="angular-momentum",
-        title="Angular momentum error over time",
-        caption="2-norm of the error of the angular momentum vector, relative to its length.",
-        label="|L − L₀| / |L₀|",
-        values="error.angular_momentum",
-        low=-17,
-        high=2,
+        "angular-momentum", "Angular momentum error over time", "|L − L₀| / |L₀|", "error.angular_momentum",
+        -17, 2, "2-norm of the error of the angular momentum vector, relative to its length.",
     ),
     OverTime(
-        key="symmetry",
-        title="Off-axis distance over time",
-        caption="What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
-        "what is smaller than the lowest power is drawn just above it.",
-        label="distance from the axis",
-        values="guard.",
-        low=-24,
-        high=4,
-        zero=True,
+        "symmetry", "Off-axis distance over time", "distance from the axis", "guard.", -24, 4,
+        "What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
+        "what is smaller than the lowest power is drawn just above it.", zero=True,
     ),
     OverTime(
-        key="distance",
-        title="Largest distance from the origin over time",
-        caption="Shows what escaped, and when.",
-        label="largest distance",
-        values="distance",
-        low=0,
-        high=5,
+        "distance", "Largest distance from the origin over time", "largest distance", "distance", 0, 5,
+        "Shows what escaped, and when.",
     ),
 )
+# fmt: on
 
 
 def _other_invariants(cases: Sequence[Drawn]) -> list[OverTime]:
-    """Return a figure for every invariant that has none of its own."""
-    drawn = {"error.energy", "error.angular_momentum"}
-    names = dict.fromkeys(
-        n for case in cases for n in case.series if n.startswith("error.") and n not in drawn
-    )
+    """Return a figure for every invariant that has none of its own and is not exact throughout."""
+    own = ("error.energy", "error.angular_momentum")
+    series = [(name, values) for case in cases for name, values in case.series.items()]
+    names = dict.fromkeys(name for name, _ in series if name.startswith("error.") and name not in own)
+    caption = "Relative error, or absolute where the value at the start is 0; a vector's 2-norm."
     made = []
     for name in names:
-        if not any(np.any(case.series[name] != 0.0) for case in cases if name in case.series):
-            continue
-        words_ = name.removeprefix("error.").replace("_", " ")
-        made.append(
-            OverTime(
-                key="invariant-" + re.sub(r"\W+", "-", words_),
-                title=f"{words_.capitalize()}: error over time",
-                caption="Relative error, or absolute where the value at the start is 0; a vector's 2-norm.",
-                label=f"error of {words_}",
-                values=name,
-                low=-17,
-                high=2,
-            )
-        )
+        if any(np.any(values != 0.0) for other, values in series if other == name):
+            said = name.removeprefix("error.").replace("_", " ")
+            key, title = "invariant-" + re.sub(r"\W+", "-", said), f"{said.capitalize()}: error over time"
+            made.append(OverTime(key, title, f"error of {said}", name, -17, 2, caption))
     return made
 
 
@@ -267,12 +201,8 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
     if "agreement" in made:
         said.append(f"The two agree to {made['agreement']}")
     floor = problem.errors(known.high, known.t)
-    least = ", ".join(
-        f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}"
-        for name in ("energy", "angular_momentum")
-        if name in floor
-    )
-    if least:
+    shown = [name for name in ("energy", "angular_momentum") if name in floor]
+    if least := ", ".join(f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}" for name in shown):
         said.append(
             f"Errors of the reference itself once rounded to doubles, the least a run can show: {least}"
         )

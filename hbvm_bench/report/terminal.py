@@ -13,19 +13,14 @@ from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import goals
-from hbvm_bench.summaries.rows import Row, at_once, columns, numbers, rows, tasks, title_of
+from hbvm_bench.summaries.rows import Row, at_once, columns, grouped, numbers, rows, tasks
 from hbvm_bench.summaries.table import NONE, Table
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
 GIVEN_UP = (
-    "compile_seconds",
-    "evaluations",
-    "z_end",
-    "steps",
-    "z_error",
-    "guard_max",
-    "angular_momentum_max",
+    *("compile_seconds", "evaluations", "z_end", "steps", "z_error"),
+    *("guard_max", "angular_momentum_max"),
 )
 PIPE_WIDTH = 200  # characters; a table that is piped away should not be folded at 80
 
@@ -56,9 +51,8 @@ def print_table(table: Table) -> None:
     made = empty(table.title)
     made.caption = table.note
     for index, head in enumerate(table.head):
-        made.add_column(
-            Text(head), justify="left" if index in table.words else "right", overflow="fold", min_width=6
-        )
+        justify = "left" if index in table.words else "right"
+        made.add_column(Text(head), justify=justify, overflow="fold", min_width=6)
     for row in table.rows:
         made.add_row(*(Text(cell) for cell in row))
     console().print(made)
@@ -87,16 +81,7 @@ def results(
 ) -> list[RenderableType]:
     """Return, for each problem and each ensemble, its table and the remarks on its rows.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        The cases.
-    keys : sequence of str, optional
-        Only these metrics, whether they fit or not.
-    sort : str, optional
-        Metric to sort by.
-    width : int
-        Of the terminal, in characters.
+    The metrics are those of ``keys``, or the headline ones that fit into the width, in characters.
     """
     return [
         _results(problem + at_once(ensemble), members, keys, sort, width)
@@ -117,18 +102,15 @@ def _results(
     for metric in shown:
         made.add_column(metric.short, justify="right", no_wrap=True)
     remarks = RichTable.grid(padding=(0, 2))
-    group = ""
-    for row in lines:
-        if row.group != group:
-            if group:
-                made.add_section()
-            group = row.group
-            title = title_of(group, [one for one in lines if one.group == group])
-            made.add_row("", Text(title, style="bold italic"))
-        number = str(number_of[row.record.id])
-        made.add_row(number, _method(row), *(_cell(row, metric.key) for metric in shown))
-        if row.remark:
-            remarks.add_row(Text(number, justify="right"), Text(f"{row.record.case.method}: {row.remark}."))
+    for title, members in grouped(lines):
+        made.add_section()
+        made.add_row("", Text(title, style="bold italic"))
+        for row in members:
+            number, method = str(number_of[row.record.id]), row.record.case.method
+            name = Text(method, style="bold cyan" if row.record.role == "ours" else "")
+            made.add_row(number, name, *(_cell(row, metric.key) for metric in shown))
+            if row.remark:
+                remarks.add_row(Text(number, justify="right"), Text(f"{method}: {row.remark}."))
     note = "In brackets: void, for the row is another trajectory or only a part of it."
     if hidden:
         note += f" {hidden} columns do not fit; a wider terminal or --metric shows them."
@@ -137,24 +119,15 @@ def _results(
 
 def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metric]:
     """Return the columns that fit beside the methods, the least telling given up first."""
-    kept = list(shown)
-
-    def needed() -> int:
-        cells = {
-            metric.key: [row.cells[metric.key] for row in lines if metric.key in row.cells] for metric in kept
-        }
-        lengths = [max([len(one.short), *(len(cell.text) + 2 for cell in cells[one.key])]) for one in kept]
-        return 5 + NARROWEST + sum(length + 3 for length in lengths)
-
+    needed: dict[str, int] = {}
+    for metric in shown:
+        cells = (row.cells[metric.key] for row in lines if metric.key in row.cells)
+        needed[metric.key] = 3 + max(len(metric.short), *(len(cell.text) + 2 for cell in cells), 0)
     for key in GIVEN_UP:
-        if needed() <= width:
+        if 5 + NARROWEST + sum(needed.values()) <= width:
             break
-        kept = [metric for metric in kept if metric.key != key]
-    return kept
-
-
-def _method(row: Row) -> Text:
-    return Text(row.record.case.method, style="bold cyan" if row.record.role == "ours" else "")
+        needed.pop(key, None)
+    return [metric for metric in shown if metric.key in needed]
 
 
 def _cell(row: Row, key: str) -> Text:

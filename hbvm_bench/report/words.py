@@ -1,13 +1,12 @@
 """What the report says in sentences; every number in them is read from the records."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import fairness
-from hbvm_bench.summaries.points import accurate, family_of, number
+from hbvm_bench.summaries.points import accurate, number
 from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, status_of
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
@@ -84,8 +83,7 @@ def summary(records: Sequence[Record]) -> list[str]:
         f"{cases}: {len(groups['on'])} follow the trajectory to the end, "
         f"{len(groups['off'])} lost its symmetry, {len(groups['ended'])} did not reach the end."
     ]
-    ranked = _ranked(groups["on"], "position_end")
-    if ranked:
+    if ranked := _ranked(groups["on"], "position_end"):
         sentences.append(_best("Smallest position error at the end", ranked, "position_end"))
         fast = _ranked([r for r in ranked if accurate(r, RIGHT)], "warm_seconds")
         level = " and ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in RIGHT.items())
@@ -99,10 +97,9 @@ def summary(records: Sequence[Record]) -> list[str]:
             "`reference = true` in the campaign file, or `--reference`, computes one before the run."
         )
     sentences += fairness.disturbed(records)
-    for record in groups["ended"]:
-        if record.result.outcome == "stalled":
-            sentences.append(f"{record.case.method} {status_of(record)}, seen by the watchdog.")
-    return sentences
+    stalled = [record for record in groups["ended"] if record.result.outcome == "stalled"]
+    said = (f"{record.case.method} {status_of(record)}, seen by the watchdog." for record in stalled)
+    return [*sentences, *said]
 
 
 def shortcomings(records: Sequence[Record]) -> list[str]:
@@ -113,25 +110,15 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
         ours = record.role == "ours" and group_of(record) == "on"
         if not ours or position is None or energy is None or position < 1e-2:
             continue
-        parts = [
+        z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
+        shown.append(
             f"Here {record.case.method} has the energy right to {energy:.1e} "
             f"and a position error of {position:.2g} at the end"
-        ]
-        z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
-        if z is not None:
-            parts.append(f"z wrong by {z:.2g}")
-        if angular is not None:
-            parts.append(f"the angular momentum off by {angular:.1e}")
-        shown.append(", ".join(parts) + "; the paths below show what that does to the orbits.")
+            + ("" if z is None else f", z wrong by {z:.2g}")
+            + ("" if angular is None else f", the angular momentum off by {angular:.1e}")
+            + "; the paths below show what that does to the orbits."
+        )
     return shown
-
-
-def settings_count(records: Sequence[Record]) -> list[tuple[str, str, Counter[str]]]:
-    """Return method, library and how many settings it has of each kind."""
-    counted: dict[tuple[str, str], Counter[str]] = {}
-    for record in records:
-        counted.setdefault((family_of(record), record.library), Counter())[record.case.settings] += 1
-    return [(name, library, kinds) for (name, library), kinds in counted.items()]
 
 
 def excluded(records: Sequence[Record]) -> list[str]:

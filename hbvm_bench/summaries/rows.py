@@ -101,10 +101,14 @@ def at_once(ensemble: Ensemble | None) -> str:
     return f", {ensemble.count} trajectories at once{varied}"
 
 
-def title_of(group: str, found: Sequence[Row]) -> str:
-    """Return the title of a group, with what it is sorted by where any of its rows has that."""
-    ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in found)
-    return GROUPS[group] + (", by position error at the end" if ranked else "")
+def grouped(found: Sequence[Row]) -> list[tuple[str, list[Row]]]:
+    """Return the groups that have rows, each with its title, which says what ranks them."""
+    made = []
+    for group, title in GROUPS.items():
+        members = [row for row in found if row.group == group]
+        ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in members)
+        made += [(title + ", by position error at the end" * ranked, members)] if members else []
+    return made
 
 
 def numbers(records: Sequence[Record]) -> dict[str, int]:

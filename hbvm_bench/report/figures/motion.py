@@ -54,17 +54,10 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
     grid = figure.subplots(1, len(panes), squeeze=False)[0]
     for axes, pane in zip(grid, panes, strict=True):
         _pane(axes, pane[0])
+    shown = [case for pane in panes for case in pane]
     every = max(1, len(panes[0][0].series["t"]) // NUMBERS)
-    traces = [
-        trace(case, case.series["t"][::every], case.series["y"][::every, PLANETOID_Z])
-        for pane in panes
-        for case in pane
-    ]
-    said = "; ".join(
-        f"{case.record.case.method}: {_fate(case, float(case.series['t'][-1]))}"
-        for pane in panes
-        for case in pane
-    )
+    traces = [trace(c, c.series["t"][::every], c.series["y"][::every, PLANETOID_Z]) for c in shown]
+    said = "; ".join(f"{c.record.case.method}: {_fate(c, float(c.series['t'][-1]))}" for c in shown)
     made = picture(
         figure,
         "motion",
@@ -75,21 +68,12 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
         f"Where the planetoid is at the end. {said}.",
         Plot([Panel("", Axis("time"), Axis("z of the planetoid"), traces)]),
     )
-    return replace(made, motion=as_json(panes))
-
-
-def as_json(panes: Sequence[Sequence[Drawn]]) -> dict[str, Any]:
-    """Return what the page needs to move it: positions as differences of whole multiples of 1/`GRAIN`."""
-    return {
-        "grain": GRAIN,
-        "revolution": REVOLUTION,
-        "camera": [YAW, PITCH],
-        "reach": REACH,
-        "panes": [[_case(case) for case in pane] for pane in panes],
-    }
+    view = {"grain": GRAIN, "revolution": REVOLUTION, "camera": [YAW, PITCH], "reach": REACH}
+    return replace(made, motion=view | {"panes": [[_case(case) for case in pane] for pane in panes]})
 
 
 def _case(case: Drawn) -> dict[str, Any]:
+    """Return what the page needs to move a case: positions as differences of whole multiples of 1/`GRAIN`."""
     t, y = case.series["t"], case.series["y"][:, :9]
     good = np.isfinite(y).all(axis=1)
     t, y = t[good], np.clip(y[good], -FAR, FAR)
@@ -123,15 +107,19 @@ def _pane(axes: Axes, case: Drawn) -> None:
     good = np.isfinite(y).all(axis=1)
     t, y = t[good], y[good]
     late = t >= t[-1] - REVOLUTION
-    for body in range(3):
+    primary, planetoid = (TRUTH, 0.8, MUTED, 8), (case.look.light, 1.4, case.look.light, 5)
+    for body, (colour, width, dot, size) in enumerate((primary, primary, planetoid)):
         path = project(y[late][:, 3 * body : 3 * body + 3])
         path = path[np.abs(path).max(axis=1) < 3 * REACH]
-        colour = case.look.light if body == 2 else TRUTH
-        axes.plot(*path.T, color=colour, linewidth=1.4 if body == 2 else 0.8, clip_on=True)
+        axes.plot(*path.T, color=colour, linewidth=width, clip_on=True)
         if len(path) and np.abs(path[-1]).max() < REACH:
-            axes.plot(*path[-1], "o", color=colour if body == 2 else MUTED, markersize=5 if body == 2 else 8)
-    name = f"{case.look.number}  {family_of(case.record)}  {options(case.record)}"
-    axes.set_title(f"{name}\n{_fate(case, float(t[-1]))}", color=INK, fontsize=7.5, loc="center")
+            axes.plot(*path[-1], "o", color=dot, markersize=size)
+    axes.set_title(
+        f"{case.short}  {options(case.record)}\n{_fate(case, float(t[-1]))}",
+        color=INK,
+        fontsize=7.5,
+        loc="center",
+    )
 
 
 def project(points: Array) -> Array:
@@ -143,8 +131,7 @@ def project(points: Array) -> Array:
 
 
 def _fate(case: Drawn, end: float) -> str:
-    z = float(case.series["y"][-1, PLANETOID_Z])
-    lost = case.record.result.violation
     if case.record.result.outcome != "ok":
         return status_of(case.record)
-    return f"t = {end:g}, z = {z:.4g}" + (", off the axis" if lost else "")
+    lost = ", off the axis" if case.record.result.violation else ""
+    return f"t = {end:g}, z = {case.series['y'][-1, PLANETOID_Z]:.4g}{lost}"

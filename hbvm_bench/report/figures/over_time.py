@@ -44,6 +44,11 @@ class Drawn:
         error = number(self.record, "position_end")
         return math.inf if error is None else error
 
+    @property
+    def short(self) -> str:
+        """Its number and the name of its method."""
+        return f"{self.look.number}  {family_of(self.record)}"
+
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
         mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
@@ -57,11 +62,11 @@ class OverTime:
 
     key: str
     title: str
-    caption: str
     label: str  # of the axis
     values: str  # name of the series that is drawn; one that ends in a dot is the first that begins so
     low: int  # powers of ten of the axis
     high: int
+    caption: str
     t: str = "t"
     zero: bool = False  # whether "exactly 0" is a place on the axis
     joined: bool = True  # whether the samples are joined and binned (else: drawn as markers)
@@ -164,8 +169,13 @@ def panel_legend(
 def shortened(name: str, note: str) -> str:
     """Return a name and its note in one line of a legend under its panel; the name gives way."""
     room = max(48 - len(note) - 3, 8) if note else 42  # with notes the letters are smaller
-    cut = name if len(name) <= room else name[: room - 1] + "…"
-    return f"{cut}   {note}" if note else cut
+    name = cut(name, room, room - 1)
+    return f"{name}   {note}" if note else name
+
+
+def cut(text: str, room: int, kept: int = 0) -> str:
+    """Return a text in so much room; of a longer one so much is ``kept``, by default all that fits."""
+    return text if len(text) <= room else text[: kept or room] + "…"
 
 
 def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture
-from hbvm_bench.report.figures.over_time import WIDTH, Drawn, trace
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, cut, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, options
 from problems.problem import Problem
@@ -26,9 +26,8 @@ def portrait(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
     """Draw momentum against position of a problem with one degree of freedom; else ``None``."""
     if problem.system.dof != 1:
         return None
-    clouds = [(case, case.series["y"][:, 0], case.series["y"][:, 1]) for case in cases]
     return _grid(
-        [(case, q, p) for case, q, p in clouds if q.size > 2],
+        [(case, *case.series["y"][:, :2].T) for case in cases if len(case.series["y"]) > 2],
         "phase-portrait",
         "Phase portrait",
         "All samples of each case. The true motion stays on one closed curve; a spread across it is an error "
@@ -57,13 +56,7 @@ def section(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
 
 
 def crossings(y: Array) -> tuple[Array, Array]:
-    """Return q2 and p2 where q1 passes 0 upwards, shape (n,) each.
-
-    Parameters
-    ----------
-    y : ndarray, shape (n, 4)
-        States q1, q2, p1, p2 in the order of time.
-    """
+    """Return q2 and p2 where q1 of states q1, q2, p1, p2, shape (n, 4), passes 0 upwards, shape (m,) each."""
     good = np.isfinite(y).all(axis=1)
     y = y[good]
     if len(y) < 2:
@@ -96,23 +89,13 @@ def _grid(
         every = max(1, -(-x.size // MOST))
         axes.plot(x[::every], y[::every], ".", color=case.look.light, markersize=1.1, rasterized=True)
         axes.set(xlim=reach[0], ylim=reach[1])
-        axes.set_title(
-            f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=8, color=INK
-        )
-        words = options(case.record)
+        axes.set_title(case.short, fontsize=8, color=INK)
         lowest = axes in grid[max(len(clouds) - COLUMNS, 0) : len(clouds)]
         if lowest:  # of its column
             axes.tick_params(labelbottom=True)
             axes.text(1.0, -0.2, labels[0], transform=axes.transAxes, fontsize=8, ha="right", va="top")
-        axes.text(
-            0.0,
-            -0.2 if lowest else -0.08,
-            words if len(words) < 34 else words[:33] + "…",
-            transform=axes.transAxes,
-            fontsize=6,
-            color=MUTED,
-            va="top",
-        )
+        words, below = cut(options(case.record), 33), -0.2 if lowest else -0.08
+        axes.text(0.0, below, words, transform=axes.transAxes, fontsize=6, color=MUTED, va="top")
         fewer = max(1, -(-x.size // PAGE_POINTS))
         traces.append(trace(case, x[::fewer], y[::fewer]))
     for row in range(rows):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from hbvm_bench.measure.metrics import PLANETOID_Z
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, say
-from hbvm_bench.report.figures.over_time import WIDTH, Drawn, family_panels, panel_legend, trace
+from hbvm_bench.report.figures.over_time import WIDTH, Drawn, cut, family_panels, panel_legend, trace
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH, options
 from hbvm_bench.summaries.rows import status_of
@@ -69,8 +69,9 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
     best = min(shown, key=lambda case: case.position_error)
     columns = 9
     rows = -(-len(shown) // columns)
-    figure = new(WIDTH, 1.66 * rows)
-    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / (1.66 * rows), bottom=0.2 / (1.66 * rows))
+    height = 1.66 * rows
+    figure = new(WIDTH, height)
+    figure.subplots_adjust(left=0.02, right=0.99, top=1 - 0.2 / height, bottom=0.2 / height)
     grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"hspace": 0.32}).ravel().tolist()
     for axes in grid[len(shown) :]:
         axes.set_axis_off()
@@ -85,14 +86,10 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
             axes.plot(*mine, color=case.look.light, linewidth=0.9)
             curves[body].append(trace(case, *mine[:, ::4]))
         axes.set(xlim=(-3.4, 3.4), ylim=(-3.4, 3.4), aspect="equal")
-        axes.set_xticks([-2.5, 0, 2.5], labels=[])
-        axes.set_yticks([-2.5, 0, 2.5], labels=[])
+        axes.set(xticks=[-2.5, 0, 2.5], xticklabels=[], yticks=[-2.5, 0, 2.5], yticklabels=[])
         axes.tick_params(length=0)
-        axes.set_title(
-            f"{case.look.number}  {case.record.case.method.partition('(')[0]}", fontsize=7, color=INK
-        )
-        words = options(case.record)
-        axes.set_xlabel(words if len(words) < 32 else words[:30] + "…", fontsize=5.5, color=MUTED, labelpad=1)
+        axes.set_title(case.short, fontsize=7, color=INK)
+        axes.set_xlabel(cut(options(case.record), 31, 30), fontsize=5.5, color=MUTED, labelpad=1)
     return picture(
         figure,
         "primaries",
@@ -102,11 +99,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
         "for the direction of the apsides, whatever its energy says.",
         Plot(
-            [
-                Panel(f"primary {body + 1}", Axis("x"), Axis("y"), curves[body], square=True)
-                for body in (0, 1)
-            ],
-            "paths",
+            [Panel(f"primary {i + 1}", Axis("x"), Axis("y"), curves[i], square=True) for i in (0, 1)], "paths"
         ),
     )
 
@@ -126,29 +119,19 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     low = 0
     curves: tuple[list[Trace], list[Trace]] = ([], [])
     for case in shown:
-        history = case.series["extra.dt_history"]
-        history = history[np.abs(history[:, 1]) > 0]
-        dt = np.abs(history[:, 1])
+        t, dt = case.series["extra.dt_history"][:, :2].T
+        t, dt = t[dt != 0], np.abs(dt[dt != 0])
         low = min(low, int(np.floor(np.log10(dt.min()))) - 1)
-        for axes, x in ((left, history[:, 0]), (right, np.arange(1, len(dt) + 1))):
-            every = max(1, len(dt) // 60)
+        every = max(1, len(dt) // 60)
+        for axes, x, panel in ((left, t, curves[0]), (right, np.arange(1.0, len(dt) + 1), curves[1])):
             axes.plot(x, dt, color=case.look.light, marker=case.look.marker, markersize=2, markevery=every)
-        curves[0].append(trace(case, history[:, 0], dt))
-        curves[1].append(trace(case, np.arange(1.0, len(dt) + 1), dt))
-        say(
-            left,
-            f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}",
-            (history[-1, 0], dt.min()),
-            (-8, 4),
-            ha="right",
-            fontsize=8,
-            color=INK,
-        )
-    for axes in (left, right):
+            panel.append(trace(case, x, dt))
+        said = f"{case.look.number}  {case.record.case.method}: {status_of(case.record)}"
+        say(left, said, (t[-1], dt.min()), (-8, 4), ha="right", fontsize=8)
+    titles = ("time", "recorded step")
+    for axes, title in zip((left, right), titles, strict=True):
         log_axis(axes, "y", low, 1)
-        axes.set_ylabel("step size dt")
-    left.set_xlabel("time")
-    right.set_xlabel("recorded step")
+        axes.set(xlabel=title, ylabel="step size dt")
     return picture(
         figure,
         "step-sizes",
@@ -157,8 +140,8 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
         "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
         Plot(
             [
-                Panel(title, Axis(title), Axis("step size dt", log=True), traces)
-                for title, traces in zip(("time", "recorded step"), curves, strict=True)
+                Panel(t, Axis(t), Axis("step size dt", log=True), c)
+                for t, c in zip(titles, curves, strict=True)
             ]
         ),
     )

@@ -258,7 +258,15 @@ def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
     case = msgspec.structs.replace(record.case, ensemble=Ensemble(count=100))
     record = msgspec.structs.replace(record, case=case)
     for ends, said in ((7, True), (0, False)):
-        made = part(case.problem, [(record, {"position_t": np.ones(ends)})], looks([case.method]), [], 1)
+        made = part(
+            case.problem,
+            [(record, {"position_t": np.ones(ends)})],
+            looks([case.method]),
+            [],
+            1,
+            brief=False,
+            summarized=False,
+        )
         assert (f"the largest of {ends} trajectories" in str(made.summary)) == said
 
 
