@@ -10,7 +10,6 @@ from rich.text import Text
 import problems
 from hbvm_bench.campaign.identity import typed_problem
 from hbvm_bench.report import terminal
-from hbvm_bench.summaries import engines as engines_
 from hbvm_bench.summaries import findings
 from hbvm_bench.summaries.table import Table
 from problems.errors import unknown
@@ -42,7 +41,7 @@ def engines(
     for name in names or []:
         if name not in problems.names():
             raise unknown("problem", name, problems.names())
-    table, reasons = engines_.table(names or [])
+    table, reasons = findings.engines(names or [])
     if markdown:
         from hbvm_bench.report.markdown import printed  # what draws costs seconds to import
 

@@ -11,7 +11,7 @@ from hbvm_bench.gallery import pictures
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.report.markdown import printed
 from hbvm_bench.store.files import write_all
-from hbvm_bench.summaries import engines
+from hbvm_bench.summaries import findings
 from problems import registry
 from problems.analysis import structure
 from problems.analysis.latex import latex
@@ -82,7 +82,7 @@ def _gallery(names: Sequence[str]) -> str:
 
 
 def _engines(names: Sequence[str]) -> str:
-    table, reasons = engines.table(names)
+    table, reasons = findings.engines(names)
     listed = "\n".join(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1))
     return f"{printed(table)}\n\n{listed}"
 

@@ -1,7 +1,7 @@
 """A run for other tools: JSON, and flat tables as CSV or, with the extra ``hbvm-bench[export]``, Parquet."""
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,33 +16,24 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.files import atomic, csv_of
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Record, Timing, Value
 from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError, MissingLibraryError, unknown
 
-Row = dict[str, Any]
+Row = tuple[Any, ...]
 FORMATS = (".csv", ".parquet")
 
 
 @dataclass(frozen=True)
 class Table:
-    """One of the tables."""
+    """One of the tables: its columns, each of which may be empty in a row, and the rows of a case."""
 
-    columns: dict[str, type]  # by name; every column may be empty in a row
-    rows: Callable[[Record, Store], Iterator[Row]]
+    columns: dict[str, type]
+    rows: Callable[[Record, Store], Iterable[Row]]
 
 
 def export(store: Store, path: Path, table: str = "cases") -> int:
-    """Write a table of a run and return the number of its rows.
-
-    Parameters
-    ----------
-    store : Store
-        The run.
-    path : pathlib.Path
-        Its ending says the format: ``.csv`` or ``.parquet``.
-    table : {"cases", "timings", "series"}
-        One row per case, per timing sample, or per number in a series.
+    """Write one of `TABLES` to a file that ends in ``.csv`` or ``.parquet``; return the number of rows.
 
     Raises
     ------
@@ -65,8 +56,7 @@ def export(store: Store, path: Path, table: str = "cases") -> int:
 
 def cases_csv(records: Sequence[Record]) -> bytes:
     """Return the table of cases as comma-separated text."""
-    names = CASE_COLUMNS.keys()
-    return csv_of([names, *([row.get(name) for name in names] for row in map(_case_row, records))])
+    return csv_of([list(CASES), *map(_case, records)])
 
 
 def as_json(records: Sequence[Record]) -> dict[str, Any]:
@@ -86,7 +76,7 @@ def _as_json(record: Record) -> dict[str, Any]:
     return {**_whole(record.case), **result, **fields, "timing": timed}
 
 
-def _whole(declared: msgspec.Struct) -> Row:
+def _whole(declared: msgspec.Struct) -> dict[str, Any]:
     """Return a part of a campaign as JSON values with its defaults, which its file leaves out."""
     values = msgspec.structs.asdict(declared)
     return {key: _whole(v) if isinstance(v, msgspec.Struct) else v for key, v in values.items()}
@@ -95,8 +85,8 @@ def _whole(declared: msgspec.Struct) -> Row:
 @contextmanager
 def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], None]]:
     with path.open("w", encoding="utf-8", newline="") as stream:
-        made = csv.DictWriter(stream, list(columns))
-        made.writeheader()
+        made = csv.writer(stream)
+        made.writerow(columns)
         yield made.writerows
 
 
@@ -112,118 +102,118 @@ def _parquet(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Ro
         ) from None
     types = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
     schema = pyarrow.schema([(name, types[kind]) for name, kind in columns.items()])
+
+    def write(rows: list[Row]) -> None:
+        named = [dict(zip(columns, row, strict=True)) for row in rows]
+        writer.write_table(pyarrow.Table.from_pylist(named, schema=schema))
+
     with ParquetWriter(path, schema) as writer:
-        yield lambda rows: writer.write_table(pyarrow.Table.from_pylist(rows, schema=schema))
+        yield write
 
 
-def _key(record: Record) -> Row:
-    return {"id": record.id, "problem": record.case.problem, "method": record.case.method}
-
-
-def _case_row(record: Record) -> Row:
-    case, result, timing = record.case, record.result, record.timing
-    row = _key(record) | {
-        "problem_name": parse_spec(case.problem).name,
-        "problem_arguments": _json(parse_spec(case.problem).arguments),
-        "method_name": parse_spec(case.method).name,
-        "method_options": _json(parse_spec(case.method).arguments),
-        "settings": case.settings,
-        "note": case.note,
-        "ensemble": "" if case.ensemble is None else _json(_whole(case.ensemble)),
-        "role": record.role,
-        "library": record.library,
-        "order": record.order,
-        "outcome": result.outcome,
-        "status": result.status,
-        "reason": result.reason,
-        "violation": result.violation,
-        "warnings": " ".join(result.warnings),
-        "t_stop": result.t_stop,
-    }
-    for key in METRICS:
-        value = result.metrics.get(key)
-        number = None if value is None or value.value is None else float(value.value)
-        row |= {key: number, f"{key}_void": value is not None and value.void}
-        row[f"{key}_why"] = "" if value is None else value.why
-    if timing is not None:
-        rounds = timing.rounds
-        row |= {f"time_{name}": number for name, number in timing.summary.items()}
-        row |= {"time_rounds": len(rounds), "time_samples": len(timing.samples), "time_why": timing.why}
-        row |= {"time_share": timing.share, "time_machine": _json(timing.machine)}
-        if calibration := [seconds for one in rounds for seconds in one.calibration]:
-            row["time_calibration"] = median(calibration)
-    counters = result.counters
-    row |= {"rejections": counters.rejections, "iterations": counters.iterations, "solver": counters.solver}
-    row |= {"process_seconds": record.seconds, "process_peak_gib": record.peak_memory_gib}
-    row |= {"versions": _json(record.versions), "machine": _json(record.machine)}
-    return row | {"finished": record.finished}
+def _case(record: Record) -> Row:
+    return tuple(value(record) for _, value in CASES.values())
 
 
 def _timings(record: Record, store: Store) -> Iterator[Row]:
     del store
     for number, one in enumerate(record.timing.rounds if record.timing else []):
+        calibration = median(one.calibration) if one.calibration else None
+        rest = (one.repeats, calibration, one.share, one.compile.seconds, one.compile.cached)
         for sample, seconds in enumerate(one.samples):
-            yield _key(record) | {
-                "round": number,
-                "sample": sample,
-                "seconds": seconds,
-                "repeats": one.repeats,
-                "calibration": median(one.calibration) if one.calibration else None,
-                "share": one.share,
-                "compile_seconds": one.compile.seconds,
-                "compile_cached": one.compile.cached,
-            }
+            yield (*_key(record), number, sample, seconds, *rest)
 
 
 def _series(record: Record, store: Store) -> Iterator[Row]:
     series = store.series(record.id)
     if why := damage(record, series, make_problem(record.case.problem).system.dim):
-        yield _key(record) | {"quantity": f"damaged: {why}"}
+        yield (*_key(record), f"damaged: {why}", None, None, None, None)
         return
     for name, values in series.items():
         times = series["position_t" if name.startswith(("position", "phase")) else "t"]
         for i, parts in enumerate(values):
+            t = float(times[i]) if len(times) == len(values) else None
             for component, value in enumerate(np.ravel(parts).tolist()):
-                yield _key(record) | {
-                    "quantity": name,
-                    "sample": i,
-                    "component": component,
-                    "t": float(times[i]) if len(times) == len(values) else None,
-                    "value": float(value),
-                }
+                yield (*_key(record), name, i, component, t, float(value))
+
+
+def _key(record: Record) -> Row:
+    return record.id, record.case.problem, record.case.method
 
 
 def _json(value: Any) -> str:
     return msgspec.json.encode(value, order="deterministic").decode()
 
 
-def _case_columns() -> dict[str, type]:
-    words = ("problem_name", "problem_arguments", "method_name", "method_options", "settings", "note")
-    keys = ("id", "problem", "method", *words, "ensemble", "role", "library")
-    columns: dict[str, type] = dict.fromkeys(keys, str)
-    columns |= {"order": int} | dict.fromkeys(("outcome", "status", "reason", "violation", "warnings"), str)
-    columns["t_stop"] = float
-    for key in METRICS:
-        columns |= {key: float, f"{key}_void": bool, f"{key}_why": str}
-    columns |= dict.fromkeys(("time_median", "time_min", "time_q1", "time_q3"), float)
-    columns |= {"time_rounds": int, "time_samples": int, "time_why": str, "time_share": float}
-    columns |= {"time_calibration": float, "time_machine": str}
-    columns |= {"rejections": int, "iterations": int, "solver": str}
-    columns |= {"process_seconds": float, "process_peak_gib": float}
-    return columns | dict.fromkeys(("versions", "machine", "finished"), str)
+def _timed(value: Callable[[Timing], Any]) -> Callable[[Record], Any]:
+    return lambda record: None if record.timing is None else value(record.timing)
 
 
-CASE_COLUMNS = _case_columns()
+def _metric(key: str) -> dict[str, tuple[type, Callable[[Record], Any]]]:
+    """Return the three columns of a metric."""
+
+    def found(record: Record) -> Value:
+        return record.result.metrics.get(key, Value())
+
+    def number(record: Record) -> float | None:
+        value = found(record).value
+        return None if value is None else float(value)
+
+    void, why = (lambda record: found(record).void), (lambda record: found(record).why)
+    return {key: (float, number), f"{key}_void": (bool, void), f"{key}_why": (str, why)}
+
+
+def _calibration(timing: Timing) -> float | None:
+    found = [seconds for one in timing.rounds for seconds in one.calibration]
+    return median(found) if found else None
+
+
+CASES: dict[str, tuple[type, Callable[[Record], Any]]] = {
+    "id": (str, lambda record: record.id),
+    "problem": (str, lambda record: record.case.problem),
+    "method": (str, lambda record: record.case.method),
+    "problem_name": (str, lambda record: parse_spec(record.case.problem).name),
+    "problem_arguments": (str, lambda record: _json(parse_spec(record.case.problem).arguments)),
+    "method_name": (str, lambda record: parse_spec(record.case.method).name),
+    "method_options": (str, lambda record: _json(parse_spec(record.case.method).arguments)),
+    "settings": (str, lambda record: record.case.settings),
+    "note": (str, lambda record: record.case.note),
+    "ensemble": (str, lambda record: _json(_whole(record.case.ensemble)) if record.case.ensemble else ""),
+    "role": (str, lambda record: record.role),
+    "library": (str, lambda record: record.library),
+    "order": (int, lambda record: record.order),
+    "outcome": (str, lambda record: record.result.outcome),
+    "status": (str, lambda record: record.result.status),
+    "reason": (str, lambda record: record.result.reason),
+    "violation": (str, lambda record: record.result.violation),
+    "warnings": (str, lambda record: " ".join(record.result.warnings)),
+    "t_stop": (float, lambda record: record.result.t_stop),
+    **{name: column for key in METRICS for name, column in _metric(key).items()},
+    "time_median": (float, _timed(lambda timing: timing.summary.get("median"))),
+    "time_min": (float, _timed(lambda timing: timing.summary.get("min"))),
+    "time_q1": (float, _timed(lambda timing: timing.summary.get("q1"))),
+    "time_q3": (float, _timed(lambda timing: timing.summary.get("q3"))),
+    "time_rounds": (int, _timed(lambda timing: len(timing.rounds))),
+    "time_samples": (int, _timed(lambda timing: len(timing.samples))),
+    "time_why": (str, _timed(lambda timing: timing.why)),
+    "time_share": (float, _timed(lambda timing: timing.share)),
+    "time_calibration": (float, _timed(_calibration)),
+    "time_machine": (str, _timed(lambda timing: _json(timing.machine))),
+    "rejections": (int, lambda record: record.result.counters.rejections),
+    "iterations": (int, lambda record: record.result.counters.iterations),
+    "solver": (str, lambda record: record.result.counters.solver),
+    "process_seconds": (float, lambda record: record.seconds),
+    "process_peak_gib": (float, lambda record: record.peak_memory_gib),
+    "versions": (str, lambda record: _json(record.versions)),
+    "machine": (str, lambda record: _json(record.machine)),
+    "finished": (str, lambda record: record.finished),
+}
 _KEY: dict[str, type] = {"id": str, "problem": str, "method": str}
+_TIMINGS = {"round": int, "sample": int, "seconds": float, "repeats": int, "calibration": float}
+_COMPILE = {"share": float, "compile_seconds": float, "compile_cached": bool}
+_SERIES = {"quantity": str, "sample": int, "component": int, "t": float, "value": float}
 TABLES = {
-    "cases": Table(CASE_COLUMNS, lambda record, store: iter([_case_row(record)])),
-    "timings": Table(
-        _KEY
-        | {"round": int, "sample": int, "seconds": float, "repeats": int, "calibration": float}
-        | {"share": float, "compile_seconds": float, "compile_cached": bool},
-        _timings,
-    ),
-    "series": Table(
-        _KEY | {"quantity": str, "sample": int, "component": int, "t": float, "value": float}, _series
-    ),
+    "cases": Table({name: kind for name, (kind, _) in CASES.items()}, lambda record, _: [_case(record)]),
+    "timings": Table(_KEY | _TIMINGS | _COMPILE, _timings),
+    "series": Table(_KEY | _SERIES, _series),
 }

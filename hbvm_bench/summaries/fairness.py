@@ -20,13 +20,14 @@ def sentences(records: Sequence[Record]) -> list[str]:
     said: list[str] = []
     if len(counts) == 1:
         number = counts.pop()
-        said.append(
+        said = [
             f"In this run every method has {number} {'setting' if number == 1 else 'settings'} on every "
             "problem that it accepts, declared before the run."
-        )
+        ]
     elif counts:
-        listed = ", ".join(f"{family} {_range(numbers)}" for family, numbers in families.items())
-        said.append(f"In this run the methods do not have equally many settings on a problem: {listed}.")
+        ranges = {family: " to ".join(map(str, sorted(set(each)))) for family, each in families.items()}
+        listed = ", ".join(f"{family} {numbers}" for family, numbers in ranges.items())
+        said = [f"In this run the methods do not have equally many settings on a problem: {listed}."]
     return said + doubts(records)
 
 
@@ -79,7 +80,3 @@ def _settings(records: Sequence[Record]) -> tuple[int, int]:
     accepted = [record for record in records if record.result.outcome != "refused"]
     counts = [len(members) for members in by_problem(accepted or records).values()]
     return min(counts), max(counts)
-
-
-def _range(numbers: tuple[int, int]) -> str:
-    return f"{numbers[0]}" if numbers[0] == numbers[1] else f"{numbers[0]} to {numbers[1]}"

@@ -1,15 +1,19 @@
-"""What ``hbvm-bench inspect`` says about a formula or a problem."""
+"""What can be read off a formula or a problem, and which engine accepts it, and why not."""
 
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+import integrators.registry
 import problems
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
-from hbvm_bench.summaries import engines
+from hbvm_bench.summaries.table import Table
+from integrators.protocol import MethodBase
+from problems import emit
 from problems.analysis import structure
 from problems.analysis.latex import latex
 from problems.catalogue import expression
@@ -21,9 +25,20 @@ SHORTEST = 3
 """Letters that a formula's only name may have: q, p10."""
 
 DEGREES = (1, 2, 3, 4, 5)  # of the methods for which k is given
+KINDS = {
+    "hamiltonian": "canonical, q' = dH/dp, p' = -dH/dq",
+    "poisson": "Poisson, y' = B(y) grad H(y)",
+    "vector_field": "first-order system, y' = f(t, y)",
+}
+
+LIBRARIES = ("numpy", "numba", "jax", "heyoka")
+BODIES, FORCES = "REBOUND's bodies", "REBOUND's forces"
+# Values for what a method must be given: whether it accepts a problem does not depend on them.
+_NUMBERS = {"h": 1e-3, "k": 4, "s": 2, "tol": 1e-10, "rtol": 1e-10, "atol": 1e-10}
+_REQUIRED: dict[str, Any] = {**_NUMBERS, "invariants": ("energy",)}
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Findings:
     """What was found."""
 
@@ -108,41 +123,36 @@ def _describe(name: str, system: System, problem: Problem) -> Findings:
             key: value.tolist() if isinstance(value, np.ndarray) else value
             for key, value in system.unpack(problem.par).items()
         },
-        engines=engines.reasons(problem),
+        engines=reasons(problem),
     )
 
 
 def lines(found: Findings) -> list[tuple[str, str]]:
     """Return the findings as pairs of a heading and a sentence."""
-    freedom = f"{found.dimension // 2} degrees of freedom, " if found.kind == "hamiltonian" else ""
-    kinds = {
-        "hamiltonian": "canonical, q' = dH/dp, p' = -dH/dq",
-        "poisson": "Poisson, y' = B(y) grad H(y)",
-        "vector_field": "first-order system, y' = f(t, y)",
-    }
-    rows = [("system", f"{kinds[found.kind]}; {freedom}{found.dimension} unknowns")]
-    if found.formula:
-        rows.append(("H", found.formula))
-    if found.parameters:
-        values = ", ".join(f"{name} = {value!r}" for name, value in found.parameters.items())
-        rows.append(("parameters", values))
-    if found.kind == "hamiltonian":
-        yes = "yes: H = sum of c p^2/2 + V(q), the second-order form applies"
-        rows.append(("separable", yes if found.separable else "no: the first-order form applies"))
-    if found.kind != "vector_field":
-        rows.append(("polynomial", _polynomial(found)))
-    if found.kind == "hamiltonian":
-        momenta = ", ".join(f"{name.replace('q', 'p')} is constant" for name in found.cyclic)
-        rows.append(("cyclic coordinates", f"{', '.join(found.cyclic)}: {momenta}" if momenta else "none"))
-    rows.append(("time", "occurs: the energy is not kept" if found.depends_on_time else "does not occur"))
-    rows.append(("invariants", ", ".join(found.invariants) or "none known"))
-    if found.guards:
-        rows.append(("stays 0 by symmetry", ", ".join(found.guards)))
-    accepted = [name for name, reason in found.engines.items() if reason is None]
-    rows.append(("engines", ", ".join(accepted)))
-    refused = [f"{name}: {reason}" for name, reason in found.engines.items() if reason is not None]
-    rows += [("not for", sentence) for sentence in refused]
-    return rows
+    canonical = found.kind == "hamiltonian"
+    freedom = f"{found.dimension // 2} degrees of freedom, " if canonical else ""
+    momenta = ", ".join(f"{name.replace('q', 'p')} is constant" for name in found.cyclic)
+    cyclic = f"{', '.join(found.cyclic)}: {momenta}" if momenta else "none"
+    separable = (
+        "yes: H = sum of c p^2/2 + V(q), the second-order form applies"
+        if found.separable
+        else "no: the first-order form applies"
+    )
+    accepted = ", ".join(name for name, reason in found.engines.items() if reason is None)
+    rows = [
+        ("system", f"{KINDS[found.kind]}; {freedom}{found.dimension} unknowns"),
+        ("H", found.formula),
+        ("parameters", ", ".join(f"{name} = {value!r}" for name, value in found.parameters.items())),
+        ("separable", separable if canonical else ""),
+        ("polynomial", _polynomial(found) if found.kind != "vector_field" else ""),
+        ("cyclic coordinates", cyclic if canonical else ""),
+        ("time", "occurs: the energy is not kept" if found.depends_on_time else "does not occur"),
+        ("invariants", ", ".join(found.invariants) or "none known"),
+        ("stays 0 by symmetry", ", ".join(found.guards)),
+        ("engines", accepted),
+        *(("not for", f"{name}: {reason}") for name, reason in found.engines.items() if reason is not None),
+    ]
+    return [row for row in rows if row[1]]
 
 
 def _polynomial(found: Findings) -> str:
@@ -150,3 +160,67 @@ def _polynomial(found: Findings) -> str:
         return "not polynomial: the energy is kept to rounding once k is large enough, never exactly"
     pairs = ", ".join(f"k = {k} for s = {s}" for s, k in found.exact)
     return f"degree {found.degree}: HBVM(k, s) keeps the energy exactly from {pairs}"
+
+
+def reasons(problem: Problem) -> dict[str, str | None]:
+    """Return for each engine ``None`` if it accepts the problem, otherwise the reason.
+
+    First what the vector field is emitted to, then how REBOUND takes it, then the methods by name.
+    """
+    system, why = problem.system, "it is not a system of bodies with Newton's attraction."
+    return {
+        **{name: _emitted(problem, name) for name in LIBRARIES},
+        BODIES: why if system.bodies is None else None,
+        FORCES: _forces(system),
+        **{name: _accepted(problem, name) for name in integrators.registry.names()},
+    }
+
+
+def _accepted(problem: Problem, name: str) -> str | None:
+    try:
+        return _instance(integrators.registry.get(name)).accepts(problem)
+    except InputError as error:  # a library that is missing among them
+        return str(error)
+
+
+def _instance(cls: type[MethodBase]) -> MethodBase:
+    required = [field.name for field in dataclasses.fields(cls) if field.default is dataclasses.MISSING]
+    for option in required:
+        if option not in _REQUIRED:
+            raise InputError(f"it has to be told its option {option!r} first.")
+    given = {option: _REQUIRED[option] for option in required}
+    try:
+        return cls(**given)
+    except InputError:  # one of two, such as a step or a tolerance, is left to the user
+        return cls(h=1e-3, **given)  # type: ignore[call-arg]
+
+
+def _emitted(problem: Problem, library: str) -> str | None:
+    try:
+        emit.source(problem.system, "field", library)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def _forces(system: System) -> str | None:
+    if system.kind != "hamiltonian":
+        return "it has no positions and momenta."
+    if not system.separable:
+        return "it is not separable: q'' is not a function of q alone."
+    return None
+
+
+def matrix(names: Sequence[str] = ()) -> dict[str, dict[str, str | None]]:
+    """Return the reasons of problems at their defaults; of all of them without names."""
+    return {name: reasons(problems.load(name)) for name in (names or problems.names())}
+
+
+def engines(names: Sequence[str] = ()) -> tuple[Table, list[str]]:
+    """Return the matrix as a table, ✓ or the number of a reason, with the reasons in that order."""
+    rows = matrix(names)
+    listed = list(dict.fromkeys(reason for row in rows.values() for reason in row.values() if reason))
+    signs = {None: "✓"} | {reason: str(number) for number, reason in enumerate(listed, 1)}
+    cells = [(name, *(signs[reason] for reason in row.values())) for name, row in rows.items()]
+    head = ("problem", *next(iter(rows.values())))
+    return Table("", head, cells, words=range(len(head))), listed

@@ -74,11 +74,8 @@ def said(found: Verdict) -> str:
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
     for key in (goal.metric, *goal.within, *goal.no_worse):
         find(key)
-    judge = _alone if goal.ratio is None else _against
-    return judge(goal, entry, records)
-
-
-def _alone(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
+    if goal.ratio is not None:
+        return _against(goal, entry, records, goal.ratio)
     assert goal.at is not None
     metric, able = METRICS[goal.metric], standings.among(records, goal.method)
     ours = standings.best(able, goal.within, goal.metric)
@@ -97,8 +94,7 @@ def _alone(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdic
     )
 
 
-def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
-    assert goal.ratio is not None
+def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: float) -> Verdict:
     within = goal.within if goal.within or goal.no_worse else entry.within
     theirs = standings.best(standings.among(records, goal.against), within, goal.metric)
     found = Comparison(None, None)
@@ -108,7 +104,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verd
         ours = standings.best(standings.among(records, goal.method), allowed, goal.metric)
         found = standings.compare(ours, theirs, goal.metric)
     blind = not goal.alone and not any(key.startswith(PLACE) for key in (*within, *goal.no_worse))
-    reached = found.ratio is not None and found.ratio.median >= goal.ratio
+    reached = found.ratio is not None and found.ratio.median >= ratio
     why = ""
     if blind:
         why = "energy is not ranked without position"
@@ -119,7 +115,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verd
         goal=goal,
         entry=entry,
         words=goal.words or f"{label} of {goal.against} over ours, {_bounds(goal, within)}",
-        asked=f"≥ {goal.ratio:g}",
+        asked=f"≥ {ratio:g}",
         measured=ratio_text(found.ratio),
         verdict="void" if blind else "reached" if reached else "missed",
         why=why,
@@ -130,10 +126,8 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verd
 
 def _bounds(goal: Goal, within: dict[str, float]) -> str:
     said = [f"{METRICS[key].short} ≤ {bound:.0e}" for key, bound in within.items()]
-    said += [
-        f"{METRICS[key].short} no worse" if factor == 1.0 else f"{METRICS[key].short} ≤ {factor:g}× theirs"
-        for key, factor in goal.no_worse.items()
-    ]
+    for key, factor in goal.no_worse.items():
+        said.append(f"{METRICS[key].short} " + ("no worse" if factor == 1.0 else f"≤ {factor:g}× theirs"))
     return ", ".join(said) or "at any accuracy"
 
 
@@ -141,9 +135,8 @@ def ratio_text(ratio: Spread | None) -> str:
     """Write a ratio with its quartiles."""
     if ratio is None:
         return NONE
-    if ratio.low is None or ratio.high is None:
-        return f"{_number(ratio.median)}×"
-    return f"{_number(ratio.median)}× ({_number(ratio.low)}–{_number(ratio.high)})"
+    spread = f" ({_number(ratio.low)}–{_number(ratio.high)})" if ratio.low and ratio.high else ""
+    return f"{_number(ratio.median)}×{spread}"
 
 
 def _number(value: float) -> str:
@@ -168,12 +161,8 @@ def as_data(found: Sequence[Verdict]) -> list[dict[str, object]]:
 
 def ratio_data(found: Comparison) -> dict[str, object]:
     """Return a comparison as plain data for JSON."""
-    ratio = found.ratio
-    data: dict[str, object] = {
-        "ratio": ratio.median if ratio else None,
-        "low": ratio.low if ratio else None,
-        "high": ratio.high if ratio else None,
-    }
+    low, high = (found.ratio.low, found.ratio.high) if found.ratio else (None, None)
+    data: dict[str, object] = {"ratio": found.ratio and found.ratio.median, "low": low, "high": high}
     for name, record in (("ours", found.ours), ("theirs", found.theirs)):
         data[name] = record.case.method if record else None
         data[f"{name}_seconds"] = number(record, standings.TIME) if record else None

@@ -1,23 +1,34 @@
-"""Which integrator for which need: the answers of a run, in rows of text.
+"""Which integrator for which need, in rows of text, and performance profiles over all problems.
 
 A need is an accuracy and a number to be small. On every problem the settings that reach the
 accuracy are compared, and each family stands for its best; families are then ordered by on
 how many problems they come near the best, and among equals by how far they are from it
-in the median.
+in the median. The profile of a family at tau is the share of the problems on which its
+work is at most tau times the least of all families.
+
+E. D. Dolan, J. J. More, "Benchmarking optimization software with performance profiles",
+Mathematical Programming 91 (2002) 201-213.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from statistics import median
 from typing import NamedTuple
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import accurate, by_problem, family_of, number, work_of
+from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, work_of
 from hbvm_bench.summaries.table import Table
 
 SHOWN = 3  # families
 ROUND_OFF = 1e-15  # an error below this is as good as any other
+ACCURACIES = (
+    {"position_end": 1e-4},
+    {"position_end": 1e-8},
+    {"position_end": 1e-8, "energy_max": 1e-13},
+)
+"""Errors by metric: loose, accurate, and accurate with the energy at round-off."""
 
 
 class Need(NamedTuple):
@@ -37,10 +48,7 @@ def table(records: Sequence[Record]) -> Table | None:
         behind = factors(records, need)
         problems = len(next(iter(behind.values()), ()))
         near = {family: sum(factor <= need.near for factor in found) for family, found in behind.items()}
-        typical = {
-            family: median([factor for factor in found if factor < math.inf])
-            for family, found in behind.items()
-        }
+        typical = {family: median(filter(math.isfinite, found)) for family, found in behind.items()}
         first = sorted(behind, key=lambda family: (-near[family], typical[family]))[:SHOWN]
         said = [
             f"{family} ({near[family]} of {problems}"
@@ -112,3 +120,49 @@ def _within(**errors: float) -> Callable[[Record], bool]:
 def _without_drift(record: Record) -> bool:
     law = record.result.laws.get("energy")
     return accurate(record, {}) and law is not None and law.law in ("bounded", "square root")
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The profiles of all families for one accuracy."""
+
+    words: str  # the accuracy that was asked for
+    # of each family its work over the least, by problem that any family solves; infinite where it does not
+    ratios: dict[str, list[float]]
+
+    @property
+    def problems(self) -> int:
+        """On how many problems any family reaches the accuracy; the shares are of these."""
+        return len(next(iter(self.ratios.values()), ()))
+
+    def share(self, family: str, tau: float) -> float:
+        """Return the share of the problems on which a family is within a factor ``tau`` of the best."""
+        ratios = self.ratios[family]
+        return sum(ratio <= tau for ratio in ratios) / len(ratios) if ratios else 0.0
+
+    def curve(self, family: str) -> tuple[list[float], list[float]]:
+        """Return the steps of a family's profile: factors, ascending from 1, and shares from there on."""
+        taus = sorted({1.0, *(ratio for ratio in self.ratios[family] if math.isfinite(ratio))})
+        return taus, [self.share(family, tau) for tau in taus]
+
+    def solved(self, family: str) -> int:
+        """Return on how many problems a family reaches the accuracy."""
+        return sum(math.isfinite(ratio) for ratio in self.ratios[family])
+
+    def wins(self, family: str) -> int:
+        """Return on how many problems a family has the least work, the first of several that have it."""
+        first = [min(self.ratios, key=lambda name: self.ratios[name][i]) for i in range(self.problems)]
+        return first.count(family)
+
+
+def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -> Profile:
+    """Return the profiles of all families for the errors, by metric, that a setting may have at most.
+
+    A family without the metric of work (a Taylor method has no count of evaluations) has no ratio.
+    """
+    need = Need("", lambda record: bool(number(record, work)) and accurate(record, within), work)
+    found = factors(records, need)
+    solved = len(next(iter(found.values()), ()))
+    families = by_family([record for record in records if record.case.ensemble is None])
+    words = ", ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in within.items())
+    return Profile(words, {family: list(found.get(family, [math.inf] * solved)) for family in families})

@@ -80,33 +80,18 @@ def table(result: PeerCheck) -> Table:
     rows: list[tuple[str, ...]] = []
     for row in result.rows:
         ratio = row.ratio
-        mark = " (beyond)" if row.beyond else ""
-        rows.append(
-            (
-                row.method,
-                row.problem,
-                row.call,
-                f"{ratio.median:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]{mark}",
-                in_words(median(row.alone)),
-                str(row.steps),
-                str(row.alone_steps),
-                f"{row.difference:.0e}",
-            )
-        )
+        said = f"{ratio.median:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]{' (beyond)' * row.beyond}"
+        steps = (str(row.steps), str(row.alone_steps))
+        spent, difference = in_words(median(row.alone)), f"{row.difference:.0e}"
+        rows.append((row.method, row.problem, row.call, said, spent, *steps, difference))
     now = digest(row.method for row in result.rows)
     rounds = len(result.rows[0].seconds) if result.rows else 0
     versions = ", ".join(f"{name} {number}" for name, number in result.versions.items())
     return Table(
         "Every peer through this bench, over the same library alone",
         (
-            "method",
-            "problem",
-            "called by",
-            "bench / alone",
-            "time alone",
-            "steps, bench",
-            "steps, alone",
-            "end states differ by",
+            *("method", "problem", "called by", "bench / alone", "time alone"),
+            *("steps, bench", "steps, alone", "end states differ by"),
         ),
         rows,
         f"Median and quartiles of the ratio of the processor's times in each of {rounds} rounds, the two in "

@@ -11,18 +11,8 @@ from hbvm_bench.store.records import Record, Value
 
 # In this order a reader needs them; position and its error stand beside the energy, always.
 HEADLINE = (
-    "energy_max",
-    "angular_momentum_max",
-    "guard_max",
-    "position_end",
-    "phase_end",
-    "z_end",
-    "z_error",
-    "steps",
-    "evaluations",
-    "warm_seconds",
-    "throughput",
-    "compile_seconds",
+    *("energy_max", "angular_momentum_max", "guard_max", "position_end", "phase_end", "z_end", "z_error"),
+    *("steps", "evaluations", "warm_seconds", "throughput", "compile_seconds"),
 )
 RANKED_BY = "position_end"
 
@@ -68,15 +58,10 @@ def columns(records: Sequence[Record], keys: Sequence[str] | None = None) -> lis
 
 
 def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
-    """Return the rows, group by group.
+    """Return the rows of one problem, group by group, sorted by a metric within each.
 
-    Parameters
-    ----------
-    records : sequence of Record
-        Of one problem, in the order of the campaign.
-    sort : str, optional
-        Metric to sort by within the groups. Default: the position error; without
-        a reference the order of the campaign stays, for energy alone ranks nobody.
+    By default that is the position error; without a reference the order of the campaign stays, for
+    energy alone ranks nobody.
     """
     key = find(sort).key if sort else RANKED_BY
     made = [_row(record) for record in records]
@@ -128,12 +113,9 @@ def group_of(record: Record) -> Literal["on", "off", "ended"]:
 def status_of(record: Record) -> str:
     """Say in a few words how a case ended: ``"ok"``, ``"stalled at t = 8.534"``, ..."""
     result = record.result
-    if result.outcome == "ok":
-        if result.status == "finished":
-            return "ok"
-        words = result.status.replace("_", " ")
-    else:
-        words = result.outcome
+    if (result.outcome, result.status) == ("ok", "finished"):
+        return "ok"
+    words = result.status.replace("_", " ") if result.outcome == "ok" else result.outcome
     return words if result.t_stop is None else f"{words} at t = {result.t_stop:.4g}"
 
 
@@ -168,10 +150,8 @@ def format_metric(record: Record, key: str) -> str:
 
 def seconds(number: float) -> str:
     """Format seconds with three digits and their unit."""
-    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "µs")):
-        if number * factor >= 1 or unit == "µs":
-            return f"{number * factor:.3g} {unit}"
-    raise AssertionError
+    factor, unit = (1.0, "s") if number >= 1 else (1e3, "ms") if number * 1e3 >= 1 else (1e6, "µs")
+    return f"{number * factor:.3g} {unit}"
 
 
 def _sort_value(row: Row, key: str) -> float:

@@ -32,11 +32,10 @@ def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[Problem
     tables = tasks(records)
     for entry in campaign.entries():
         for chosen in combinations(entry.sweep):
-            problem = repr(make_problem(fill(entry.use, entry.values | chosen)))
-            found.append((entry, tables.get((problem, None), [])))
+            problem = make_problem(fill(entry.use, entry.values | chosen))
+            found.append((entry, tables.get((repr(problem), None), [])))
     for many in campaign.ensembles:
-        problem = repr(make_problem(many.problem))
-        found.append((many.entry, tables.get((problem, many.ensemble), [])))
+        found.append((many.entry, tables.get((repr(make_problem(many.problem)), many.ensemble), [])))
     return found
 
 

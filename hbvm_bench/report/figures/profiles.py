@@ -11,8 +11,8 @@ from hbvm_bench.report.figures.over_time import WIDTH
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import DASHES, INK, base
 from hbvm_bench.store.records import Record
+from hbvm_bench.summaries.needs import ACCURACIES, profile
 from hbvm_bench.summaries.points import work_of
-from hbvm_bench.summaries.profiles import ACCURACIES, profile
 
 FEWEST_PROBLEMS = 3  # a profile over fewer says nothing that the table does not
 NEVER = 6.0  # decades: the end of the axis where a family is not within any factor

@@ -4,7 +4,7 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Ensemble
 from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.summaries import fairness, laws, needs, outcomes, points, profiles
+from hbvm_bench.summaries import fairness, laws, needs, outcomes, points
 
 
 def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
@@ -65,12 +65,12 @@ def test_the_front_is_what_nothing_beats_in_both():
 def test_an_ensemble_is_in_no_summary_of_single_trajectories():
     many = record("Taylor()", many=True)
     assert points.by_problem([many]) == {}
-    assert profiles.profile([many], {"position_end": 1e-4}, "warm_seconds").ratios == {}
+    assert needs.profile([many], {"position_end": 1e-4}, "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})
 
 
 def test_a_profile_counts_problems_within_a_factor_of_the_best():
-    found = profiles.profile(RUN, {"position_end": 1e-8}, "warm_seconds")
+    found = needs.profile(RUN, {"position_end": 1e-8}, "warm_seconds")
     assert found.problems == 2  # nobody solves toda()
     assert found.ratios == {"Gauss": [2.0, 1.0], "Taylor": [1.0, 8.0]}
     assert found.share("Gauss", 1.0) == 0.5
@@ -80,7 +80,7 @@ def test_a_profile_counts_problems_within_a_factor_of_the_best():
 
 
 def test_who_does_not_reach_the_accuracy_has_an_infinite_ratio():
-    found = profiles.profile(RUN, {"position_end": 1e-8, "energy_max": 1e-13}, "warm_seconds")
+    found = needs.profile(RUN, {"position_end": 1e-8, "energy_max": 1e-13}, "warm_seconds")
     assert found.ratios["Taylor"] == [math.inf, 8.0]
     assert found.solved("Taylor") == 1
     assert found.words == "position to 1e-08, energy to 1e-13"

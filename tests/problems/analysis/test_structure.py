@@ -6,7 +6,7 @@ import pytest
 
 import problems
 from hbvm_bench import cli
-from hbvm_bench.summaries import engines, findings
+from hbvm_bench.summaries import findings
 from problems import Hamiltonian
 from problems.analysis import structure
 from problems.analysis.latex import latex
@@ -122,22 +122,22 @@ def test_every_energy_prints_with_balanced_braces(name):
 
 
 def test_every_problem_goes_to_every_library():
-    _, rows = engines.matrix()
+    rows = findings.matrix()
     for name, row in rows.items():
-        for engine in (*engines.LIBRARIES, "HBVM", "Gauss", "Taylor", "DOP853"):
+        for engine in (*findings.LIBRARIES, "HBVM", "Gauss", "Taylor", "DOP853"):
             assert row[engine] is None, (name, engine)
 
 
 def test_rebound_takes_bodies_and_what_is_separable_and_says_why_not():
-    _, rows = engines.matrix(["sitnikov", "henon_heiles", "cr3bp", "rigid_body", "sine_gordon"])
-    assert rows["sitnikov"][engines.BODIES] is None
+    rows = findings.matrix(["sitnikov", "henon_heiles", "cr3bp", "rigid_body", "sine_gordon"])
+    assert rows["sitnikov"][findings.BODIES] is None
     assert rows["sitnikov"]["WHFast"] is None
-    assert "bodies" in rows["henon_heiles"][engines.BODIES]
-    assert rows["henon_heiles"][engines.FORCES] is None
+    assert "bodies" in rows["henon_heiles"][findings.BODIES]
+    assert rows["henon_heiles"][findings.FORCES] is None
     assert rows["henon_heiles"]["IAS15"] is None
-    assert "separable" in rows["cr3bp"][engines.FORCES]
+    assert "separable" in rows["cr3bp"][findings.FORCES]
     assert "separable" in rows["cr3bp"]["IAS15"]
-    assert "no positions and momenta" in rows["rigid_body"][engines.FORCES]
+    assert "no positions and momenta" in rows["rigid_body"][findings.FORCES]
 
 
 def test_the_command_inspects_formulas_and_problems(capsys):
