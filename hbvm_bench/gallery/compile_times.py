@@ -56,18 +56,7 @@ class Times:
 
 
 def measure(text: str) -> Times:
-    """Trace, emit and compile the field of a problem from nothing.
-
-    Parameters
-    ----------
-    text : str
-        The problem as it prints.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the text names no problem.
-    """
+    """Trace, emit and compile the field of a problem, as it prints, from nothing."""
     traced, problem = _seconds(lambda: _traced(text))
     emitted, source = _seconds(lambda: emit.source(problem.system, "field", "numba"))
     return Times(

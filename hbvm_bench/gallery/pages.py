@@ -23,19 +23,7 @@ BEGIN, END = "<!-- made by: hbvm-bench gallery docs -->", "<!-- end of what is m
 
 
 def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
-    """Write into a directory the pictures, and what is made of ``problems.md`` and ``engines.md``.
-
-    Parameters
-    ----------
-    directory : Path
-        Such as ``docs``; pictures go into ``problems`` below it.
-    with_pictures : bool
-        Whether to draw them again.
-
-    Returns
-    -------
-    list of Path
-        What was written.
+    """Write the pictures, and what is made of ``problems.md`` and ``engines.md``, into a directory.
 
     Raises
     ------

@@ -20,17 +20,7 @@ COLORS = ("#0a58b5", "#c8500a", "#17753a", "#8a2160", "#6b4bb8", "#86720c", "#55
 
 
 def draw(name: str) -> str:
-    """Draw a problem as SVG.
-
-    Parameters
-    ----------
-    name : str
-        Its name; drawn at its default arguments, or at those of its picture.
-
-    Returns
-    -------
-    str
-        The picture.
+    """Draw a problem as SVG, at its default arguments or at those of its picture.
 
     Raises
     ------

@@ -21,14 +21,7 @@ Array = NDArray[np.float64]
 def check(measured: Measured, method: MethodBase, program: Program, asked: Checks) -> Measured:
     """Return what was measured with the laws of its drifts and the way back, as far as they are asked for.
 
-    Parameters
-    ----------
-    measured : Measured
-        The trajectory from the problem's own start, over all samples.
-    method, program
-        What made it.
-    asked : Checks
-        See there.
+    ``measured`` is the trajectory from the problem's own start, over all samples; ``program`` made it.
     """
     problem = measured.problem
     if asked.reversal:

@@ -28,15 +28,11 @@ LEAST_SHARE = 0.97  # of a core while calibrating
 LARGEST_STEAL = 0.01  # of the wall time of all cores
 LOOKS, PAUSE = 9, 0.03  # at the processes that run: something short always does
 
+# Of each optional extra its libraries, and what happens without them.
 EXTRAS = {
-    "peers": ("heyoka", "rebound", "diffrax"),
-    "dask": ("distributed",),
-    "export": ("pyarrow",),
-}
-WITHOUT = {
-    "peers": "their methods are refused and the comparison is ours alone",
-    "dask": "--executor dask:// does not work",
-    "export": "export writes CSV only",
+    "peers": (("heyoka", "rebound", "diffrax"), "their methods are refused and the comparison is ours alone"),
+    "dask": (("distributed",), "--executor dask:// does not work"),
+    "export": (("pyarrow",), "export writes CSV only"),
 }
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
@@ -52,18 +48,7 @@ class Finding:
 
 
 def examine(*, calibration: bool = True) -> dict[str, list[Finding]]:
-    """Look at this machine.
-
-    Parameters
-    ----------
-    calibration : bool
-        Whether to take the time of a fixed computation, again and again for a second.
-
-    Returns
-    -------
-    dict of list of Finding
-        Under ``"installed"`` and ``"timings"``.
-    """
+    """Return what is ``"installed"`` and what ``"timings"`` depend on; the calibration takes a second."""
     timings = [cores(), load(), governor(), boost(), vectors(), virtual()]
     return {
         "installed": [python(), *libraries(), *methods(), browser()],
@@ -85,20 +70,21 @@ def python() -> Finding:
 def libraries() -> list[Finding]:
     """Return for every optional library its version, or what does not work without it."""
     found: list[Finding] = []
-    for extra, names in EXTRAS.items():
-        advice = f"pip install 'hbvm-bench[{extra}]'"
+    for extra, (names, without) in EXTRAS.items():
+        state: State = "bad" if extra == "peers" else "note"
+        missing = f"not installed: {without}", f"pip install 'hbvm-bench[{extra}]'"
         for name in names:
             try:
                 found.append(Finding(name, "ok", version(name)))
             except PackageNotFoundError:
-                state: State = "bad" if extra == "peers" else "note"
-                found.append(Finding(name, state, f"not installed: {WITHOUT[extra]}", advice))
+                found.append(Finding(name, state, *missing))
     return found
 
 
 def methods() -> list[Finding]:
     """Return the registered methods of libraries that are no extra of ours, and those that fail to load."""
     found: list[Finding] = []
+    known = {"hbvm-bench", "scipy"}.union(*(names for names, _ in EXTRAS.values()))
     for name in integrators.registry.names():
         try:
             library = integrators.registry.get(name).library
@@ -108,7 +94,6 @@ def methods() -> list[Finding]:
             words = f"cannot be imported: {type(error).__name__}: {error}"
             found.append(Finding(name, "bad", words, "ask its authors, or uninstall it"))
         else:
-            known = {known for names in EXTRAS.values() for known in names} | {"hbvm-bench", "scipy"}
             if library.lower() not in known:
                 found.append(Finding(name, "ok", f"{library} {version_of_library(library)}"))
     return found
@@ -173,9 +158,8 @@ def vectors() -> Finding:
     name = str(machine.describe()["vector_instructions"])
     if name == "AVX-512":
         return Finding("vectors", "ok", name)
-    return Finding(
-        "vectors", "note", f"{name}, no AVX-512: HBVM's lanes of stages take more instructions here"
-    )
+    words = f"{name}, no AVX-512: HBVM's lanes of stages take more instructions here"
+    return Finding("vectors", "note", words)
 
 
 def virtual() -> Finding:
@@ -186,13 +170,7 @@ def virtual() -> Finding:
 
 
 def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
-    """Time a fixed computation again and again on one core, and tell how steady that is.
-
-    Parameters
-    ----------
-    measure : callable
-        Returns the seconds of the fixed computation.
-    """
+    """Time a fixed computation again and again on one core, and tell how steady that is."""
     with machine.staying_on_a_core():
         measure()  # compiled now
         stolen, wall, busy = psutil.cpu_times().steal, time.perf_counter(), time.process_time()
@@ -205,10 +183,9 @@ def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
 def scatter(taken: Sequence[float]) -> Finding:
     """Judge how much the same computation varies."""
     deciles = quantiles(taken, n=10, method="inclusive")
-    spread = deciles[-1] / deciles[0] - 1
+    spread, slowest = deciles[-1] / deciles[0] - 1, max(taken) / median(taken) - 1
     words = (
-        f"{median(taken) * 1e3:.2f} ms, varying by {spread:.1%} between deciles, "
-        f"the slowest by {max(taken) / median(taken) - 1:.0%}"
+        f"{median(taken) * 1e3:.2f} ms, varying by {spread:.1%} between deciles, the slowest by {slowest:.0%}"
     )
     bad = spread > LARGEST_SCATTER
     return _judged("calibration", words, bad, "fix the frequency and stop what else runs")
@@ -238,10 +215,8 @@ def _quota() -> float | None:
 
 def _running() -> int:
     """Return the number of runnable processes, this one among them."""
-    for line in _read(Path("/proc/stat")).splitlines():
-        if line.startswith("procs_running"):
-            return int(line.split()[1])
-    return 1
+    lines = _read(Path("/proc/stat")).splitlines()
+    return next((int(line.split()[1]) for line in lines if line.startswith("procs_running")), 1)
 
 
 def _read(path: Path) -> str:

@@ -48,15 +48,7 @@ CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is 
 
 
 def curve(law: Law, t: ArrayLike) -> Array:
-    """Return a law as it was fitted, shape (n,), for drawing; not-a-number where there is none.
-
-    Parameters
-    ----------
-    law : Law
-        What `fit` returned.
-    t : array_like, shape (n,)
-        Times since the start, positive.
-    """
+    """Return a law as fitted at positive times since the start, shape (n,); NaN where there is none."""
     times = np.asarray(t, dtype=np.float64)
     if law.law is None:
         return np.full(times.shape, math.nan)
@@ -120,14 +112,7 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Law:
 
     The offset of a trajectory, its mean over the first window of time, is taken off:
     what the evaluation of an invariant adds throughout is no drift. End less begin is
-    the maximum-likelihood estimate of the drift of a random walk.
-
-    Parameters
-    ----------
-    t : array_like, shape (n,)
-        Times since the start, positive and ascending.
-    errors : array_like, shape (starts, n)
-        Signed errors.
+    the maximum-likelihood estimate of the drift of a random walk. Times and errors are as of `fit`.
     """
     times = np.asarray(t, dtype=np.float64)
     rows = np.atleast_2d(np.asarray(errors, dtype=np.float64))

@@ -67,23 +67,11 @@ def integrate(
     clock: Callable[[], float] = time.perf_counter,
     par: Array | None = None,
 ) -> Members:
-    """Integrate every start to the end of the problem's span.
+    """Integrate every start, shape (n, dim), to the end of the problem's span, with the parameters of each.
 
-    Parameters
-    ----------
-    program : Program
-        Its ``batch`` is used where it has one, prepared before the clock runs where it can be
-        (``prepare_batch``); otherwise one trajectory follows the other.
-    starts : ndarray, shape (n, dim)
-        Where they start.
-    problem : Problem
-        Parameters and span.
-    sample : str, optional
-        How one trajectory meets the end; see `integrators.protocol.MethodBase.to_end`.
-    clock : callable
-        Returns seconds.
-    par : ndarray, shape (n, n_par), optional
-        Parameters of each; the problem's own by default.
+    The program's ``batch`` is used where it has one, prepared before the clock runs where it can be
+    (``prepare_batch``); otherwise one trajectory follows the other and meets the end as ``sample`` says
+    (`integrators.protocol.MethodBase.to_end`).
     """
     end = np.array([problem.t_end])
     par = np.tile(problem.par, (len(starts), 1)) if par is None else par
@@ -121,16 +109,9 @@ def integrate(
 
 
 def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Measured, Status, str]:
-    """Run an ensemble once and evaluate what it kept.
+    """Run an ensemble once and evaluate what it kept; return it with the first failure, if any, and why.
 
-    Returns
-    -------
-    measured : Measured
-        See `Measured.trajectories`; the series are over the trajectories, not over time.
-    status : Status
-        The first failure, if any.
-    reason : str
-        One sentence on it.
+    Its series are over the trajectories, not over time; see `Measured.trajectories`.
     """
     starts, par = members(problem, ensemble)
     made = integrate(program, starts, problem, par=par)

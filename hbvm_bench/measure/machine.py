@@ -11,35 +11,26 @@ from problems.errors import InputError
 
 VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
 
-
 MEASURED = ("vector_bits", "clock_ghz")
 """What `describe` measures: it may differ from one look at a processor to the next."""
 
+# What `kind` says, for under a table; then what the option --avx2 does.
 COLUMNS = (
     "Columns: LLVM's name of the processor and how wide its arithmetic is, where that was measured; -avx2: "
     "all that numba compiles, which is our code and the forces and fields handed to REBOUND and SciPy, "
     "without AVX-512."
 )
-"""What `kind` says, for under a table."""
-
 AVX2 = (
     "Without AVX-512 in all that numba compiles: our code, and the forces and fields handed to REBOUND "
     "and SciPy."
 )
-"""What the option --avx2 does."""
-
-FEATURES = "NUMBA_CPU_FEATURES"
-NAME = "NUMBA_CPU_NAME"
+FEATURES, NAME = "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME"
 
 
 def describe(*, measure: bool = False) -> dict[str, str | int]:
     """Return processor, cores, memory, instruction sets, operating system and Python.
 
-    Parameters
-    ----------
-    measure : bool
-        Whether to measure the width of the arithmetic and the clock too (some 50 ms): for
-        whatever will be printed beside times.
+    With ``measure`` also the width of the arithmetic and the clock (some 50 ms), to be printed beside times.
     """
     from llvmlite import binding
 
@@ -86,22 +77,20 @@ def kind(described: Mapping[str, str | int]) -> str:
 
 def sentence(described: Mapping[str, str | int]) -> str:
     """Say what kind of processor times and their ratios belong to."""
-    names = [str(described[key]) for key in ("family",) if key in described]
-    names += [f"LLVM: {described['llvm_processor']}"] if "llvm_processor" in described else []
+    known = (("family", "{}"), ("llvm_processor", "LLVM: {}"))
+    names = [words.format(described[key]) for key, words in known if key in described]
     bits, clock = described.get("vector_bits"), described.get("clock_ghz")
     width = f"arithmetic {bits} bits wide" if bits else "width of the arithmetic not recorded"
-    built = described.get("ours_built_for")
+    restricted = (
+        "; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
+        f"was restricted to {described.get('ours_built_for')}, the peers' own code was not"
+    )
     return (
         f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"
         + (f" ({'; '.join(names)})" if names else "")
         + f", {described.get('vector_instructions', 'vector instructions not recorded')}, {width}"
         + (f", {clock} GHz" if clock else "")
-        + (
-            f"; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
-            f"was restricted to {built}, the peers' own code was not"
-            if built
-            else ""
-        )
+        + restricted * bool(described.get("ours_built_for"))
         + "."
     )
 
@@ -195,8 +184,5 @@ def _processor() -> str:
 
 
 def _vector_instructions() -> str:
-    has = flags()
-    for flag, name in (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX")):
-        if flag in has:
-            return name
-    return "SSE2" if "sse2" in has else "none known"
+    known = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "SSE2"))
+    return next((name for flag, name in known if flag in flags()), "none known")

@@ -61,15 +61,7 @@ class Measured:
 
 
 def measure(solution: Solution, reference: Reference | None) -> Measured:
-    """Evaluate everything on the samples of a solution.
-
-    Parameters
-    ----------
-    solution : Solution
-        As `integrators.integrate` returns it.
-    reference : Reference, optional
-        The trusted solution of the same problem.
-    """
+    """Evaluate everything on the samples of a solution, against the trusted one where there is one."""
     problem, t, y = solution.problem, solution.t, solution.y
     # an overflow is a result here: it becomes a sentence in the metrics
     with np.errstate(all="ignore"):
@@ -149,12 +141,7 @@ def positions(problem: Problem, y: Array) -> Array:
 def largest_distance(problem: Problem, q: Array) -> Array:
     """Return the largest distance of a body from the origin, shape (n,).
 
-    Parameters
-    ----------
-    problem : Problem
-        Its bodies say how ``q`` is grouped; without bodies all of ``q`` is one vector.
-    q : ndarray, shape (n, dof)
-        Positions, or differences of positions.
+    ``q``, shape (n, dof), are positions or differences of them; without bodies all of it is one vector.
     """
     bodies = getattr(problem.system, "bodies", None)
     width = q.shape[1] if bodies is None else bodies.dimension
@@ -176,14 +163,8 @@ POSITION = (
 def position_error(problem: Problem, difference: Array, true: Array) -> Array:
     """Return position errors, shape (n,), as `POSITION` says.
 
-    Parameters
-    ----------
-    problem : Problem
-        Says which part of a state is a position, and of which body.
-    difference : ndarray, shape (n, dim)
-        States less the true ones.
-    true : ndarray, shape (m, dim)
-        The true states at all their stored times; they give the size.
+    ``difference``, shape (n, dim), are states less the true ones; ``true``, shape (m, dim), the true states
+    at all their stored times, which give the size.
     """
     size = float(largest_distance(problem, positions(problem, true)).max(initial=0.0))
     return largest_distance(problem, positions(problem, difference)) / (size or 1.0)

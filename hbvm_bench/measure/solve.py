@@ -12,17 +12,7 @@ from problems.problem import Problem
 
 
 def solve(problem: Problem, method: MethodBase, program: Program, times: NDArray[np.float64]) -> Solution:
-    """Return what `integrators.integrate` returns, without compiling again.
-
-    Parameters
-    ----------
-    problem, method
-        The method accepts the problem.
-    program : Program
-        What ``method.compile(problem.system)`` returned.
-    times : ndarray, shape (n,)
-        Sampling times.
-    """
+    """Return what `integrators.integrate` returns, with what ``method.compile(problem.system)`` returned."""
     stepper = program.start(problem.y0, problem.par, problem.t0)
     samples = stepper.advance(times)
     finished = samples.status is Status.FINISHED
@@ -45,12 +35,8 @@ def solve_with_bare_end(
 ) -> Solution:
     """Return the same, but for the end, which is that of a second run without samples.
 
-    This is the run that is timed, and an error at the end is to be of the very run that is.
-
-    Parameters
-    ----------
-    problem, method, program, times
-        As of `solve`; the last time is the problem's end.
+    That run is the one that is timed, and an error at the end is to be of the very run that is. The last
+    time is the problem's end.
     """
     sampled = solve(problem, method, program, times)
     if sampled.status is not Status.FINISHED:

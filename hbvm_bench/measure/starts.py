@@ -17,16 +17,9 @@ PERTURBATION = 1e-6
 def scaled(problem: Problem, count: int) -> Array:
     """Return starts for the law of a drift, shape (count, dim); the first is the problem's own.
 
-    All positions are multiplied by one number and all momenta by another, both within
-    `PERTURBATION` of 1: round-off decorrelates, and a start that is symmetric, at rest or
+    All positions are multiplied by one number and all momenta by another (a state without either: by one),
+    both within `PERTURBATION` of 1: round-off decorrelates, and a start that is symmetric, at rest or
     in a plane stays so bit for bit. The numbers follow the golden ratio.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of any kind; a state without positions and momenta has one number.
-    count : int
-        How many, the problem's own among them.
     """
     dim, dof = problem.system.dim, problem.system.dof or problem.system.dim
     number = np.arange(2 * count).reshape(count, 2)

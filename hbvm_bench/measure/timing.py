@@ -102,23 +102,9 @@ def interleaved(
 ) -> list[list[float]]:
     """Take one sample of each in every round, so that what else the machine does meets them all.
 
-    Parameters
-    ----------
-    samples : sequence of callable
-        Each takes one sample and returns its seconds.
-    rounds : int
-        How many.
-    order : {"alternating", "shuffled", "as given"}
-        Every other round goes backwards; or each is in another order; or all are alike.
-    turns : sequence of collection of int, optional
-        The rounds, from 0, in which each takes part; all by default.
-    begin : callable, optional
-        Called with the number of a round before it begins.
-
-    Returns
-    -------
-    list of list of float
-        The seconds of each, round by round.
+    A sample is taken by a call that returns its seconds. The order of the rounds is that given, another in
+    each, or backwards in every other one. ``turns`` are the rounds, from 0, in which each takes part (all by
+    default), and ``begin`` is called with the number of a round before it. Returned are the seconds of each.
     """
     taken: list[list[float]] = [[] for _ in samples]
     shuffle = np.random.default_rng(ORDER_SEED)
@@ -183,17 +169,7 @@ class Timeable(Protocol):
 def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
     """Take the samples of one round of a run that is alone in its process.
 
-    Parameters
-    ----------
-    run : Timeable
-        Compiled.
-    plan : TimingPlan
-        How many samples, and how long they may take.
-
-    Returns
-    -------
-    Timing
-        Of one round; of none, with the reason, where the integration does not reach the end.
+    There is no round, with the reason, where the integration does not reach the end.
     """
     run.until(WARM_UP).seconds()
     wall, busy = time.perf_counter(), time.process_time()
@@ -225,19 +201,8 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
     """Take all samples of the runs of one problem, interleaved round by round in this process.
 
     Every round begins with a garbage collection and one sample of the calibration. A run
-    that is too slow for all rounds within the plan's budget takes part in fewer of them.
-
-    Parameters
-    ----------
-    runs : sequence of Timeable
-        Compiled.
-    plan : TimingPlan
-        How many rounds, in which order and by which clock.
-
-    Returns
-    -------
-    list of Timing
-        For each run; without rounds, with the reason, where it does not reach the end.
+    that is too slow for all rounds within the plan's budget takes part in fewer of them; one that
+    does not reach the end has none, with the reason.
     """
     clock = CLOCKS[plan.clock]
     firsts, calls = [], []

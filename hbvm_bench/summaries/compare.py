@@ -96,18 +96,17 @@ def _name(case: Case) -> str:
 
 
 def _behind(both: Sequence[tuple[Record, Record]]) -> list[str]:
-    found: dict[str, None] = {}
+    found: list[str] = []
     for before, after in both:
         for name in sorted(before.versions.keys() | after.versions.keys()):
             was, now = before.versions.get(name, "none"), after.versions.get(name, "none")
-            if was != now:
-                found[f"{name} {was} → {now}"] = None
+            found += [f"{name} {was} → {now}"] if was != now else []
         if before.versions == after.versions and before.id != after.id:
-            found["the sources of hbvm-bench or of a method"] = None
+            found.append("the sources of hbvm-bench or of a method")
         for name, was in before.machine.items():
             if (now := after.machine.get(name, was)) != was and name not in machine.MEASURED:
-                found[f"{name.replace('_', ' ')} {was} → {now}"] = None
-    return list(found)
+                found.append(f"{name.replace('_', ' ')} {was} → {now}")
+    return list(dict.fromkeys(found))
 
 
 def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
@@ -116,7 +115,8 @@ def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
     def differs(what: str, was: str, now: str) -> None:
         found.changed.append(Change(before.case.problem, before.case.method, what, was, now))
 
-    was, now = (_ending(record) for record in (before, after))
+    lost = (", on another trajectory" * bool(record.result.violation) for record in (before, after))
+    was, now = (status_of(record) + words for record, words in zip((before, after), lost, strict=True))
     if was != now:
         differs("outcome", was, now)
     one, other = before.result.metrics, after.result.metrics
@@ -132,11 +132,6 @@ def _compare_numbers(before: Record, after: Record, found: Comparison) -> None:
             found.rounded += 1
         else:
             differs(metric.label, f"{a.value:.17g}", f"{b.value:.17g}")
-
-
-def _ending(record: Record) -> str:
-    lost = ", on another trajectory" if record.result.violation else ""
-    return status_of(record) + lost
 
 
 def _shown(metric: Metric, value: Value) -> str:
@@ -165,21 +160,15 @@ def _compare_times(both: Sequence[tuple[Record, Record]], found: Comparison) -> 
     if not pairs:
         return
     common = _typical_variance([logs for *_, one, other in pairs for logs in (one, other)])
-    found.noise = math.exp(
-        median(max(math.log(SMALLEST_RATIO), _doubt(one, other, common)) for *_, one, other in pairs)
-    )
-    for before, after, one, other in pairs:
+    doubts = [max(math.log(SMALLEST_RATIO), _doubt(one, other, common)) for *_, one, other in pairs]
+    found.noise = math.exp(median(doubts))
+    for (before, after, one, other), doubt in zip(pairs, doubts, strict=True):
         shift = fmean(other) - fmean(one)
-        if abs(shift) <= max(math.log(SMALLEST_RATIO), _doubt(one, other, common)):
+        if abs(shift) <= doubt:
             continue
         was, now = (seconds(record.timing.summary["median"]) for record in (before, after) if record.timing)
-        change = Change(
-            before.case.problem,
-            before.case.method,
-            "time",
-            was,
-            f"{now}, {math.exp(shift):.2f} times as long",
-        )
+        case, said = before.case, f"{now}, {math.exp(shift):.2f} times as long"
+        change = Change(case.problem, case.method, "time", was, said)
         (found.slower if shift > 0 else found.faster).append(change)
 
 
@@ -214,8 +203,5 @@ def _typical_variance(groups: Sequence[Sequence[float]]) -> float:
 
 
 def _doubt(one: Sequence[float], other: Sequence[float], common: float) -> float:
-    total = 0.0
-    for group in (one, other):
-        own = variance(group) if len(group) > 1 else 0.0
-        total += max(own, common) / len(group)
-    return DEVIATIONS * math.sqrt(total)
+    own = ((variance(group) if len(group) > 1 else 0.0, len(group)) for group in (one, other))
+    return DEVIATIONS * math.sqrt(sum(max(scatter, common) / count for scatter, count in own))

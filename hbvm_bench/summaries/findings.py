@@ -58,14 +58,9 @@ class Findings:
 
 
 def inspect(text: str, parameters: str = "") -> Findings:
-    """Return what is found about a formula or a problem.
+    """Return what is found about a formula, ``"p^2/2 - cos(q)"``, or a problem, ``"kepler(e=0.9)"``.
 
-    Parameters
-    ----------
-    text : str
-        A formula, ``"p^2/2 - cos(q)"``, or a problem, ``"sitnikov"`` or ``"kepler(e=0.9)"``.
-    parameters : str
-        Values of the other names in a formula: ``"k=2, m=0.5"``.
+    ``parameters`` are the values of the other names in a formula: ``"k=2, m=0.5"``.
 
     Raises
     ------
