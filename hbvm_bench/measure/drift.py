@@ -45,6 +45,7 @@ LAWS: dict[str, str] = {
     "drift": "drifts: the mean over the starts is not 0",
 }
 CURVES = [law for law in LAWS if law != "drift"]  # that are fitted; a drift is told by the mean
+POWERS = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}  # of t
 
 
 def curve(law: Law, t: ArrayLike) -> Array:
@@ -57,8 +58,7 @@ def curve(law: Law, t: ArrayLike) -> Array:
         grown = np.exp(np.minimum(growth * (times - law.end), 0.0))
     else:
         slope = math.nan if law.slope is None else law.slope
-        power = {"bounded": 0.0, "square root": 0.5, "linear": 1.0}.get(law.law, slope)
-        grown = (times / law.end) ** power
+        grown = (times / law.end) ** POWERS.get(law.law, slope)
     return np.hypot(law.floor, law.reached * grown)
 
 
@@ -212,16 +212,9 @@ class _Fit:
 
 def _growth(law: str, t: Array) -> Callable[[Array], Array]:
     """Return ln g(t) as a function of the parameters after the floor; at the end of the span it is p[0]."""
-    ratio = np.log(t / t[-1])
-    share = t / t[-1] - 1.0
-    match law:
-        case "square root":
-            return lambda p: p[0] + 0.5 * ratio
-        case "linear":
-            return lambda p: p[0] + ratio
-        case "power":
-            return lambda p: p[0] + p[1] * ratio
-    return lambda p: p[0] + p[1] * share
+    over = t / t[-1] - 1.0 if law == "exponential" else np.log(t / t[-1])
+    power = POWERS.get(law)
+    return lambda p: p[0] + (p[1] if power is None else power) * over
 
 
 def _fitted(law: str, t: Array, values: Array) -> _Fit:
@@ -288,10 +281,8 @@ def _slope(t: Array, rows: Array, whole: _Fit) -> tuple[float, float, float]:
     if len(each) < 3:
         return (slope, -math.inf, math.inf)
     n = len(each)
-    return (
-        slope,
-        *_interval(slope, math.sqrt((n - 1) / n * float(np.sum((np.array(each) - np.mean(each)) ** 2))), n),
-    )
+    error = math.sqrt((n - 1) / n * float(np.sum((np.array(each) - np.mean(each)) ** 2)))
+    return (slope, *_interval(slope, error, n))
 
 
 def _interval(mean: float, error: float, count: int) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.file import Ensemble
 from hbvm_bench.measure.measured import Measured, ahead, largest_distance, position_error, positions
 from hbvm_bench.measure.starts import members
-from hbvm_bench.measure.timing import no_collection
+from hbvm_bench.measure.timing import Timeable
 from hbvm_bench.reference import solutions as reference
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters
@@ -42,6 +42,11 @@ class Members:
     steps: int  # over all, as the next
     evaluations: int | None
     seconds: float  # of integrating; preparing the batch, or making a stepper for each start, is left out
+
+    @property
+    def failed(self) -> list[Status]:
+        """How those ended that did not arrive."""
+        return [one for one in self.status if one is not Status.FINISHED]
 
 
 def prepared(
@@ -91,8 +96,8 @@ def integrate(
         )
     y = np.full(starts.shape, np.nan)
     status: list[Status] = []
-    reason, steps, evaluations, spent = "", 0, 0, 0.0
-    counted = True
+    evaluated: list[int | None] = []
+    reason, steps, spent = "", 0, 0.0
     for i, start in enumerate(starts):
         stepper = program.start(start, par[i], problem.t0)
         begin = clock()
@@ -103,9 +108,9 @@ def integrate(
         if samples.status is Status.FINISHED:
             y[i] = samples.y[-1]
         steps += stepper.stats.steps
-        counted = counted and stepper.stats.evaluations is not None
-        evaluations += stepper.stats.evaluations or 0
-    return Members(y, status, reason, steps, evaluations if counted else None, spent)
+        evaluated.append(stepper.stats.evaluations)
+    evaluations = None if None in evaluated else sum(filter(None, evaluated))
+    return Members(y, status, reason, steps, evaluations, spent)
 
 
 def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Measured, Status, str]:
@@ -115,7 +120,7 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
     """
     starts, par = members(problem, ensemble)
     made = integrate(program, starts, problem, par=par)
-    failed = [one for one in made.status if one is not Status.FINISHED]
+    failed = made.failed
     witnesses = np.unique(np.linspace(0, ensemble.count - 1, WITNESSES).astype(int))
     known = _truth(problem, starts[witnesses], par[witnesses])
     with np.errstate(all="ignore"):
@@ -149,7 +154,7 @@ def measure(problem: Problem, program: Program, ensemble: Ensemble) -> tuple[Mea
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleRun:
+class EnsembleRun(Timeable):
     """An ensemble, ready to be timed."""
 
     program: Program
@@ -171,19 +176,10 @@ class EnsembleRun:
         par = None if self.par is None else self.par[:WARM_UP]
         return replace(self, starts=self.starts[:WARM_UP], par=par, problem=problem)
 
-    def seconds(
-        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
-    ) -> tuple[float, Samples]:
-        """Return the mean seconds of ``repeats`` ensembles, and how the last ended."""
-        with no_collection():
-            spent, made = 0.0, None
-            for _ in range(repeats):
-                made = integrate(self.program, self.starts, self.problem, self.sample, clock, self.par)
-                spent += made.seconds
-        assert made is not None
-        failed = [one for one in made.status if one is not Status.FINISHED]
-        status = failed[0] if failed else Status.FINISHED
-        return spent / repeats, Samples(np.array([self.problem.t_end]), made.y[:1], status)
+    def once(self, clock: Callable[[], float]) -> tuple[float, Samples]:
+        made = integrate(self.program, self.starts, self.problem, self.sample, clock, self.par)
+        status = next(iter(made.failed), Status.FINISHED)
+        return made.seconds, Samples(np.array([self.problem.t_end]), made.y[:1], status)
 
 
 def _errors(problem: Problem, starts: Array, par: Array, y: Array) -> dict[str, Array]:

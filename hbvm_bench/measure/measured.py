@@ -15,6 +15,10 @@ from problems.problem import Problem
 
 Array = NDArray[np.float64]
 
+PLAIN = ("t", "y", "distance", "position_t", "position", "phase")
+PREFIXES = {"errors": "error.", "guards": "guard.", "drift": "drift.", "extra": "extra."}
+"""What of a `Measured` the store keeps as series: by its own name, and by that of each with a prefix."""
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -46,18 +50,10 @@ class Measured:
 
     def series(self) -> dict[str, Array]:
         """Return the arrays that the store keeps beside the record."""
-        return {
-            "t": self.t,
-            "y": self.y,
-            "distance": self.distance,
-            "position_t": self.position_t,
-            "position": self.position,
-            "phase": self.phase,
-            **{f"error.{name}": values for name, values in self.errors.items()},
-            **{f"guard.{name}": values for name, values in self.guards.items()},
-            **{f"drift.{name}": values for name, values in self.drift.items()},
-            **{f"extra.{name}": values for name, values in self.extra.items()},
-        }
+        made = {name: getattr(self, name) for name in PLAIN}
+        for field_, prefix in PREFIXES.items():
+            made |= {f"{prefix}{name}": values for name, values in getattr(self, field_).items()}
+        return made
 
 
 def measure(solution: Solution, reference: Reference | None) -> Measured:
@@ -70,6 +66,9 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
         distance = largest_distance(problem, positions(problem, y))
         position_t, position, phase = _position_error(problem, t, y, reference)
     stats = solution.stats
+    counts = {name: getattr(stats, name) for name in ("steps", "rejections", "evaluations", "iterations")}
+    counts = {name: None if count is None else int(count) for name, count in counts.items()}
+    histories = {name: v for name, v in stats.extra.items() if isinstance(v, np.ndarray)}
     return Measured(
         problem=problem,
         t=t,
@@ -83,15 +82,9 @@ def measure(solution: Solution, reference: Reference | None) -> Measured:
         reference=reference,
         complete=solution.status is Status.FINISHED,
         t_stop=float(solution.t_stop),
-        counters=Counters(
-            steps=_count(stats.steps),
-            rejections=_count(stats.rejections),
-            evaluations=_count(stats.evaluations),
-            iterations=_count(stats.iterations),
-            solver=stats.solver,
-        ),
+        counters=Counters(**counts, solver=stats.solver),
         compile=Compile(seconds=float(solution.compile_seconds), cached=solution.from_cache),
-        extra={name: np.asarray(v) for name, v in stats.extra.items() if _is_history(v)},
+        extra={name: values for name, values in histories.items() if values.dtype.kind in "fiu"},
     )
 
 
@@ -103,20 +96,12 @@ def restore(
     timing: Timing | None,
 ) -> Measured:
     """Put together again what was measured, from the store, with a timing."""
-
-    def named(prefix: str) -> dict[str, Array]:
-        return {name.removeprefix(prefix): v for name, v in series.items() if name.startswith(prefix)}
-
+    arrays: dict[str, Any] = {name: series[name] for name in PLAIN}
+    for field_, prefix in PREFIXES.items():
+        named = {name: values for name, values in series.items() if name.startswith(prefix)}
+        arrays[field_] = {name.removeprefix(prefix): values for name, values in named.items()}
     return Measured(
         problem=problem,
-        t=series["t"],
-        y=series["y"],
-        errors=named("error."),
-        guards=named("guard."),
-        distance=series["distance"],
-        position_t=series["position_t"],
-        position=series["position"],
-        phase=series["phase"],
         reference=reference,
         complete=result.status == Status.FINISHED,
         t_stop=float("nan") if result.t_stop is None else result.t_stop,
@@ -125,10 +110,9 @@ def restore(
         timing=timing,
         trajectories=result.trajectories,
         laws=result.laws,
-        drift=named("drift."),
         reversal=result.reversal.why if result.reversal.value is None else result.reversal.value,
         peak_gib=result.peak_gib,
-        extra=named("extra."),
+        **arrays,
     )
 
 
@@ -198,11 +182,3 @@ def ahead(problem: Problem, t: Array, y: Array, difference: Array) -> Array:
         along += (difference[:, block] / size * (flow[:, block] / size)).sum(axis=1)
         speed += ((flow[:, block] / size) ** 2).sum(axis=1)
     return along / speed
-
-
-def _count(value: Any) -> int | None:
-    return None if value is None else int(value)
-
-
-def _is_history(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu"

@@ -7,12 +7,13 @@ import gc
 import math
 import os
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from statistics import median, quantiles
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 import psutil
@@ -32,9 +33,34 @@ CALLS = 20
 CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "thread": time.thread_time}
 
 
+class Timeable(ABC):
+    """What can be timed, compiled: an integration, or an ensemble."""
+
+    program: Program
+
+    @abstractmethod
+    def once(self, clock: Callable[[], float]) -> tuple[float, Samples]:
+        """Return the seconds of one run, all but setting up, and what it returned."""
+
+    @abstractmethod
+    def until(self, share: float) -> "Timeable":
+        """Return a shorter run, over the first ``share`` of the span."""
+
+    def seconds(
+        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> tuple[float, Samples]:
+        """Return the mean seconds of runs in a row, garbage collection off, and what the last returned."""
+        with no_collection():
+            spent, samples = self.once(clock)
+            for _ in range(repeats - 1):
+                taken, samples = self.once(clock)
+                spent += taken
+        return spent / repeats, samples
+
+
 @dataclass(frozen=True, eq=False)
-class Run:
-    """A whole integration that returns its end state only, ready to be timed."""
+class Run(Timeable):
+    """A whole integration that returns its end state only."""
 
     program: Program
     y0: NDArray[np.float64]
@@ -45,35 +71,18 @@ class Run:
 
     @classmethod
     def of(cls, problem: Problem, method: MethodBase, program: Program | None = None) -> "Run":
-        """Return the run of a method on a problem, which meets its end as the method's library does.
-
-        ``program`` is what ``method.compile(problem.system)`` returned; it is made anew by default.
-        """
+        """Return the run of a method, compiled if it is not yet, which meets its end as its library does."""
         program = method.compile(problem.system) if program is None else program
         return cls(program, problem.y0, problem.par, problem.t0, problem.t_end, method.to_end)
 
-    def seconds(
-        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
-    ) -> tuple[float, Samples]:
-        """Return the mean seconds of ``repeats`` runs one after the other, and what the last returned.
-
-        Only ``advance`` is timed: making a stepper belongs to setting up. Garbage
-        collection is off meanwhile.
-        """
+    def once(self, clock: Callable[[], float]) -> tuple[float, Samples]:
         end = np.array([self.t_end])
-        spent, samples = 0.0, None
-        with no_collection():
-            for _ in range(repeats):
-                stepper = self.program.start(self.y0, self.par, self.t0)
-                start = clock()
-                samples = stepper.advance(end, sample=self.sample)
-                spent += clock() - start
-        if samples is None:
-            raise ValueError(f"repeats must be at least 1, not {repeats!r}")
-        return spent / repeats, samples
+        stepper = self.program.start(self.y0, self.par, self.t0)
+        start = clock()
+        samples = stepper.advance(end, sample=self.sample)
+        return clock() - start, samples
 
     def until(self, share: float) -> "Run":
-        """Return the run over the first ``share`` of the span."""
         return replace(self, t_end=self.t0 + share * (self.t_end - self.t0))
 
 
@@ -145,25 +154,6 @@ class Spread:
 def repeats_for(seconds: float, shortest: float) -> int:
     """Return how many runs of ``seconds`` make a sample that lasts ``shortest``, with a reserve."""
     return max(1, math.ceil(1.2 * shortest / max(seconds, 1e-9))) if seconds < shortest else 1
-
-
-class Timeable(Protocol):
-    """What can be timed: a `Run`, or an ensemble."""
-
-    @property
-    def program(self) -> Program:
-        """What runs, compiled."""
-        ...
-
-    def seconds(
-        self, repeats: int = 1, clock: Callable[[], float] = time.perf_counter
-    ) -> tuple[float, Samples]:
-        """Return the mean seconds of some runs, and what the last returned."""
-        ...
-
-    def until(self, share: float) -> "Timeable":
-        """Return a shorter run, over the first ``share`` of the span."""
-        ...
 
 
 def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
