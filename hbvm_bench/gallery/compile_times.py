@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
@@ -42,8 +41,7 @@ code grows with the term and not with the number of bodies. Processor seconds of
 """
 
 
-@dataclass(frozen=True)
-class Times:
+class Times(NamedTuple):
     """What one system took, in processor seconds."""
 
     problem: str
@@ -59,15 +57,9 @@ def measure(text: str) -> Times:
     """Trace, emit and compile the field of a problem, as it prints, from nothing."""
     traced, problem = _seconds(lambda: _traced(text))
     emitted, source = _seconds(lambda: emit.source(problem.system, "field", "numba"))
-    return Times(
-        problem=repr(problem),
-        unknowns=problem.system.dim,
-        trace=traced,
-        emit=emitted,
-        lines=source.text.count("\n"),
-        scalar=_seconds(lambda: _compiled(problem))[0],
-        lanes=_seconds(lambda: _on_lanes(problem))[0],
-    )
+    scalar, lanes = _seconds(lambda: _compiled(problem))[0], _seconds(lambda: _on_lanes(problem))[0]
+    lines = source.text.count("\n")
+    return Times(repr(problem), problem.system.dim, traced, emitted, lines, scalar, lanes)
 
 
 def page() -> str:
@@ -76,20 +68,16 @@ def page() -> str:
         measure(text)  # what is done only once in a process is not the systems'
     rows = [measure(text) for text in CASES]
     here = machine.describe()
-    table = Table(
-        "",
+    compiled = ("compile, one state (s)", f"compile, {LANES} stages (s)")
+    columns = ("problem", "unknowns", "trace (ms)", "emit (ms)", "lines", *compiled)
+    cells = [
         (
-            *("problem", "unknowns", "trace (ms)", "emit (ms)", "lines"),
-            *("compile, one state (s)", f"compile, {LANES} stages (s)"),
-        ),
-        [
-            (
-                *(row.problem, str(row.unknowns), f"{1e3 * row.trace:.1f}", f"{1e3 * row.emit:.1f}"),
-                *(str(row.lines), f"{row.scalar:.2f}", f"{row.lanes:.2f}"),
-            )
-            for row in rows
-        ],
-    )
+            *(row.problem, str(row.unknowns), f"{1e3 * row.trace:.1f}", f"{1e3 * row.emit:.1f}"),
+            *(str(row.lines), f"{row.scalar:.2f}", f"{row.lanes:.2f}"),
+        )
+        for row in rows
+    ]
+    table = Table("", columns, cells)
     head = HEAD.format(processor=here["processor"], python=here["python"], lanes=LANES)
     return f"{head}{printed(table)}\n"
 

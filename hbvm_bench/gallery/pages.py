@@ -4,7 +4,7 @@ import inspect
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from textwrap import dedent
 
 import problems
 from hbvm_bench.gallery import pictures
@@ -30,19 +30,11 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     problems.errors.InputError
         If a page there has not the places for what is made.
     """
-    drawn = {
-        name: entry.picture
-        for name in registry.built_in()
-        if (entry := registry.entry(name)) and entry.picture
-    }
+    entries = {name: registry.entry(name) for name in registry.built_in()}
+    drawn = {name: entry.picture for name, entry in entries.items() if entry and entry.picture}
     names = [name for name, picture in drawn.items() if not picture.arguments]
-    made = {
-        path: _filled(path, pieces).encode()
-        for path, pieces in (
-            (directory / "problems.md", [_gallery(names), _references()]),
-            (directory / "engines.md", [_engines(names)]),
-        )
-    }
+    pages = {"problems.md": [_gallery(names), _references()], "engines.md": [_engines(names)]}
+    made = {directory / name: _filled(directory / name, pieces).encode() for name, pieces in pages.items()}
     for name in drawn if with_pictures else ():
         made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
     write_all(made)
@@ -54,9 +46,8 @@ def _filled(path: Path, pieces: Sequence[str]) -> str:
     made = [f"{BEGIN}\n\n{piece.strip()}\n\n{END}" for piece in pieces]
     if not path.is_file():
         return "\n\n".join(made) + "\n"
-    kept = re.split(
-        f"{re.escape(BEGIN)}.*?{re.escape(END)}", path.read_text(encoding="utf-8"), flags=re.DOTALL
-    )
+    marked = f"(?s){re.escape(BEGIN)}.*?{re.escape(END)}"
+    kept = re.split(marked, path.read_text(encoding="utf-8"))
     if len(kept) != len(pieces) + 1:
         raise InputError(
             f"{path} must have {BEGIN!r} and {END!r} around {len(pieces)} places, not {len(kept) - 1}."
@@ -92,22 +83,21 @@ def _overview(loaded: dict[str, Problem]) -> str:
 
 
 def _section(name: str, problem: Problem) -> str:
-    make = registry.factory(name)
-    system = problem.system
-    sections = _numpydoc(inspect.getdoc(make) or "")
-    lines = [f"## {name}", "", f"![{problem.title}](problems/{name}.svg)", ""]
+    sections = _numpydoc(inspect.getdoc(registry.factory(name)) or "")
     summary = _flowed(sections.get("Summary", "")).removeprefix("Return ")
-    lines += [summary[:1].upper() + summary[1:], ""]
-    lines += ["$$H = " + latex(system) + "$$", ""]
-    lines += [f"`{problem!r}`, t from {problem.t0:g} to {problem.t_end:g}.", ""]
-    arguments = _entries(sections.get("Parameters", ""))
-    lines += [f"- `{head}`: {body}" for head, body in arguments]
-    returns = _entries(sections.get("Returns", ""))
-    if returns:
-        lines.append(f"- returns: {returns[0][1]}")
-    if system.guard_names:
-        lines.append(f"- stays exactly 0 by symmetry: {', '.join(system.guard_names).replace('_', ' ')}")
-    lines += [f"- source: {source}" for source in problem.references]
+    arguments, returns = (_entries(sections.get(key, "")) for key in ("Parameters", "Returns"))
+    guards = ", ".join(problem.system.guard_names).replace("_", " ")
+    lines = [
+        f"## {name}\n",
+        f"![{problem.title}](problems/{name}.svg)\n",
+        f"{summary[:1].upper()}{summary[1:]}\n",
+        f"$$H = {latex(problem.system)}$$\n",
+        f"`{problem!r}`, t from {problem.t0:g} to {problem.t_end:g}.\n",
+        *(f"- `{head}`: {body}" for head, body in arguments),
+        *(f"- returns: {body}" for _, body in returns[:1]),
+        *([f"- stays exactly 0 by symmetry: {guards}"] if guards else []),
+        *(f"- source: {source}" for source in problem.references),
+    ]
     return "\n".join(lines) + "\n\n"
 
 
@@ -141,13 +131,10 @@ def _entries(section: str) -> list[tuple[str, str]]:
 def _flowed(block: str) -> str:
     """Return paragraphs on one line each; indented formulas stay as they are."""
     paragraphs = re.split(r"\n\s*\n", block.strip("\n"))
-    shown = [
-        "```\n" + "\n".join(line[4:] for line in part.splitlines()) + "\n```"
-        if part.startswith("    ")
-        else _code(" ".join(part.split()))
+    return "\n\n".join(
+        f"```\n{dedent(part)}\n```" if part.startswith("    ") else _code(" ".join(part.split()))
         for part in paragraphs
-    ]
-    return "\n\n".join(shown)
+    )
 
 
 def _code(body: str) -> str:
@@ -158,7 +145,6 @@ def _references() -> str:
     lines = ["| problem | up to t = | the two differ by (relative) |", "|---|---|---|"]
     for path in sorted(reference.folder().glob("*.json")):
         stored = reference.read(path)
-        end = float.fromhex(stored.t[-1])
-        said: Any = stored.provenance.get("agreement", "")
-        lines.append(f"| `{stored.problem}` | {end:g} | {said.split(' ')[0]} |")
+        agreement = str(stored.provenance.get("agreement", "")).split(" ")[0]
+        lines.append(f"| `{stored.problem}` | {float.fromhex(stored.t[-1]):g} | {agreement} |")
     return "\n".join(lines)

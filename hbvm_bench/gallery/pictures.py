@@ -46,13 +46,9 @@ def draw(name: str) -> str:
         "svg.hashsalt": "hbvm-bench",  # the same file from the same numbers
         "svg.fonttype": "none",
         "font.size": 8,
-        "axes.edgecolor": MUTED,
-        "text.color": INK,
-        "axes.labelcolor": INK,
-        "xtick.color": MUTED,
-        "ytick.color": MUTED,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
+        **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), MUTED),
+        **dict.fromkeys(("text.color", "axes.labelcolor"), INK),
+        **dict.fromkeys(("axes.spines.top", "axes.spines.right"), False),
         "path.simplify_threshold": 0.5,
     }
     with plt.rc_context(look):
@@ -125,10 +121,8 @@ def _lattice(ax: Any, picture: Lattice, problem: Problem, t: Array, y: Array) ->
     values = y[:, : problem.system.dof]
     if picture.moving:
         values = values - values.mean(axis=1, keepdims=True)
-    size = np.abs(values).max()
-    ax.pcolormesh(
-        t, np.arange(values.shape[1]), values.T, cmap="RdBu_r", vmin=-size, vmax=size, rasterized=True
-    )
+    size, number = np.abs(values).max(), np.arange(values.shape[1])
+    ax.pcolormesh(t, number, values.T, cmap="RdBu_r", vmin=-size, vmax=size, rasterized=True)
     ax.set(xlabel="t", ylabel="number along the chain")
 
 
@@ -138,11 +132,9 @@ def _phase(ax: Any, problem: Problem, y: Array) -> None:
     q, p = np.linspace(-reach[0], reach[0], 161), np.linspace(-reach[1], reach[1], 161)
     grid = np.array([[a, b] for b in p for a in q])
     level = problem.invariants(grid)["energy"].reshape(161, 161)
-    here = problem.invariants(problem.y0)["energy"][0]
     low = level.min()
-    step = max((here - low) / 3, 1e-9)
-    ax.contour(
-        q, p, level, levels=low + step * np.arange(0.3, 8.0), colors=GRID, linewidths=0.7, linestyles="-"
-    )
+    step = max((problem.invariants(problem.y0)["energy"][0] - low) / 3, 1e-9)
+    levels = low + step * np.arange(0.3, 8.0)
+    ax.contour(q, p, level, levels=levels, colors=GRID, linewidths=0.7, linestyles="-")
     ax.plot(y[:, 0], y[:, 1], lw=1.2, color=COLORS[0])
     ax.set(xlabel="q", ylabel="p")
