@@ -68,11 +68,11 @@ def _reversal(problem: Problem, method: MethodBase, program: Program, share: flo
     if step:  # a whole number of steps, so that the way back meets the same ones
         way = float(np.copysign(max(1, round(abs(way) / step)) * step, way))
     turn = problem.t0 + way
-    there = program.start(problem.y0, problem.par, problem.t0).advance(np.array([turn]))
-    if there.status is not Status.FINISHED:
-        return f"the way there ended as {there.status.value.replace('_', ' ')}"
-    back = program.start(there.y[-1], problem.par, turn).advance(np.array([problem.t0]))
-    if back.status is not Status.FINISHED:
-        return f"the way back ended as {back.status.value.replace('_', ' ')}"
+    y = problem.y0
+    for which, begin, end in (("there", problem.t0, turn), ("back", turn, problem.t0)):
+        made = program.start(y, problem.par, begin).advance(np.array([end]))
+        if made.status is not Status.FINISHED:
+            return f"the way {which} ended as {made.status.value.replace('_', ' ')}"
+        y = made.y[-1]
     with np.errstate(all="ignore"):
-        return float(largest_distance(problem, positions(problem, (back.y[-1] - problem.y0)[None]))[0])
+        return float(largest_distance(problem, positions(problem, (y - problem.y0)[None]))[0])

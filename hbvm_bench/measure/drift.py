@@ -14,7 +14,6 @@ The Astronomical Journal 46 (1937) 149-153.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,16 +122,8 @@ def mean(t: ArrayLike, errors: ArrayLike) -> Law:
     error = math.sqrt(float(np.sum((ends - value) ** 2)) / (n * (n - 1))) if n > 1 else math.inf
     span = float(times[-1] - times[first].mean())
     rate, low, high = (_finite(one / span) for one in (value, *_interval(value, error, n)))
-    return Law(
-        mean=value,
-        mean_error=_finite(error),
-        positive=int(np.sum(ends > 0.0)),
-        rate=rate,
-        rate_low=low,
-        rate_high=high,
-        end=float(times[-1]),
-        starts=n,
-    )
+    found = Law(mean=value, mean_error=_finite(error), positive=int(np.sum(ends > 0.0)), starts=n)
+    return replace(found, rate=rate, rate_low=low, rate_high=high, end=float(times[-1]))
 
 
 def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
@@ -210,13 +201,6 @@ class _Fit:
     above: int  # windows in which the growth has passed the floor
 
 
-def _growth(law: str, t: Array) -> Callable[[Array], Array]:
-    """Return ln g(t) as a function of the parameters after the floor; at the end of the span it is p[0]."""
-    over = t / t[-1] - 1.0 if law == "exponential" else np.log(t / t[-1])
-    power = POWERS.get(law)
-    return lambda p: p[0] + (p[1] if power is None else power) * over
-
-
 def _fitted(law: str, t: Array, values: Array) -> _Fit:
     """Fit ln sqrt(floor^2 + g(t)^2) to ln of the values by least squares."""
     from scipy.optimize import least_squares  # as in _quantile
@@ -226,10 +210,13 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     if law == "bounded":
         return _Fit((float(np.mean(logs)),), _score(logs - np.mean(logs), 1), 0.0, 0)
     low, high = float(logs.min()), float(logs.max())
-    grown = _growth(law, t)
+    over = t / t[-1] - 1.0 if law == "exponential" else np.log(t / t[-1])
+
+    def grown(p: Array) -> Array:  # ln g(t); at the end of the span it is p[1]
+        return p[1] + POWERS.get(law, p[-1]) * over
 
     def residual(p: Array) -> Array:
-        return 0.5 * np.logaddexp(2.0 * p[0], 2.0 * grown(p[1:])) - logs
+        return 0.5 * np.logaddexp(2.0 * p[0], 2.0 * grown(p)) - logs
 
     # The floor lies not far below the least value: below that it has no effect and no meaning.
     bounds = [(low - 3.0, high + 1e-9), (low - 3.0, high + 3.0)]
@@ -246,7 +233,7 @@ def _fitted(law: str, t: Array, values: Array) -> _Fit:
     parameters = found.x.tolist()
     normal = found.jac.T @ found.jac + 1e-12 * np.eye(found.x.size)
     variance = max(2.0 * found.cost / max(n - found.x.size, 1), NOISE**2) * np.linalg.inv(normal)[-1, -1]
-    above = int(np.sum(grown(found.x[1:]) > found.x[0]))
+    above = int(np.sum(grown(found.x) > found.x[0]))
     score = _score(residual(found.x), found.x.size)
     return _Fit(tuple(parameters), score, math.sqrt(max(variance, 0.0)), above)
 

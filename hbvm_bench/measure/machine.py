@@ -10,6 +10,7 @@ from pathlib import Path
 from problems.errors import InputError
 
 VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
+VECTORS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "SSE2"))
 
 MEASURED = ("vector_bits", "clock_ghz")
 """What `describe` measures: it may differ from one look at a processor to the next."""
@@ -42,7 +43,7 @@ def describe(*, measure: bool = False) -> dict[str, str | int]:
         "llvm_processor": binding.get_host_cpu_name(),
         "cores": len(cores()),
         "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
-        "vector_instructions": _vector_instructions(),
+        "vector_instructions": next((name for flag, name in VECTORS if flag in flags()), "none known"),
         "system": f"{platform.system()} {platform.machine()}",
         "python": f"{platform.python_implementation()} {platform.python_version()}",
     }
@@ -181,8 +182,3 @@ def _cpu() -> dict[str, str]:
 
 def _processor() -> str:
     return _cpu().get("model name") or platform.processor() or "unknown processor"
-
-
-def _vector_instructions() -> str:
-    known = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "SSE2"))
-    return next((name for flag, name in known if flag in flags()), "none known")

@@ -177,14 +177,9 @@ def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
         calibration.append(calibrate())
         spent += mean * repeats
     wall, busy = time.perf_counter() - wall, time.process_time() - busy
-    taken = TimingRound(
-        share=round(busy / wall, 3),
-        samples=samples,
-        repeats=repeats,
-        calibration=calibration,
-        compile=_compilation(run),
-    )
-    return Timing(rounds=[taken])
+    fixed = {"repeats": repeats, "compile": _compilation(run)}
+    share = round(busy / wall, 3)
+    return Timing(rounds=[TimingRound(samples=samples, calibration=calibration, share=share, **fixed)])
 
 
 def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
@@ -202,9 +197,8 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
         calls.append(run.until(NOWHERE).seconds(CALLS, clock)[0])
     fine = [i for i, (_, reached) in enumerate(firsts) if reached.status is Status.FINISHED]
     repeats = {i: repeats_for(firsts[i][0], plan.shortest) for i in fine}
-    turns = {
-        i: spread_evenly(int(plan.budget / max(firsts[i][0] * repeats[i], 1e-9)), plan.rounds) for i in fine
-    }
+    fitting = {i: int(plan.budget / max(firsts[i][0] * repeats[i], 1e-9)) for i in fine}
+    turns = {i: spread_evenly(count, plan.rounds) for i, count in fitting.items()}
     calibration: list[float] = []
 
     def begin(number: int) -> None:
@@ -212,32 +206,20 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
         calibration.append(calibrate())
 
     before = busy()
-    taken = interleaved(
-        [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine],
-        plan.rounds,
-        order=plan.order,
-        turns=[turns[i] for i in fine],
-        begin=begin,
-    )
+    samples = [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine]
+    mine = [turns[i] for i in fine]
+    taken = interleaved(samples, plan.rounds, order=plan.order, turns=mine, begin=begin)
     load = load_between(before, busy())
     made = [_unfinished(reached) for _, reached in firsts]
     for i, seconds in zip(fine, taken, strict=True):
-        compiled, enough = _compilation(runs[i]), len(seconds) == plan.rounds
-        made[i] = Timing(
-            rounds=[
-                TimingRound(
-                    samples=[sample],
-                    repeats=repeats[i],
-                    compile=compiled,
-                    calibration=[calibration[n]],
-                    number=n,
-                )
-                for n, sample in zip(turns[i], seconds, strict=True)
-            ],
-            why="" if enough else f"{len(seconds)} of {plan.rounds} rounds: a run takes {firsts[i][0]:.2g} s",
-            call=calls[i],
-            load=load,
-        )
+        fixed = {"repeats": repeats[i], "compile": _compilation(runs[i])}
+        rounds = [
+            TimingRound(samples=[sample], calibration=[calibration[n]], number=n, **fixed)
+            for n, sample in zip(turns[i], seconds, strict=True)
+        ]
+        few = f"{len(rounds)} of {plan.rounds} rounds: a run takes {firsts[i][0]:.2g} s"
+        why = few * (len(rounds) < plan.rounds)
+        made[i] = Timing(rounds=rounds, why=why, call=calls[i], load=load)
     return made
 
 

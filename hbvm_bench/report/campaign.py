@@ -35,8 +35,8 @@ from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index, Store, again, damage, progress
 from hbvm_bench.summaries import export, fairness, goals, laws, needs, outcomes
-from hbvm_bench.summaries.points import family_of
-from hbvm_bench.summaries.rows import columns, tasks
+from hbvm_bench.summaries.points import by_family, family_of
+from hbvm_bench.summaries.rows import by, columns, tasks
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -108,13 +108,7 @@ def gather(stores: Sequence[Store]) -> Gathered:
 
 
 def document(stores: Store | Sequence[Store]) -> Document:
-    """Return the report on one or more runs.
-
-    Raises
-    ------
-    problems.errors.InputError
-        See `gather`.
-    """
+    """Return the report on one or more runs; raises what `gather` does."""
     stores = [stores] if isinstance(stores, Store) else stores
     runs, records, series = gather(stores)
     look = looks(record.case.method for record in records)
@@ -178,9 +172,7 @@ def _read(record: Record, store: Store) -> tuple[Record, Series]:
 def _overall(records: Sequence[Record], look: Looks, *, several: bool) -> list[Block]:
     """Return what the cases say together."""
     title = "Over all problems" if several else "Which integrator to take"
-    numbers: dict[str, int] = {}
-    for record in records:
-        numbers.setdefault(family_of(record), look[record.case.method].number)
+    numbers = {name: look[each[0].case.method].number for name, each in by_family(records).items()}
     made = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
@@ -237,10 +229,10 @@ def _fairness(records: Sequence[Record]) -> Section:
         *([drawn] if len(records) > DRAWN_CASES else []),
         *(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
     )
-    counted: dict[tuple[str, str], Counter[str]] = {}
-    for record in records:
-        counted.setdefault((family_of(record), record.library), Counter())[record.case.settings] += 1
-    rows = [(*of, str(kinds.total()), *(str(kinds[kind]) for kind in KINDS)) for of, kinds in counted.items()]
+    rows = []
+    for of, members in by(lambda record: (family_of(record), record.library), records).items():
+        kinds = Counter(record.case.settings for record in members)
+        rows.append((*of, str(len(members)), *(str(kinds[kind]) for kind in KINDS)))
     head = ("method", "library", "settings", *KINDS)
     settings = Table("How many settings each method has", head, rows, words=(0, 1))
     blocks = [Items(rules, "numbered"), settings, *attempt(provenance.PEERS)]

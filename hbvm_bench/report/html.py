@@ -135,14 +135,11 @@ def sort_key(cell: Cell | None) -> Markup:
 def words(text: object) -> Markup:
     """Escape a text; what stands between backquotes becomes code, ``3.4e-15`` a power of ten."""
     return Markup("").join(
-        Markup("<code>{}</code>").format(piece) if is_code else typeset(piece)
+        Markup("<code>{}</code>").format(piece)
+        if is_code
+        else Markup(MINUS.sub("−", POWER.sub(_power, str(escape(piece)))))
         for piece, is_code in pieces(text)
     )
-
-
-def typeset(text: str) -> Markup:
-    """Escape a text and set ``3.4e-15`` as a power of ten."""
-    return Markup(MINUS.sub("−", POWER.sub(_power, str(escape(text)))))
 
 
 def _power(match: re.Match[str]) -> str:

@@ -8,7 +8,7 @@ from hbvm_bench.report import document as blocks
 from hbvm_bench.report.document import VERDICTS, Block, Document, is_call, pieces
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.summaries.rows import Row, seconds
-from hbvm_bench.summaries.table import NONE, Table
+from hbvm_bench.summaries.table import Table
 
 
 def markdown(document: Document) -> str:
@@ -83,16 +83,12 @@ def _results(block: blocks.Results, level: int) -> str:
         if several:
             parts.append(f"{'#' * level} {words(problem.title)}: {code(problem.problem)}")
         for title, rows in problem.groups:
-            cases = [row.record.case for row in rows]
-            lines = [
-                (
-                    str(block.looks[case.method].number),
-                    code(case.method),
-                    words(case.settings),
-                    *row_cells(block.columns, row),
+            lines = []
+            for row in rows:
+                case, number = row.record.case, str(block.looks[row.record.case.method].number)
+                lines.append(
+                    (number, code(case.method), words(case.settings), *row_cells(block.columns, row))
                 )
-                for case, row in zip(cases, rows, strict=True)
-            ]
             remarks = [row for row in rows if row.remark]
             parts += [
                 f"{'#' * (level + several)} {words(title)}",
@@ -110,8 +106,7 @@ def row_cells(columns: Sequence[Metric], row: Row) -> list[str]:
     """Return the cells of a row: void ones in brackets, times with their quartiles."""
     made = []
     for metric in columns:
-        cell = row.cells.get(metric.key)
-        text = NONE if cell is None else cell.shown
+        text = row.shown(metric.key)
         if metric.key == "warm_seconds" and row.record.timing is not None and row.record.timing.samples:
             summary = row.record.timing.summary
             text += f" [{seconds(summary['q1'])}, {seconds(summary['q3'])}]"

@@ -14,7 +14,7 @@ from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import goals
 from hbvm_bench.summaries.rows import Row, at_once, columns, grouped, numbers, rows, tasks
-from hbvm_bench.summaries.table import NONE, Table
+from hbvm_bench.summaries.table import Table
 
 NARROWEST = 24  # characters for the methods
 # Where a terminal is narrow, these columns are left out, in this order.
@@ -132,4 +132,4 @@ def _fitting(shown: list[Metric], lines: Sequence[Row], width: int) -> list[Metr
 
 def _cell(row: Row, key: str) -> Text:
     cell = row.cells.get(key)
-    return Text(NONE if cell is None else cell.shown, style="dim" if cell is None or cell.void else "")
+    return Text(row.shown(key), style="dim" if cell is None or cell.void else "")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from statistics import median
 
 from hbvm_bench.store.records import Record, TimingRound
-from hbvm_bench.summaries.points import by_family, by_problem, family_of
+from hbvm_bench.summaries.points import by_family, by_problem, family_of, singles
 from hbvm_bench.summaries.rows import group_of
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
@@ -14,8 +14,7 @@ STEADY = 1.5  # quartiles of the calibration around a timing sample
 
 def sentences(records: Sequence[Record]) -> list[str]:
     """Return what to know of this run beside the rules: how many settings each method had, and doubts."""
-    singles = [record for record in records if record.case.ensemble is None]
-    families = {family: _settings(members) for family, members in by_family(singles).items()}
+    families = {family: _settings(members) for family, members in by_family(singles(records)).items()}
     counts = {number for numbers in families.values() for number in numbers}
     said: list[str] = []
     if len(counts) == 1:

@@ -146,15 +146,8 @@ def _number(value: float) -> str:
 def as_data(found: Sequence[Verdict]) -> list[dict[str, object]]:
     """Return the verdicts as plain data for JSON."""
     return [
-        {
-            "problem": name_of(one.entry),
-            "words": one.words,
-            "goal": msgspec.to_builtins(one.goal),
-            "verdict": one.verdict,
-            "why": one.why,
-            "measured": one.measured,
-            **ratio_data(one.comparison),
-        }
+        {"problem": name_of(one.entry), "words": one.words, "goal": msgspec.to_builtins(one.goal)}
+        | {"verdict": one.verdict, "why": one.why, "measured": one.measured, **ratio_data(one.comparison)}
         for one in found
     ]
 

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from hbvm_bench.store.records import Law, Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import by_family
 from hbvm_bench.summaries.rows import group_of
 from hbvm_bench.summaries.table import Table
 
@@ -21,12 +21,11 @@ SHORT = {
 
 def counts(records: Sequence[Record]) -> dict[str, Counter[str]]:
     """Return for each family how many cases have which law of the energy; ``"none"`` where none is clear."""
-    counted: dict[str, Counter[str]] = {}
-    for record in records:
-        law = record.result.laws.get("energy")
-        if law is not None and group_of(record) == "on":
-            counted.setdefault(family_of(record), Counter())[law.law or "none"] += 1
-    return counted
+    found = [one for one in records if "energy" in one.result.laws and group_of(one) == "on"]
+    return {
+        family: Counter(one.result.laws["energy"].law or "none" for one in members)
+        for family, members in by_family(found).items()
+    }
 
 
 def table(records: Sequence[Record]) -> Table | None:

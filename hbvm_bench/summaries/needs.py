@@ -18,7 +18,7 @@ from statistics import median
 from typing import NamedTuple
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, work_of
+from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, singles, work_of
 from hbvm_bench.summaries.table import Table
 
 SHOWN = 3  # families
@@ -58,13 +58,9 @@ def table(records: Sequence[Record]) -> Table | None:
         rows += [(need.title, "; ".join(said), str(problems))] if said else []
     if not rows:
         return None
-    return Table(
-        "Which integrator for which need",
-        ("need", "first choices", "problems"),
-        rows,
-        "In brackets: on how many problems it is near the best, and its median factor behind it.",
-        words=(0, 1),
-    )
+    head = ("need", "first choices", "problems")
+    note = "In brackets: on how many problems it is near the best, and its median factor behind it."
+    return Table("Which integrator for which need", head, rows, note, words=(0, 1))
 
 
 def needs(records: Sequence[Record]) -> list[Need]:
@@ -163,6 +159,6 @@ def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -
     need = Need("", lambda record: bool(number(record, work)) and accurate(record, within), work)
     found = factors(records, need)
     solved = len(next(iter(found.values()), ()))
-    families = by_family([record for record in records if record.case.ensemble is None])
+    families = by_family(singles(records))
     words = ", ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in within.items())
     return Profile(words, {family: list(found.get(family, [math.inf] * solved)) for family in families})

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import by_family, by_problem
+from hbvm_bench.summaries.points import by_family, by_problem, singles
 from hbvm_bench.summaries.rows import group_of, reason_of
 from hbvm_bench.summaries.table import Table
 
@@ -26,7 +26,7 @@ class Outcome(NamedTuple):
 def matrix(records: Sequence[Record]) -> tuple[list[str], dict[str, dict[str, Outcome]]]:
     """Return the families in order, and for each problem the outcome of each family."""
     here = {problem: by_family(members) for problem, members in by_problem(records).items()}
-    families = list(by_family([record for record in records if record.case.ensemble is None]))
+    families = list(by_family(singles(records)))
     rows = {
         problem: {family: _outcome(members.get(family, [])) for family in families}
         for problem, members in here.items()
@@ -62,16 +62,13 @@ def _sign(one: Outcome) -> str:
 
 
 def _outcome(records: Sequence[Record]) -> Outcome:
-    states: list[State] = [_state(record) for record in records]
+    states: list[State] = []
     said: dict[str, list[str]] = {}
-    for record, state in zip(records, states, strict=True):
-        if state != "on":
+    for record in records:
+        states.append("refused" if record.result.outcome == "refused" else group_of(record))
+        if states[-1] != "on":
             said.setdefault(reason_of(record), []).append(record.case.method)
     same = len({reason_of(record) for record in records}) == 1
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
     found: list[State] = [state for state in SIGNS if state in states]
     return Outcome(found[0] if found else "absent", states.count("on"), len(states), reasons)
-
-
-def _state(record: Record) -> State:
-    return "refused" if record.result.outcome == "refused" else group_of(record)

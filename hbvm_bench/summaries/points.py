@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.rows import by, group_of
 
 T = TypeVar("T")
 
@@ -21,19 +21,17 @@ def family_of(record: Record) -> str:
 
 def by_problem(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Return the cases that are no ensembles, problem by problem, in order."""
-    found: dict[str, list[Record]] = {}
-    for record in records:
-        if record.case.ensemble is None:
-            found.setdefault(record.case.problem, []).append(record)
-    return found
+    return by(lambda record: record.case.problem, singles(records))
 
 
 def by_family(records: Sequence[Record]) -> dict[str, list[Record]]:
     """Return cases family by family, in order."""
-    found: dict[str, list[Record]] = {}
-    for record in records:
-        found.setdefault(family_of(record), []).append(record)
-    return found
+    return by(family_of, records)
+
+
+def singles(records: Sequence[Record]) -> list[Record]:
+    """Return the cases that are no ensembles."""
+    return [record for record in records if record.case.ensemble is None]
 
 
 def number(record: Record, key: str) -> float | None:

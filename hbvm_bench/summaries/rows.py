@@ -1,13 +1,14 @@
 """The results as rows: grouped, sorted, formatted; what the terminal and the reports print."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 from hbvm_bench.campaign.entries import Ensemble
 from hbvm_bench.measure.metrics import METRICS, Metric, find
 from hbvm_bench.store.records import Record, Value
+from hbvm_bench.summaries.table import NONE
 
 # In this order a reader needs them; position and its error stand beside the energy, always.
 HEADLINE = (
@@ -15,6 +16,7 @@ HEADLINE = (
     *("steps", "evaluations", "warm_seconds", "throughput", "compile_seconds"),
 )
 RANKED_BY = "position_end"
+K = TypeVar("K")
 
 GROUPS = {
     "on": "On the trajectory that was asked for",
@@ -47,6 +49,10 @@ class Row:
     cells: dict[str, Cell]  # by metric key
     remark: str  # what went otherwise than asked, what the solution warns of, and the campaign's note
 
+    def shown(self, key: str) -> str:
+        """Return a metric as a cell shows it; a dash where there is none."""
+        return self.cells[key].shown if key in self.cells else NONE
+
 
 def columns(records: Sequence[Record], keys: Sequence[str] | None = None) -> list[Metric]:
     """Return the metrics to show: those asked for, or the headline ones that any case has a value of."""
@@ -70,12 +76,17 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
 
 
+def by(key: Callable[[Record], K], records: Iterable[Record]) -> dict[K, list[Record]]:
+    """Return the records that have one key together, in order."""
+    made: dict[K, list[Record]] = {}
+    for record in records:
+        made.setdefault(key(record), []).append(record)
+    return made
+
+
 def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[Record]]:
     """Return the records of each table: one trajectory of a problem, or an ensemble, in order."""
-    made: dict[tuple[str, Ensemble | None], list[Record]] = {}
-    for record in records:
-        made.setdefault((record.case.problem, record.case.ensemble), []).append(record)
-    return made
+    return by(lambda record: (record.case.problem, record.case.ensemble), records)
 
 
 def at_once(ensemble: Ensemble | None) -> str:
@@ -130,7 +141,7 @@ def reason_of(record: Record) -> str:
 def format_value(metric: Metric, value: Value) -> Cell:
     """Format one metric."""
     if value.value is None:
-        return Cell("–", False, value.why, math.inf)
+        return Cell(NONE, False, value.why, math.inf)
     number = value.value
     if metric.unit == "s":
         text = seconds(number)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -151,9 +150,10 @@ def panel_legend(
     cases: Sequence[Drawn],
     *,
     markers: bool = False,
-    notes: Mapping[str, str] = MappingProxyType({}),
+    notes: Mapping[str, str] | None = None,
 ) -> None:
     """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
+    notes = notes or {}
     named = len({family_of(case.record) for case in cases}) > 1
     handles = []
     for case in cases:

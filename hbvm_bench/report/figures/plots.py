@@ -87,19 +87,13 @@ def as_json(plot: Plot) -> dict[str, Any]:
 
 def as_csv(plot: Plot) -> bytes:
     """Return a plot as text: one line per point."""
-    rows = [
-        (
-            panel.title,
-            trace.case or "",
-            trace.name,
-            trace.role,
-            *("" if v is None else repr(v) for v in point),
-        )
-        for panel in plot.panels
-        for trace in panel.traces
-        for point in zip(map(short, trace.x.tolist()), map(short, trace.y.tolist()), strict=True)
-    ]
-    return csv_of([("panel", "case", "name", "kind", "x", "y"), *rows])
+    rows: list[tuple[object, ...]] = [("panel", "case", "name", "kind", "x", "y")]
+    for panel in plot.panels:
+        for trace in panel.traces:
+            of = (panel.title, trace.case or "", trace.name, trace.role)
+            points = zip(map(short, trace.x.tolist()), map(short, trace.y.tolist()), strict=True)
+            rows += [(*of, *("" if v is None else repr(v) for v in point)) for point in points]
+    return csv_of(rows)
 
 
 def numbers(plot: Plot) -> Table:

@@ -101,14 +101,9 @@ def _grid(
     for row in range(rows):
         grid[row * COLUMNS].set_ylabel(labels[1])
     said = "; ".join(f"{case.record.case.method}: {x.size} points" for case, x, _ in clouds)
-    return picture(
-        figure,
-        key,
-        f"{title} ({labels[0]}, {labels[1]})",
-        caption,
-        f"{title} of each case. {said}.",
-        Plot([Panel("", Axis(labels[0]), Axis(labels[1]), traces)], "dots"),
-    )
+    plot = Plot([Panel("", Axis(labels[0]), Axis(labels[1]), traces)], "dots")
+    summary = f"{title} of each case. {said}."
+    return picture(figure, key, f"{title} ({labels[0]}, {labels[1]})", caption, summary, plot)
 
 
 def _reach(values: Sequence[Array]) -> tuple[float, float]:

@@ -45,17 +45,9 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
             x, y = x[: y.size], y[: x.size]
             colour, _, marker = base(family)
             same = [name for name in list(one.ratios)[:index] if base(name)[0] == colour]
-            (line,) = axes.plot(
-                x,
-                y,
-                color=colour,
-                marker=marker,
-                markevery=(index % 3, max(3, x.size // 6)),
-                markersize=4,
-                linewidth=1.6,
-                dashes=DASHES[len(same)],
-                clip_on=False,
-            )
+            every = (index % 3, max(3, x.size // 6))
+            (line,) = axes.plot(x, y, color=colour, marker=marker, markevery=every, markersize=4)
+            line.set(linewidth=1.6, dashes=DASHES[len(same)], clip_on=False)
             handles.setdefault(family, line)
             traces.append(Trace(numbers.get(family, 0), family, x, y))
         log_axis(axes, "x", 0, round(np.log10(end)))

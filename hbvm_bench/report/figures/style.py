@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import by_family
+from hbvm_bench.summaries.rows import by
 
 # Of each method: its colour in the light and in the dark theme, and its marker.
 METHODS = {
@@ -76,13 +77,8 @@ def looks(methods: Iterable[str]) -> dict[str, Look]:
         light, dark, marker = base(parse_spec(method).name)
         # settings of one colour are told apart by shade and dash, whatever their method's name
         index = seen[light] = seen.get(light, -1) + 1
-        made[method] = Look(
-            number=number,
-            light=_unique(_shade(light, index, towards=0.0), taken),
-            dark=_shade(dark, index, towards=1.0),
-            dash=DASHES[index % len(DASHES)],
-            marker=marker,
-        )
+        light, dark = _unique(_shade(light, index, towards=0.0), taken), _shade(dark, index, towards=1.0)
+        made[method] = Look(number, light, dark, DASHES[index % len(DASHES)], marker)
     return made
 
 
@@ -104,10 +100,8 @@ def options(record: Record) -> str:
 
 def panels(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
     """Divide cases into panels: by library, and by method where a library has more than `IN_A_PANEL`."""
-    libraries: dict[str, list[Record]] = {}
-    for record in records:
-        libraries.setdefault("ours" if record.role == "ours" else record.library, []).append(record)
     made: list[tuple[str, list[Record]]] = []
+    libraries = by(lambda record: "ours" if record.role == "ours" else record.library, records)
     for library, members in libraries.items():
         names = by_family(members)
         if len(members) <= IN_A_PANEL:
