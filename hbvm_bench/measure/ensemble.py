@@ -213,8 +213,6 @@ def _truth(problem: Problem, starts: Array, par: Array) -> Reference | None:
 
 def _from(problem: Problem, start: Array, par: Array, t_end: float) -> Problem:
     """Return a problem with another start, other parameters and another end."""
-    parameters = {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in problem.system.unpack(par).items()
-    }
+    values = problem.system.unpack(par)
+    parameters = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()}
     return Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=t_end)

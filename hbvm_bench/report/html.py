@@ -134,12 +134,11 @@ def sort_key(cell: Cell | None) -> Markup:
 
 def words(text: object) -> Markup:
     """Escape a text; what stands between backquotes becomes code, ``3.4e-15`` a power of ten."""
-    return Markup("").join(
-        Markup("<code>{}</code>").format(piece)
-        if is_code
-        else Markup(MINUS.sub("−", POWER.sub(_power, str(escape(piece)))))
-        for piece, is_code in pieces(text)
-    )
+    made = Markup("")
+    for piece, is_code in pieces(text):
+        plain = Markup(MINUS.sub("−", POWER.sub(_power, str(escape(piece)))))
+        made += Markup("<code>{}</code>").format(piece) if is_code else plain
+    return made
 
 
 def _power(match: re.Match[str]) -> str:

@@ -143,8 +143,7 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
 
 def _rank(case: Drawn) -> tuple[bool, float]:
     errors = [number(case.record, key) for key in ("position_end", "energy_max")]
-    least = next((error for error in errors if error is not None), np.inf)
-    return group_of(case.record) != "on", least
+    return group_of(case.record) != "on", next((error for error in errors if error is not None), np.inf)
 
 
 # fmt: off

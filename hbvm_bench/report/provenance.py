@@ -30,10 +30,8 @@ def days(records: Sequence[Record]) -> str:
 def versions(records: Sequence[Record]) -> dict[str, str]:
     """Return the versions of the libraries, and how their machine code came about."""
     found = _each_once([record.versions for record in records], ", ")
-    return {
-        name: f"{numbers} ({BUILT[name.lower()]})" if name.lower() in BUILT else numbers
-        for name, numbers in found.items()
-    }
+    built = {name: BUILT.get(name.lower()) for name in found}
+    return {name: f"{numbers} ({built[name]})" if built[name] else numbers for name, numbers in found.items()}
 
 
 def processors(records: Sequence[Record]) -> list[str]:

@@ -71,11 +71,10 @@ def inspect(text: str, parameters: str = "") -> Findings:
     if problem is not None:
         if parameters:
             raise InputError(f"parameters belong to formulas; write them into the call: {text!r}.")
-        return _describe(repr(problem), problem.system, problem)
+        return _describe(repr(problem), problem)
     system = expression.hamiltonian(text, parameters=expression.assignments(parameters))
     zeros = [0.5] * (system.dim // 2)  # no start is needed: engines are asked about the system
-    made = Problem(system, q0=zeros, p0=zeros, t_end=1.0)
-    return _describe(text.strip(), system, made)
+    return _describe(text.strip(), Problem(system, q0=zeros, p0=zeros, t_end=1.0))
 
 
 def _problem(text: str) -> Problem | None:
@@ -93,15 +92,16 @@ def _problem(text: str) -> Problem | None:
     return make_problem(text) if name in problems.names() else None
 
 
-def _describe(name: str, system: System, problem: Problem) -> Findings:
+def _describe(name: str, problem: Problem) -> Findings:
+    system = problem.system
     energy = "hamiltonian" in system.offered()
     degree = structure.degree(system, problem.par) if energy else None
     try:
         formula = latex(system) if energy else ""
     except InputError:
         formula = ""
-    dof = system.dof
-    cyclic = structure.cyclic(system) if dof is not None else []
+    cyclic = structure.cyclic(system) if system.dof is not None else []
+    values = system.unpack(problem.par)
     return Findings(
         name=name,
         formula=formula,
@@ -110,14 +110,11 @@ def _describe(name: str, system: System, problem: Problem) -> Findings:
         separable=system.separable,
         degree=degree,
         exact=() if degree is None else tuple((s, structure.exact_k(degree, s)) for s in DEGREES),
-        cyclic=tuple("q" if dof == 1 else f"q{place + 1}" for place in cyclic),
+        cyclic=tuple("q" if system.dof == 1 else f"q{place + 1}" for place in cyclic),
         depends_on_time=structure.depends_on_time(system),
         invariants=system.invariant_names,
         guards=system.guard_names,
-        parameters={
-            key: value.tolist() if isinstance(value, np.ndarray) else value
-            for key, value in system.unpack(problem.par).items()
-        },
+        parameters={key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()},
         engines=reasons(problem),
     )
 

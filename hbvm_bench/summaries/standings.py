@@ -83,11 +83,8 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
 
     Its defaults are what is called so, or has no arguments.
     """
-    defaults = [
-        one
-        for one in among(records, family)
-        if one.case.settings == "default" or not parse_spec(one.case.method).arguments
-    ]
+    named = [(one, parse_spec(one.case.method).arguments) for one in among(records, family)]
+    defaults = [one for one, given in named if one.case.settings == "default" or not given]
     theirs = best(defaults, dict.fromkeys(errors, math.inf))
     if theirs is None:
         return Comparison(None, None)

@@ -44,11 +44,8 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
             truth = [Trace(0, "128-bit reference", *known, role="truth")]
         axes.set(xlim=(start, problem.t_end), ylim=(-REACH, REACH))
         panel_legend(axes, members)
-    ends = "; ".join(
-        f"{case.record.case.method}: {case.series['y'][-1, PLANETOID_Z]:.4g}"
-        for case in shown
-        if case.series["t"][-1] == problem.t_end
-    )
+    whole = [case for case in shown if case.series["t"][-1] == problem.t_end]
+    ends = "; ".join(f"{c.record.case.method}: {c.series['y'][-1, PLANETOID_Z]:.4g}" for c in whole)
     return picture(
         figure,
         "axis-motion",
@@ -106,11 +103,8 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
 
 def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     """Draw the step sizes of the cases that stalled, against time and against the step's number."""
-    shown = [
-        case
-        for case in cases
-        if case.record.result.outcome == "stalled" and np.any(case.series.get("extra.dt_history", 0.0))
-    ]
+    stalled = [case for case in cases if case.record.result.outcome == "stalled"]
+    shown = [case for case in stalled if np.any(case.series.get("extra.dt_history", 0.0))]
     if not shown:
         return None
     figure = new(WIDTH, 3.4)
@@ -162,10 +156,6 @@ def path(problem: Problem, case: Drawn, chosen: NDArray[np.bool_], body: int) ->
     h = np.diff(t)[:, None, None]
     u = np.linspace(0, 1, 5)[None, :-1, None]
     q0, q1, v0, v1 = q[:-1, None], q[1:, None], v[:-1, None], v[1:, None]
-    curve = (
-        (1 + 2 * u) * (1 - u) ** 2 * q0
-        + u * (1 - u) ** 2 * h * v0
-        + u**2 * (3 - 2 * u) * q1
-        + u**2 * (u - 1) * h * v1
-    ).reshape(-1, 2)
+    begin = (1 + 2 * u) * (1 - u) ** 2 * q0 + u * (1 - u) ** 2 * h * v0
+    curve = (begin + u**2 * (3 - 2 * u) * q1 + u**2 * (u - 1) * h * v1).reshape(-1, 2)
     return curve[np.abs(curve).max(axis=1) < 30]

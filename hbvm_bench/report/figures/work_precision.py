@@ -26,9 +26,8 @@ SIDES = (
 def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     """Draw position error and energy error against time, side by side; energy is not shown alone."""
     keys = ("position_end", "energy_max")
-    shown = [
-        case for case in cases if accurate(case.record, dict.fromkeys((*keys, "warm_seconds"), math.inf))
-    ]
+    needed: dict[str, float] = dict.fromkeys((*keys, "warm_seconds"), math.inf)
+    shown = [case for case in cases if accurate(case.record, needed)]
     if len(shown) < 2:
         return None
     figure = new(WIDTH, 4.7)
@@ -43,18 +42,14 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         log_axis(axes, "x", math.floor(math.log10(min(times))), math.ceil(math.log10(max(times))))
         log_axis(axes, "y", round(math.log10(floor)), math.ceil(math.log10(top * 3)), most=9)
         axes.set_ylim(bottom=floor / 5)  # room for the numbers of the best
-        spots = [
-            (seconds, min(max(value, floor), top * 2)) for seconds, value in zip(times, values, strict=True)
-        ]
+        spots = [(s, min(max(value, floor), top * 2)) for s, value in zip(times, values, strict=True)]
         for case, spot, value in zip(shown, spots, values, strict=True):
             marker = case.look.marker if value <= top else "^"
             axes.plot(*spot, marker, color=case.look.light, markersize=6.5, clip_on=False)
         _number_points(axes, [(str(case.look.number), spot) for case, spot in zip(shown, spots, strict=True)])
         axes.set(xlabel=seconds_, title=METRICS[key].label)
-        clouds = [
-            trace(case, np.array([seconds]), np.array([value]))
-            for case, seconds, value in zip(shown, times, values, strict=True)
-        ]
+        points = zip(shown, times, values, strict=True)
+        clouds = [trace(case, np.array([seconds]), np.array([value])) for case, seconds, value in points]
         x, y = Axis(seconds_, log=True), Axis(METRICS[key].label, log=True, low=-18, high=3)
         plotted.append(Panel(METRICS[key].label, x, y, [*clouds, *_envelopes(axes, shown, spots)]))
     side.set_axis_off()

@@ -10,8 +10,8 @@ from hbvm_bench.store.records import Record, Result, Value
 from hbvm_bench.summaries.rows import (
     columns,
     format_value,
-    grouped,
     group_of,
+    grouped,
     numbers,
     rows,
     seconds,
