@@ -34,7 +34,7 @@ from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store.files import json_of
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index, Store, again, damage, progress
-from hbvm_bench.summaries import export, fairness, goals, laws, needs, outcomes
+from hbvm_bench.summaries import export, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import by, columns, tasks
 from hbvm_bench.summaries.table import Table
@@ -227,7 +227,7 @@ def _fairness(records: Sequence[Record]) -> Section:
     drawn = f"Drawn are the first {DRAWN_CASES} of {len(records)} cases; tables and data have all of them."
     rules = (
         *([drawn] if len(records) > DRAWN_CASES else []),
-        *(*words.RULES, *fairness.sentences(records), *provenance.processors(records)),
+        *(*words.RULES, *outcomes.sentences(records), *provenance.processors(records)),
     )
     rows = []
     for of, members in by(lambda record: (family_of(record), record.library), records).items():

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import fairness
+from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, number
 from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, status_of
 
@@ -96,7 +96,7 @@ def summary(records: Sequence[Record]) -> list[str]:
             "This problem has no stored reference: positions are not measured, and nothing is ranked. "
             "`reference = true` in the campaign file, or `--reference`, computes one before the run."
         )
-    sentences += fairness.disturbed(records)
+    sentences += disturbed(records)
     stalled = [record for record in groups["ended"] if record.result.outcome == "stalled"]
     said = (f"{record.case.method} {status_of(record)}, seen by the watchdog." for record in stalled)
     return [*sentences, *said]

@@ -1,12 +1,17 @@
-"""Which integrator did what on which problem: a matrix with reasons."""
+"""What became of the cases: which integrator did what on which problem, and what to doubt of a run."""
 
+from collections import Counter
 from collections.abc import Sequence
+from statistics import median
 from typing import Literal, NamedTuple
 
-from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import by_family, by_problem, singles
+from hbvm_bench.store.records import Record, TimingRound
+from hbvm_bench.summaries.points import by_family, by_problem, family_of, singles
 from hbvm_bench.summaries.rows import group_of, reason_of
 from hbvm_bench.summaries.table import Table
+
+UNDISTURBED = 0.9  # of a core, in the timing pass
+STEADY = 1.5  # quartiles of the calibration around a timing sample
 
 State = Literal["on", "off", "ended", "refused", "absent"]
 
@@ -72,3 +77,72 @@ def _outcome(records: Sequence[Record]) -> Outcome:
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
     found: list[State] = [state for state in SIGNS if state in states]
     return Outcome(found[0] if found else "absent", states.count("on"), len(states), reasons)
+
+
+def sentences(records: Sequence[Record]) -> list[str]:
+    """Return what to know of this run beside the rules: how many settings each method had, and doubts."""
+    families = {family: _settings(members) for family, members in by_family(singles(records)).items()}
+    counts = {number for numbers in families.values() for number in numbers}
+    said: list[str] = []
+    if len(counts) == 1:
+        number = counts.pop()
+        said = [
+            f"In this run every method has {number} {'setting' if number == 1 else 'settings'} on every "
+            "problem that it accepts, declared before the run."
+        ]
+    elif counts:
+        ranges = {family: " to ".join(map(str, sorted(set(each)))) for family, each in families.items()}
+        listed = ", ".join(f"{family} {numbers}" for family, numbers in ranges.items())
+        said = [f"In this run the methods do not have equally many settings on a problem: {listed}."]
+    return said + doubts(records)
+
+
+def doubts(records: Sequence[Record]) -> list[str]:
+    """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
+    said = disturbed(records)
+    rounds = _rounds(records)
+    calibrations = sorted(seconds for one in rounds for seconds in one.calibration)
+    if len(calibrations) >= 4:
+        low, high = calibrations[len(calibrations) // 10], calibrations[-1 - len(calibrations) // 10]
+        if high > STEADY * low:
+            said.append(
+                f"The speed of the machine was not steady: a fixed computation took {high / low:.1f} times "
+                "as long at the slow end as at the fast end, the outermost tenths left out."
+            )
+    if not rounds and any(group_of(record) == "on" for record in records):
+        said.append(
+            "No times were taken: work is counted in steps and evaluations, and seconds of compilation are "
+            "those of cases that ran side by side."
+        )
+    machines = {tuple(sorted((k, str(v)) for k, v in record.machine.items())) for record in records}
+    if len(machines) > 1:
+        said.append(f"The cases ran on {len(machines)} different machines; times do not compare.")
+    timeouts = Counter(family_of(r) for r in records if r.result.outcome == "timeout")
+    if timeouts:
+        which = ", ".join(f"{family} {count}" for family, count in timeouts.items())
+        said.append(
+            f"The time limit ended {timeouts.total()} cases ({which}); a faster machine may finish some."
+        )
+    return said
+
+
+def disturbed(records: Sequence[Record]) -> list[str]:
+    """Return a sentence where the machine had other work while times were taken."""
+    share = median(one.share for one in rounds) if (rounds := _rounds(records)) else 1.0
+    if share >= UNDISTURBED:
+        return []
+    return [
+        f"The times are disturbed: the machine had other work and left half of the visits less "
+        f"than {share:.0%} of a core. Ratios below 2 say nothing."
+    ]
+
+
+def _rounds(records: Sequence[Record]) -> list[TimingRound]:
+    return [one for record in records if record.timing for one in record.timing.rounds]
+
+
+def _settings(records: Sequence[Record]) -> tuple[int, int]:
+    """Return the least and the most settings of a family on a problem that it accepts."""
+    accepted = [record for record in records if record.result.outcome != "refused"]
+    counts = [len(members) for members in by_problem(accepted or records).values()]
+    return min(counts), max(counts)

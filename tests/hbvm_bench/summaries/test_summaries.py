@@ -4,7 +4,7 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Ensemble
 from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.summaries import fairness, laws, needs, outcomes, points
+from hbvm_bench.summaries import laws, needs, outcomes, points
 
 
 def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
@@ -133,9 +133,9 @@ def test_laws_are_counted_by_family_on_the_trajectory_only():
 
 def test_fairness_counts_settings():
     run = [record("Gauss(s=2, h=0.1)"), record("Taylor()", settings="default")]
-    assert "every method has 1 setting" in fairness.sentences(run)[0]
+    assert "every method has 1 setting" in outcomes.sentences(run)[0]
     unequal = [*run, record("Gauss(s=4, h=0.1)")]
-    assert "Gauss 2, Taylor 1" in fairness.sentences(unequal)[0]
+    assert "Gauss 2, Taylor 1" in outcomes.sentences(unequal)[0]
 
 
 def test_times_of_a_busy_machine_are_doubtful():
@@ -146,9 +146,9 @@ def test_times_of_a_busy_machine_are_doubtful():
         )  # fmt: skip
         return record("Taylor()", timing=Timing(rounds=[one]))
 
-    assert fairness.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
-    assert "disturbed" in fairness.doubts([timed(0.5, [])])[0]
-    assert "not steady" in fairness.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
-    assert "No times" in fairness.doubts([record("Taylor()")])[0]
+    assert outcomes.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
+    assert "disturbed" in outcomes.doubts([timed(0.5, [])])[0]
+    assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
+    assert "No times" in outcomes.doubts([record("Taylor()")])[0]
     slow = record("Radau(rtol=1, atol=1)", outcome="timeout", status="", metrics={})
-    assert "time limit ended 1 cases (Radau 1)" in " ".join(fairness.doubts([slow]))
+    assert "time limit ended 1 cases (Radau 1)" in " ".join(outcomes.doubts([slow]))
