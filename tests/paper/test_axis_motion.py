@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.studies.paper import axis_motion
+from hbvm_bench.studies.paper.experiments import axis_motion
 from hbvm_bench.studies.paper.sitnikov_part import chaotic_from
 from integrators import integrate
 from integrators.hbvm import HBVM

@@ -12,9 +12,10 @@ import pytest
 from hbvm_bench.cli import main
 from hbvm_bench.commands.paper import PARTS
 from hbvm_bench.report.figures.canvas import new, small
-from hbvm_bench.studies.paper import others, report, results
-from hbvm_bench.studies.paper.departure import departure
+from hbvm_bench.studies.paper import report, results
 from hbvm_bench.studies.paper.drawn import number
+from hbvm_bench.studies.paper.experiments import others
+from hbvm_bench.studies.paper.experiments.departure import departure
 from hbvm_bench.studies.paper.henon_heiles_figures import fates
 from integrators.gauss import Gauss
 from integrators.protocol import Array, Samples, Status

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hbvm_bench.studies.paper import period_annulus as experiment
-from hbvm_bench.studies.paper.period_annulus import DEGREES, PRINTED, STEPS
+from hbvm_bench.studies.paper.experiments import period_annulus as experiment
+from hbvm_bench.studies.paper.experiments.period_annulus import DEGREES, PRINTED, STEPS
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hbvm_bench.studies.paper import properties
+from hbvm_bench.studies.paper.experiments import properties
 from hbvm_bench.studies.paper.properties_part import COLLOCATED, MAPPED, PAIRS, REVERSED
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.studies.paper import sitnikov
-from hbvm_bench.studies.paper.axis_motion import Growth
+from hbvm_bench.studies.paper.experiments import sitnikov
+from hbvm_bench.studies.paper.experiments.axis_motion import Growth
 from hbvm_bench.studies.paper.sitnikov_figures import apocentres
 from hbvm_bench.studies.paper.sitnikov_part import beat, dynamics, kept, oscillates, trajectories
 from integrators import integrate

@@ -12,7 +12,16 @@ from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn, heat, number
-from hbvm_bench.studies.paper.henon_heiles import DIRECTIONS, GAP, GAPS, MAP_END, T_END, H, Orbit, potential
+from hbvm_bench.studies.paper.experiments.henon_heiles import (
+    DIRECTIONS,
+    GAP,
+    GAPS,
+    MAP_END,
+    T_END,
+    H,
+    Orbit,
+    potential,
+)
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.studies.paper import henon_heiles as experiment
 from hbvm_bench.studies.paper import henon_heiles_figures as figures
-from hbvm_bench.studies.paper import others
 from hbvm_bench.studies.paper.drawn import number
-from hbvm_bench.studies.paper.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
+from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
+from hbvm_bench.studies.paper.experiments import others
+from hbvm_bench.studies.paper.experiments.henon_heiles import GAUSS, HBVM_4, Orbit, StepRow
 from hbvm_bench.studies.paper.results import Part, Results, Task, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from hbvm_bench.studies.paper.drawn import GAUSS, HBVM, WIDTH, Said, drawn
-from hbvm_bench.studies.paper.period_annulus import SPAN, energy
+from hbvm_bench.studies.paper.experiments.period_annulus import SPAN, energy
 from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import H_STAR, P1
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.studies.paper import others
-from hbvm_bench.studies.paper import period_annulus as experiment
 from hbvm_bench.studies.paper import period_annulus_figures as figures
 from hbvm_bench.studies.paper.drawn import number
-from hbvm_bench.studies.paper.period_annulus import DEGREES, NODES, PRINTED, STEPS, Edge
+from hbvm_bench.studies.paper.experiments import others
+from hbvm_bench.studies.paper.experiments import period_annulus as experiment
+from hbvm_bench.studies.paper.experiments.period_annulus import DEGREES, NODES, PRINTED, STEPS, Edge
 from hbvm_bench.studies.paper.results import Part, Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss

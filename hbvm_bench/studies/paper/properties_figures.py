@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
 from hbvm_bench.studies.paper.drawn import HBVM, WIDTH, Said, drawn
-from hbvm_bench.studies.paper.properties import Order
+from hbvm_bench.studies.paper.experiments.properties import Order
 
 MARKERS = dict(zip(range(1, 6), "osD^v", strict=True))
 Row = tuple[int, int, float]

@@ -3,8 +3,9 @@
 from functools import partial
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.studies.paper import properties, properties_figures
+from hbvm_bench.studies.paper import properties_figures
 from hbvm_bench.studies.paper.drawn import number
+from hbvm_bench.studies.paper.experiments import properties
 from hbvm_bench.studies.paper.results import Part, Results, Task
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss

@@ -10,9 +10,15 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.axis_motion import MAP_ECCENTRICITIES, MAP_SPEEDS, MAP_TURNS, START, Growth
 from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, MOTION, WIDTH, Said, drawn, heat, number
-from hbvm_bench.studies.paper.sitnikov import DEGREE, T_END, E, StepRow, usable
+from hbvm_bench.studies.paper.experiments.axis_motion import (
+    MAP_ECCENTRICITIES,
+    MAP_SPEEDS,
+    MAP_TURNS,
+    START,
+    Growth,
+)
+from hbvm_bench.studies.paper.experiments.sitnikov import DEGREE, T_END, E, StepRow, usable
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 

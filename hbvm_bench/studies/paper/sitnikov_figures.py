@@ -11,7 +11,7 @@ from hbvm_bench.report.figures.canvas import log_axis
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
 from hbvm_bench.studies.paper.drawn import FAMILIES, GAUSS, HBVM, WIDTH, Said, drawn
-from hbvm_bench.studies.paper.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
+from hbvm_bench.studies.paper.experiments.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 
 TILT = 0.55  # of the oblique drawing of the configuration

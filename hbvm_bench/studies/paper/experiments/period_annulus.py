@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.departure import departure, own_steps
+from hbvm_bench.studies.paper.experiments.departure import departure, own_steps
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program

@@ -8,7 +8,7 @@ import numpy as np
 
 import problems
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper.departure import departure, first
+from hbvm_bench.studies.paper.experiments.departure import departure, first
 from integrators import Solution, integrate, registry
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM

@@ -8,7 +8,7 @@ import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper import henon_heiles, period_annulus, sitnikov
+from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus, sitnikov
 from hbvm_bench.studies.paper.results import Results, Task
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
