@@ -16,7 +16,7 @@ from hbvm_bench.studies.paper import report, results
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
-from hbvm_bench.studies.paper.henon_heiles_figures import fates
+from hbvm_bench.studies.paper.henon_heiles_part import fates
 from integrators.gauss import Gauss
 from integrators.protocol import Array, Samples, Status
 from problems import Hamiltonian
@@ -150,8 +150,8 @@ def test_numbers_are_short(value, text):
 
 
 def test_the_same_figure_gives_the_same_bytes():
-    times = {"Gauss(s=2, h=1.0)": [100.0, None], "HBVM(k=4, s=2, h=1.0)": [None, None]}
-    first, second = fates(times, 7000.0), fates(times, 7000.0)
+    times = {"gauss": [100.0, None], "hbvm": [None, None]}
+    first, second = fates(times), fates(times)
     assert (first.svg, first.png) == (second.svg, second.png)
 
 

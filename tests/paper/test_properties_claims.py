@@ -3,7 +3,7 @@
 import pytest
 
 from hbvm_bench.studies.paper.experiments import properties
-from hbvm_bench.studies.paper.properties_part import COLLOCATED, MAPPED, PAIRS, REVERSED
+from hbvm_bench.studies.paper.experiments.properties import COLLOCATED, MAPPED, PAIRS, REVERSED
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.read_off import read_off
-from hbvm_bench.report.figures.style import TRUTH, looks
+from hbvm_bench.report.figures.style import looks
 from integrators.protocol import Array
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
-GAUSS, HBVM, MOTION = (look.light for look in LOOKS)
+COLOURS: dict[str, str] = dict(zip(("gauss", "hbvm", "motion"), (look.light for look in LOOKS), strict=True))
 NAMES = {1: "Gauss", 2: "HBVM", 3: "the motion itself"}
-FAMILIES = {"gauss": GAUSS, "hbvm": HBVM, "truth": TRUTH}
 SEQUENTIAL = LinearSegmentedColormap.from_list(
     "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
@@ -78,13 +77,13 @@ def heat(
     axes: Axes, x: Sequence[float] | Array, y: Sequence[float], values: Array, low: float, high: float
 ) -> QuadMesh:
     """Colour cells by the logarithm of their value, from ``low`` to ``high``; blank are those without."""
-    return axes.pcolormesh(
-        x,
-        y,
-        np.ma.masked_invalid(np.log10(values)),
-        cmap=SEQUENTIAL.reversed(),
-        vmin=low,
-        vmax=high,
-        shading="nearest",
-        rasterized=True,
-    )
+    axes.grid(visible=False)
+    logs = np.ma.masked_invalid(np.log10(values))
+    look = {"cmap": SEQUENTIAL.reversed(), "shading": "nearest", "rasterized": True}
+    return axes.pcolormesh(x, y, logs, vmin=low, vmax=high, **look)
+
+
+def legend_above(axes: Axes) -> None:
+    """Name the curves in a line above the axes, as wide as can be seen."""
+    for line in axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.02), ncols=2).get_lines():
+        line.set_linewidth(1.6)

@@ -8,14 +8,17 @@ from numpy.typing import NDArray
 from integrators.protocol import Array, MethodBase, Stepper
 from problems import Problem
 
-Test = Callable[[Array], NDArray[np.bool_]]
-
 GROWTH = 2.0  # of the stretches: short at first, so that an early departure costs little
 LONGEST = 4096.0  # stretch, in units of the first
 
 
 def departure(
-    stepper: Stepper, t_end: float, departed: Test, *, stretch: float, every: float | None = None
+    stepper: Stepper,
+    t_end: float,
+    departed: Callable[[Array], NDArray[np.bool_]],
+    *,
+    stretch: float,
+    every: float | None = None,
 ) -> float | None:
     """Integrate until a state has departed; return the time of the first such state.
 
@@ -47,9 +50,8 @@ def departure(
         if every is None:
             samples = stepper.advance(np.array([ahead]), sample="steps")
         else:
-            samples = stepper.advance(
-                np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))[1:]
-            )
+            times = np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))
+            samples = stepper.advance(times[1:])
         if samples.t.size and (found := first(samples.t, departed(samples.y))) is not None:
             return found
         if samples.status.failed:

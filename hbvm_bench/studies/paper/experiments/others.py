@@ -2,18 +2,16 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.reference import solutions
 from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus, sitnikov
-from hbvm_bench.studies.paper.results import Results, Task
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
-from problems import Problem, load
+from problems import Problem
 from problems.catalogue.henon_heiles import beyond_triangle
 from problems.errors import InputError
 
@@ -37,73 +35,41 @@ LOOK = 4.0  # time between two looks at a library's orbit; one that departs blow
 
 @dataclass(frozen=True)
 class Row:
-    """One method on one problem.
+    """One method on one problem."""
 
-    Attributes
-    ----------
-    method : str
-        As written.
-    numbers : dict of str to float
-        By name; those that have no meaning are missing.
-    remark : str
-        Why it refused, how it ended.
-    """
-
-    method: str
-    numbers: dict[str, float]
-    remark: str
+    method: str  # as written
+    numbers: dict[str, float]  # by name; those that have no meaning are missing
+    remark: str  # why it refused, how it ended
 
 
-Format = Callable[[float], str]
 Found = tuple[dict[str, float], str]  # the numbers, and how it ended
 
 
-def tasks(run: Callable[[str], Row], methods: Sequence[str], cost: float) -> list[Task]:
-    """Return the computations of a part with every method."""
-    return [Task(f"other {text}", partial(run, text), cost) for text in methods]
-
-
 def table(
-    results: Results,
-    methods: Sequence[str],
-    columns: Mapping[str, tuple[str, Format]],
+    key: str,
+    rows: Sequence[Row],
+    columns: Mapping[str, tuple[str, Callable[[float], str]]],
     title: str,
     note: str,
-    remark: Callable[[Row], str] = lambda row: "",
 ) -> Table:
-    """Return what came out with every method.
-
-    Parameters
-    ----------
-    results : Results
-        Of `tasks`.
-    methods : sequence of str
-        As written.
-    columns : mapping of str to (str, callable)
-        From the head of a column to the name of its number, and how it is written.
-    title, note : str
-        Of the table.
-    remark : callable
-        What to say of a row that says nothing itself.
-    """
-    rows: list[Row] = [results[f"other {text}"] for text in methods]
+    """Return what came out; a column has its head, the name of its number, and how that is written."""
 
     def cells(row: Row) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
 
     return Table(
-        key=f"{results.part}-others",
-        title=title,
-        head=("method", *columns, "remark"),
-        rows=[(row.method, *cells(row), row.remark or remark(row)) for row in rows],
+        title,
+        ("method", *columns, "remark"),
+        [(row.method, *cells(row), row.remark) for row in rows],
+        note,
         words=(0, len(columns) + 1),
-        note=note,
+        key=key,
     )
 
 
 def on_sitnikov(text: str) -> Row:
     """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
-    return _row(text, load("sitnikov", e=sitnikov.E, d=sitnikov.D, t_end=sitnikov.T_END), _on_sitnikov)
+    return _row(text, sitnikov.problem(), _on_sitnikov)
 
 
 def on_henon_heiles(text: str) -> Row:

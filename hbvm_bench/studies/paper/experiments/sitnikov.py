@@ -13,6 +13,7 @@ from integrators import Solution, integrate, registry
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
+from problems import Problem
 from problems.errors import InputError
 
 E, D = 0.75, 5.0
@@ -40,40 +41,28 @@ TRIALS = (
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A run at its own steps, reduced to what is drawn.
+    """A run at its own steps, reduced to what is drawn."""
 
-    Attributes
-    ----------
-    method : str
-        As it prints.
-    t : ndarray, shape (n,)
-        Times, from 0.
-    primaries : ndarray, shape (n, 2, 2)
-        Step, body, (x, y).
-    z : ndarray, shape (n,)
-        The planetoid's height.
-    energy, momentum : ndarray, shape (n,)
-        Relative errors of H and of the angular momentum vector M.
-    plane, off_axis : float
-        Largest |z| of a primary, largest distance of the planetoid from the axis.
-    reason : str
-        Why it ended early; empty otherwise.
-    """
-
-    method: str
-    t: Array
-    primaries: Array
-    z: Array
-    energy: Array
-    momentum: Array
-    plane: float
-    off_axis: float
-    reason: str
+    method: str  # as it prints
+    t: Array  # shape (n,), from 0
+    primaries: Array  # shape (n, 2, 2): step, body, (x, y)
+    z: Array  # shape (n,), the planetoid's height
+    energy: Array  # shape (n,), relative error of H
+    momentum: Array  # shape (n,), relative error of the angular momentum vector M
+    plane: float  # largest |z| of a primary
+    off_axis: float  # largest distance of the planetoid from the axis
 
     @property
     def distance(self) -> Array:
         """Distance of the primaries, shape (n,)."""
         return np.hypot(*(self.primaries[:, 0] - self.primaries[:, 1]).T)
+
+    @property
+    def apocentres(self) -> tuple[float, float]:
+        """The smallest and the largest maximum of the primaries' distance, each from a parabola."""
+        _, a, b, c = _maxima(self.distance)
+        peaks = b - (a - c) ** 2 / (8 * (a - 2 * b + c))
+        return float(peaks.min()), float(peaks.max())
 
     @property
     def lost(self) -> float | None:
@@ -83,129 +72,97 @@ class Orbit:
 
 @dataclass(frozen=True)
 class StepRow:
-    """What a method does with a step h over the paper's span.
+    """What a method does with a step h over the paper's span."""
 
-    Attributes
-    ----------
-    method : str
-        As it prints.
-    family, s, h
-        Family ("gauss" or "hbvm"), degree and step.
-    lost : float or None
-        When the planetoid has left.
-    energy : float
-        Largest relative error of H.
-    z_error : float
-        Of the planetoid at the end.
-    turn, unsteady : float
-        Rate at which the primaries' orbits turn, degrees per revolution, less the
-        true one; rms of what a constant rate leaves, degrees.
-    period : float
-        Mean time between two apocentres of the primaries.
-    slow : float
-        Its relative error.
-    reason : str
-        Why it ended early; empty otherwise.
-    """
-
-    method: str
-    family: str
+    family: str  # "gauss", "hbvm" or "truth"
     s: int
     h: float
-    lost: float | None
-    energy: float
-    z_error: float
-    turn: float
-    unsteady: float
-    period: float
-    slow: float
-    reason: str
+    lost: float | None  # when the planetoid has left
+    energy: float  # largest relative error of H
+    z_error: float  # of the planetoid at the end
+    turn: float  # degrees per revolution at which the primaries' orbits turn, less the true rate
+    unsteady: float  # rms of what a constant rate leaves, degrees
+    period: float  # mean time between two apocentres of the primaries
+    slow: float  # its relative error
+    reason: str  # why it ended early; empty otherwise
+
+    @property
+    def usable(self) -> bool:
+        """Whether the rates describe the whole span of a bound planetoid."""
+        return self.lost is None and not self.reason
+
+    @property
+    def beat(self) -> float:
+        """After how long the steps fall on the same places of the revolution again."""
+        steps = self.period / self.h
+        return self.period / abs(steps - round(steps))
 
 
-def usable(row: StepRow) -> bool:
-    """Whether the rates of a row describe the whole span of a bound planetoid."""
-    return row.lost is None and not row.reason
-
-
-def both_laws() -> MethodBase | None:
-    """Return the method that keeps energy and angular momentum, where one is installed."""
-    if "LineIntegral" not in registry.names():
-        return None
-    return registry.create("LineIntegral", k=24, s=4, h=H, invariants=["energy", "angular_momentum"])
+def problem(e: float = E) -> Problem:
+    """Return the problem with the paper's numbers."""
+    return problems.load("sitnikov", e=e, d=D, t_end=T_END)
 
 
 def orbit(method: MethodBase, every: int = 1) -> Orbit:
     """Integrate over the paper's span; keep every ``every``-th of the method's own steps."""
     solution = _run(method)
-    problem = solution.problem
-    t = np.concatenate([[problem.t0], solution.t])[::every]
-    y = np.vstack([problem.y0, solution.y])[::every]
-    errors = problem.errors(y)
+    start = solution.problem
+    y = np.vstack([start.y0, solution.y])[::every]
+    errors = start.errors(y)
     return Orbit(
         method=repr(method),
-        t=t,
+        t=np.concatenate([[start.t0], solution.t])[::every],
         primaries=y[:, :6].reshape(-1, 2, 3)[:, :, :2],
         z=y[:, 8],
         energy=errors["energy"],
         momentum=errors["angular_momentum"],
         plane=float(np.abs(y[:, [2, 5]]).max()),
-        off_axis=float(problem.guards(y)["off_axis"].max()),
-        reason=solution.reason,
+        off_axis=float(start.guards(y)["off_axis"].max()),
     )
 
 
 def orbits() -> dict[str, Orbit]:
-    """Return the paper's two runs and the true motion on the grid of step 1/2, and that on its own grid."""
-    made = {
-        "gauss": orbit(GAUSS),
-        "hbvm": orbit(HBVM_18),
-        "truth": orbit(TRUTH, every=4),
-        "fine": orbit(TRUTH),
-    }
-    method = both_laws()
-    if method is not None:
-        made["both"] = orbit(method)
+    """Return the paper's two runs and the true motion on the grid of step 1/2, and that on its own grid.
+
+    Where a method is installed that keeps both energy and angular momentum, ``both`` is its run.
+    """
+    made = {"gauss": orbit(GAUSS), "hbvm": orbit(HBVM_18), "fine": orbit(TRUTH)}
+    made["truth"] = orbit(TRUTH, every=4)
+    if "LineIntegral" in registry.names():
+        laws = ["energy", "angular_momentum"]
+        made["both"] = orbit(registry.create("LineIntegral", k=24, s=4, h=H, invariants=laws))
     return made
 
 
 def ellipses() -> list[Array]:
     """Return the paths (2, n) of the second primary under HBVM(18, 2) in the `REVOLUTIONS`."""
-    problem = problems.load("sitnikov", e=E, d=D, t_end=T_END)
-    stepper = HBVM_18.compile(problem.system).start(problem.y0, problem.par, 0.0)
-    paths = []
-    for number in REVOLUTIONS:
-        times = PERIOD * (number - 1 + np.linspace(0.0, 1.0, 401))
-        paths.append(stepper.advance(times).y[:, 3:5].T)
-    return paths
+    start = problem()
+    stepper = HBVM_18.compile(start.system).start(start.y0, start.par, 0.0)
+    grids = [PERIOD * (number - 1 + np.linspace(0.0, 1.0, 401)) for number in REVOLUTIONS]
+    return [stepper.advance(times).y[:, 3:5].T for times in grids]
 
 
 def neighbours() -> list[float | None]:
     """Return when Gauss loses the planetoid from starts that differ in the last bits of e."""
-    program = None
-    times: list[float | None] = []
-    for i in range(NEIGHBOURS):
-        problem = problems.load("sitnikov", e=E + i * 2.0**-53)
-        program = program or GAUSS.compile(problem.system)
-        stepper = program.start(problem.y0, problem.par, problem.t0)
-        times.append(departure(stepper, T_END, lambda y: np.abs(y[:, 8]) > LOST, stretch=64 * H))
-    return times
+    starts = [problem(E + i * 2.0**-53) for i in range(NEIGHBOURS)]
+    program = GAUSS.compile(starts[0].system)
+    return [
+        departure(program.start(one.y0, one.par), T_END, lambda y: np.abs(y[:, 8]) > LOST, stretch=64 * H)
+        for one in starts
+    ]
 
 
 def energy_by_nodes(h: float, ks: Sequence[int] = range(DEGREE, 25)) -> list[tuple[int, float, float | None]]:
     """Return k, largest relative error of H and the time of loss, for HBVM(k, 2) with step h."""
-    rows = []
-    for k in ks:
-        solution = _run(HBVM(k=k, s=DEGREE, h=h))
-        error = float(solution.errors()["energy"].max())
-        rows.append((k, error, first(solution.t, np.abs(solution.y[:, 8]) > LOST)))
-    return rows
+    runs = [(k, _run(HBVM(k=k, s=DEGREE, h=h))) for k in ks]
+    return [(k, float(run.errors()["energy"].max()), _lost(run)) for k, run in runs]
 
 
 def by_step(s: int, steps: Sequence[float] = STEPS) -> list[StepRow]:
     """Return what Gauss(s) and HBVM(k, s) with many nodes do with each step, the true motion first."""
     truth = _run(TRUTH)
     rate, _ = turning(truth)
-    rows = [_row(truth, "truth", rate, truth)]
+    rows = [_row(truth, "truth", 0.0, truth)]
     for h in steps:
         rows.append(_row(_run(Gauss(s=s, h=h)), "gauss", rate, truth))
         rows.append(_row(_run(HBVM(k=max(NODES, 5 * s), s=s, h=h)), "hbvm", rate, truth))
@@ -236,53 +193,58 @@ def turning(solution: Solution) -> tuple[float, float]:
 
 def radial_period(solution: Solution) -> float:
     """Return the mean time between two apocentres of the primaries, each found by a parabola."""
-    t, distance = solution.t, np.hypot(*(solution.y[:, 3:5] - solution.y[:, 0:2]).T)
-    i = 1 + np.flatnonzero((distance[1:-1] > distance[:-2]) & (distance[1:-1] >= distance[2:]))
+    t = solution.t
+    i, before, at, after = _maxima(np.hypot(*(solution.y[:, 3:5] - solution.y[:, 0:2]).T))
     if i.size < 2:
         return float("nan")
-    before, at, after = distance[i - 1], distance[i], distance[i + 1]
     peaks = t[i] + 0.5 * (t[1] - t[0]) * (before - after) / (before - 2 * at + after)
     return float((peaks[-1] - peaks[0]) / (i.size - 1))
 
 
+def against_truth() -> list[tuple[str, str, Array, Array]]:
+    """Return label, family, times and |z - true z| of several runs, at the times of the 128-bit reference."""
+    start = problem()
+    known = solutions.find(start)
+    if known is None:
+        raise InputError(
+            "the stored reference of sitnikov() is missing: run hbvm-bench reference 'sitnikov()'."
+        )
+    runs = [(label, integrate(start, method, times=known.t)) for label, method in TRIALS]
+    return [
+        (label, run.method.family, run.t, np.abs(run.y[:, 8] - known.high[: run.t.size, 8]))
+        for label, run in runs
+    ]
+
+
 def _run(method: MethodBase) -> Solution:
-    problem = problems.load("sitnikov", e=E, d=D, t_end=T_END)
-    return integrate(problem, method, times=[T_END], sample="steps")
+    return integrate(problem(), method, times=[T_END], sample="steps")
+
+
+def _lost(solution: Solution) -> float | None:
+    return first(solution.t, np.abs(solution.y[:, 8]) > LOST)
+
+
+def _maxima(values: Array) -> tuple[Any, Array, Array, Array]:
+    """Return where values are larger than their neighbours; the values before, at and after these places."""
+    i = 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:]))
+    return i, values[i - 1], values[i], values[i + 1]
 
 
 def _row(solution: Solution, family: str, true_rate: float, truth: Solution) -> StepRow:
     method: Any = solution.method
     rate, unsteady = turning(solution)
-    finished = not solution.status.failed
     period = radial_period(solution)
+    end = float(abs(solution.y[-1, 8] - truth.y[-1, 8]))
     return StepRow(
-        method=repr(method),
         family=family,
         s=method.s,
         h=method.h,
-        lost=first(solution.t, np.abs(solution.y[:, 8]) > LOST),
+        lost=_lost(solution),
         energy=float(solution.errors()["energy"].max()),
-        z_error=float(abs(solution.y[-1, 8] - truth.y[-1, 8])) if finished else float("nan"),
-        turn=rate - (0.0 if family == "truth" else true_rate),
+        z_error=float("nan") if solution.status.failed else end,
+        turn=rate - true_rate,
         unsteady=unsteady,
         period=period,
         slow=period / radial_period(truth) - 1.0,
         reason=solution.reason,
     )
-
-
-def against_truth() -> list[tuple[str, str, Array, Array]]:
-    """Return label, family, times and |z - true z| of several runs, at the times of the 128-bit reference."""
-    problem = problems.load("sitnikov", e=E, d=D, t_end=T_END)
-    known = solutions.find(problem)
-    if known is None:
-        raise InputError(
-            "the stored reference of sitnikov() is missing: run hbvm-bench reference 'sitnikov()'."
-        )
-    made = []
-    for label, method in TRIALS:
-        solution = integrate(problem, method, times=known.t)
-        made.append(
-            (label, method.family, solution.t, np.abs(solution.y[:, 8] - known.high[: solution.t.size, 8]))
-        )
-    return made
