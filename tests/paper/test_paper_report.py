@@ -214,12 +214,12 @@ def test_what_is_not_there_cannot_be_drawn_again(tmp_path, capsys):
 
 def test_a_library_that_refuses_is_a_row_with_its_reason():
     pytest.importorskip("rebound")
-    row = others.on_period_annulus("WHFast(h=0.02)")
+    row = others.measured("period-annulus", "WHFast(h=0.02)")
     assert not row.numbers
     assert "bodies" in row.remark
 
 
 def test_heyoka_finds_the_same_edge():
     pytest.importorskip("heyoka")
-    row = others.on_period_annulus("Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)")
+    row = others.measured("period-annulus", "Taylor(tol=1e-15, high_accuracy=True, compact_mode=True)")
     assert row.numbers["error"] < 2e-15  # 4.6e-16

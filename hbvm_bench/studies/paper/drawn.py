@@ -24,7 +24,7 @@ SEQUENTIAL = LinearSegmentedColormap.from_list(
 )
 WIDTH = 10.4  # inches, of a whole line
 P = ParamSpec("P")
-Said = tuple[str, str] | tuple[str, str, str, str]
+Said = tuple[str, str]  # a caption, and a summary for those who do not see the picture
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -46,15 +46,8 @@ def drawn(
 ) -> Callable[[Callable[Concatenate[Figure, P], Said]], Callable[P, Picture]]:
     """Have a function draw on an empty sheet, of which a picture is made; the same gives the same bytes.
 
-    Parameters
-    ----------
-    key, title : str
-        Of the picture; unless they follow from what is drawn: then the function returns both, before
-        the caption and the summary that every such function returns.
-    width, height : float
-        Of the sheet, in inches; it makes room for its labels.
-    values : bool
-        Whether colours mean values.
+    The sheet is ``width`` times ``height`` inches and makes room for its labels; ``values`` says whether
+    colours mean values.
     """
 
     def decorate(draw: Callable[Concatenate[Figure, P], Said]) -> Callable[P, Picture]:
@@ -63,10 +56,9 @@ def drawn(
         def made(*args: P.args, **kwargs: P.kwargs) -> Picture:
             figure = new(width, height)
             figure.set_layout_engine("constrained")
-            *named, caption, summary = draw(figure, *args, **kwargs)
-            key_, title_ = named or (key, title)
+            caption, summary = draw(figure, *args, **kwargs)
             plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
-            return picture(figure, key_, title_, caption, summary, plot, values=values)
+            return picture(figure, key, title, caption, summary, plot, values=values)
 
         return made
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import takewhile
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,27 +17,13 @@ from hbvm_bench.report.figures.style import INK, MUTED, PAPER
 from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
 from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
 from hbvm_bench.studies.paper.experiments import others
-from hbvm_bench.studies.paper.experiments.henon_heiles import (
-    DIRECTIONS,
-    GAP,
-    GAPS,
-    GAUSS,
-    HBVM_4,
-    MAP_END,
-    NEIGHBOURS,
-    PRINTED,
-    STEP_STARTS,
-    T_END,
-    H,
-    Orbit,
-    StepRow,
-)  # fmt: skip
-from hbvm_bench.studies.paper.results import Part, Results, Task, split
+from hbvm_bench.studies.paper.experiments.henon_heiles import GAP, GAPS, NEIGHBOURS, T_END, H, Orbit, StepRow
+from hbvm_bench.studies.paper.results import Part, Results, Task, each, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 
-METHODS = {"gauss": GAUSS, "hbvm": HBVM_4}
+METHODS = {"gauss": experiment.GAUSS, "hbvm": experiment.HBVM_4}
 LEVELS = (0.02, 0.05, 0.08, 0.11, 0.14, ESCAPE)
 LABELLED = (math.radians(162), math.radians(34))  # directions from the origin, alternating
 PROBLEM = (
@@ -52,52 +37,41 @@ PROBLEM = (
 
 
 def _runs() -> list[Task]:
-    return [
+    runs = [
         Task("gauss", experiment.gauss_orbit, 20),
-        Task("hbvm", partial(experiment.orbit, HBVM_4), 3),
+        Task("hbvm", partial(experiment.orbit, METHODS["hbvm"]), 3),
         Task("truth", experiment.true_orbit),
-        *(
-            task
-            for family, method in METHODS.items()
-            for task in (
-                Task(f"steps {family}", partial(experiment.by_step, family), 9),
-                *split(f"escapes {family}", partial(experiment.escapes, method), range(NEIGHBOURS), 4, 6),
-                *split(f"map {family}", partial(experiment.escape_map, method), GAPS, 4, 15),
-            )
-        ),
-        *(Task(f"other {text}", partial(others.on_henon_heiles, text), 8) for text in others.HENON_HEILES),
+        *each("steps", experiment.by_step, METHODS, 9),
+        *each("other", partial(others.measured, "henon-heiles"), others.HENON_HEILES, 8),
     ]
+    for family, method in METHODS.items():
+        runs += split(f"escapes {family}", partial(experiment.escapes, method), range(NEIGHBOURS), 4, 6)
+        runs += split(f"map {family}", partial(experiment.escape_map, method), GAPS, 4, 15)
+    return runs
 
 
 def _blocks(results: Results) -> list[Maker]:
-    pair = partial(_pair, results)
-    words = (
-        "Every step until the orbit leaves; circles: the last steps, as in the paper.",
-        "All 50,000 steps from the first of the starts.",
-    )
     return [
         ("the problem", lambda: PROBLEM.format(*experiment.START, results["gauss"][0])),
         ("Figure 1", lambda: level_curves(results["truth"])),
-        ("Figure 2", lambda: plane(results["gauss"][1], "gauss", 2, words[0])),
-        ("Figure 3", lambda: plane(results["hbvm"], "hbvm", 3, words[1])),
+        ("Figure 2", lambda: gauss_plane(results["gauss"][1])),
+        ("Figure 3", lambda: hbvm_plane(results["hbvm"])),
         ("Figure 4", lambda: hamiltonian(results["gauss"][1], results["hbvm"])),
-        ("the escape times", lambda: fates(pair("escapes"))),
-        ("who escapes from where", lambda: maps(pair("map"))),
-        ("the table of steps", lambda: _step_table(pair("steps"))),
+        ("the escape times", lambda: fates(results.each("escapes", METHODS))),
+        ("who escapes from where", lambda: maps(_maps(results))),
+        ("the table of steps", lambda: _step_table(results.each("steps", METHODS))),
         ("the other integrators", lambda: _others(results)),
     ]
 
 
-def _pair(results: Results, what: str) -> dict[str, Any]:
-    """Return what was computed with both methods; maps as arrays."""
-    found = {family: results[f"{what} {family}"] for family in METHODS}
-    return {family: np.stack(rows) for family, rows in found.items()} if what == "map" else found
+def _maps(results: Results) -> dict[str, Array]:
+    return {family: np.stack(rows) for family, rows in results.each("map", METHODS).items()}
 
 
 def _claims(results: Results) -> list[Claim]:
     gauss: Orbit = results["gauss"][1]
     hbvm: Orbit = results["hbvm"]
-    times, escaped, steps = (_pair(results, what) for what in ("escapes", "map", "steps"))
+    times, steps, escaped = results.each("escapes", METHODS), results.each("steps", METHODS), _maps(results)
     gone = {family: _times(found) for family, found in times.items()}
     starts = len(times["gauss"])
     middle = float(np.median([np.inf if time is None else time for time in times["gauss"]]))
@@ -145,9 +119,9 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "HBVM allows larger steps than Gauss",
             "in the text",
-            f"of {STEP_STARTS} neighbouring starts none leaves for any h tried up to {largest['hbvm']:g} "
-            f"with HBVM(4,2), up to {largest['gauss']:g} with Gauss. Inside is not true: with h = 1 either "
-            f"orbit agrees with the true one up to t ≈ {agrees:.0f} only",
+            f"of {experiment.STEP_STARTS} neighbouring starts none leaves for any h tried up to "
+            f"{largest['hbvm']:g} with HBVM(4,2), up to {largest['gauss']:g} with Gauss. Inside is not true: "
+            f"with h = 1 either orbit agrees with the true one up to t ≈ {agrees:.0f} only",
             "holds" if largest["hbvm"] > largest["gauss"] else "no",
         ),
     ]
@@ -177,7 +151,7 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
         "The step and who stays",
         ("h", *("leave", "the first at", "agrees until t") * 2),
         [(f"{a.h:g}", *cells(a), *cells(b)) for a, b in zip(steps["gauss"], steps["hbvm"], strict=True)],
-        f"{STEP_STARTS} neighbouring starts, followed to t = {T_END:,.0f}; "
+        f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {T_END:,.0f}; "
         "a step whose equations find no solution counts as leaving. Agrees: time up to which the first of "
         f"them is within {experiment.AGREES:g} of the true orbit. Staying inside is what the energy gives; "
         "a true orbit takes a smaller step under either method.",
@@ -190,7 +164,7 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
 def _others(results: Results) -> Table:
     return others.table(
         "henon-heiles-others",
-        [results[f"other {text}"] for text in others.HENON_HEILES],
+        results.each("other", others.HENON_HEILES),
         {
             "energy": ("energy", number),
             "outside by": ("outside", number),
@@ -212,32 +186,42 @@ def level_curves(figure: Figure, trace: Array) -> Said:
     axes.plot(*trace.T, color=COLOURS["hbvm"], linewidth=0.6, alpha=0.6)
     lines = axes.contour(x, y, experiment.potential(x, y), levels=LEVELS, colors=INK, linewidths=0.9)
     places = [_on_level(level, LABELLED[i % 2]) for i, level in enumerate(LEVELS)]
-    for text in axes.clabel(
-        lines, fmt=lambda u: "1/6" if abs(u - ESCAPE) < 1e-9 else f"{u:g}", fontsize=7.5, manual=places
-    ):
+    names = {level: f"{level:g}" for level in LEVELS} | {ESCAPE: "1/6"}
+    for text in axes.clabel(lines, fmt=names, fontsize=7.5, manual=places):
         text.set_bbox({"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})
     _saddles(axes)
     axes.plot(0, 0, "+", color=INK, markersize=8)
     say(axes, "O", (0, 0), (5, 4), fontsize=9)
-    axes.set(**_plane(1.25, -0.75))
+    _bounds(axes, 1.25, -0.75)
     return (
         "The level 1/6 is the triangle of the three saddles. The true orbit from our start, H₀ = 1/6 − "
-        f"{GAP:g}, to t = 300: it comes close to the sides, where a small error of the energy lets it "
-        "out.",
+        f"{GAP:g}, to t = 300: it comes close to the sides, where a small error of the energy lets it out.",
         "The orbit fills the triangle and stays inside.",
     )
 
 
-@drawn("", "", WIDTH * 0.6, 5.0)
-def plane(figure: Figure, run: Orbit, family: str, figure_number: int, caption: str) -> Said:
-    """henon_fig2, henon_fig3: every step in the (q1, q2) plane."""
+@drawn("henon-heiles-2", f"Figure 2 · Gauss of order four, h = {H:g}", WIDTH * 0.6, 5.0)
+def gauss_plane(figure: Figure, run: Orbit) -> Said:
+    """henon_fig2: every step in the (q1, q2) plane."""
+    words = "Every step until the orbit leaves; circles: the last steps, as in the paper."
+    return words, _orbit(figure, run, COLOURS["gauss"])
+
+
+@drawn("henon-heiles-3", f"Figure 3 · HBVM(4,2), h = {H:g}", WIDTH * 0.6, 5.0)
+def hbvm_plane(figure: Figure, run: Orbit) -> Said:
+    """henon_fig3: every step in the (q1, q2) plane."""
+    return "All 50,000 steps from the first of the starts.", _orbit(figure, run, COLOURS["hbvm"])
+
+
+def _orbit(figure: Figure, run: Orbit, colour: str) -> str:
+    """Draw every step of an orbit and return what is to see; the last ones, if it leaves, in circles."""
     gone = run.left is not None
     if gone:
         figure.set_size_inches(WIDTH * 0.66, 5.0)
     axes = figure.subplots()
     axes.plot(*np.array([*SADDLES, SADDLES[0]]).T, color=INK, linewidth=0.9)
     inside = run.q[:-3] if gone else run.q
-    axes.plot(*inside.T, ".", color=COLOURS[family], markersize=1.1, alpha=0.55, rasterized=True)
+    axes.plot(*inside.T, ".", color=colour, markersize=1.1, alpha=0.55, rasterized=True)
     if gone:
         last = run.q[-4:]
         shown = last[(np.abs(last[:, 0]) < 1.7) & (np.abs(last[:, 1]) < 1.5)]
@@ -246,15 +230,9 @@ def plane(figure: Figure, run: Orbit, family: str, figure_number: int, caption: 
     fate = f"gone at t = {run.left:g}" if gone else f"{len(run.t) - 1} steps, none outside"
     axes.set_title(f"{run.method}: {fate}", color=INK)
     _saddles(axes)
-    axes.set(**(_plane(1.5, -0.9) if gone else _plane(1.25, -0.75)))
-    name = "Gauss of order four" if family == "gauss" else "HBVM(4,2)"
-    return (
-        f"henon-heiles-{figure_number}",
-        f"Figure {figure_number} · {name}, h = {H:g}",
-        caption,
-        f"{run.method}: {len(run.t) - 1} steps, {run.outside} outside the triangle, "
-        + (f"gone at t = {run.left:g}." if gone else "the orbit stays to the end."),
-    )
+    _bounds(axes, *((1.5, -0.9) if gone else (1.25, -0.75)))
+    fate = f"gone at t = {run.left:g}." if gone else "the orbit stays to the end."
+    return f"{run.method}: {len(run.t) - 1} steps, {run.outside} outside the triangle, {fate}"
 
 
 @drawn("henon-heiles-4", "Figure 4 · the Hamiltonian along both solutions", WIDTH, 3.3)
@@ -292,8 +270,8 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
         look = {"color": COLOURS[family], "linewidth": 1.6, "label": f"{method}, {len(found)} starts"}
         axes.step([0, *gone, T_END], [*share, share[-1]], where="post", **look)
         summary.append(f"{method}: {len(gone)} of {len(found)} orbits leave")
-    axes.axvline(PRINTED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
-    say(axes, f"the paper's t ≃ {PRINTED:.0f}", (PRINTED, 0.04), (5, 0), fontsize=8, color=INK)
+    axes.axvline(experiment.PRINTED, color=MUTED, linewidth=0.9, linestyle=(0, (4, 3)))
+    say(axes, f"the paper's t ≃ {experiment.PRINTED:.0f}", (experiment.PRINTED, 0.04), (5, 0), fontsize=8)
     axes.set(xlim=(0, T_END), ylim=(0, 1.04), xlabel="time", ylabel="share of orbits still inside")
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     return (
@@ -308,10 +286,10 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
 def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     """Escape times over starts and energies, both methods."""
     panels = figure.subplots(1, 2, sharey=True)
-    high = math.log10(MAP_END)
+    high = math.log10(experiment.MAP_END)
     meshes = []
     for axes, (family, times) in zip(panels, found.items(), strict=True):
-        meshes.append(heat(axes, np.degrees(DIRECTIONS), GAPS, np.maximum(times, 1.0), 2, high))
+        meshes.append(heat(axes, np.degrees(experiment.DIRECTIONS), GAPS, np.maximum(times, 1.0), 2, high))
         axes.set(yscale="log", xlabel="direction of the start, degrees", xticks=range(0, 361, 60))
         left = int(np.count_nonzero(~np.isnan(times)))
         axes.set_title(f"{METHODS[family]}: {left} of {times.size} leave", color=INK)
@@ -330,11 +308,10 @@ def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     gone = {family: ~np.isnan(times) for family, times in found.items()}
     inside = gone["gauss"][np.asarray(GAPS) >= 4e-3]
     return (
-        f"Orbits from (0, 1/2) in every direction, with energies from 1/6 − {number(max(GAPS))} "
-        f"(bottom) to 1/6 − {number(min(GAPS))} (top), followed to t = {MAP_END:,.0f}. Under Gauss the "
-        "triangle leaks where 1/6 is nearer than the error of H; the blank cells among the coloured "
-        "ones are orbits that have not left yet, or regular ones that never will. Under HBVM nothing "
-        "leaves.",
+        f"Orbits from (0, 1/2) in every direction, with energies from 1/6 − {number(max(GAPS))} (bottom) to "
+        f"1/6 − {number(min(GAPS))} (top), followed to t = {experiment.MAP_END:,.0f}. Under Gauss the "
+        "triangle leaks where 1/6 is nearer than the error of H; the blank cells among the coloured ones are "
+        "orbits that have not left yet, or regular ones that never will. Under HBVM nothing leaves.",
         f"Under Gauss {gone['gauss'].sum()} of {gone['gauss'].size} orbits leave, {inside.sum()} of "
         f"{inside.size} of those with 1/6 − H₀ ≥ 4e-3; under HBVM {gone['hbvm'].sum()}.",
     )
@@ -353,10 +330,8 @@ def _saddles(axes: Axes) -> None:
         say(axes, f"P{'₁₂₃'[i]}", point, offset, fontsize=9)
 
 
-def _plane(reach: float, low: float) -> dict[str, Any]:
-    return {
-        "xlim": (-reach, reach), "ylim": (low, 1.25), "aspect": "equal", "xlabel": "q₁", "ylabel": "q₂"
-    }  # fmt: skip
+def _bounds(axes: Axes, reach: float, low: float) -> None:
+    axes.set(xlim=(-reach, reach), ylim=(low, 1.25), aspect="equal", xlabel="q₁", ylabel="q₂")
 
 
 PART = Part("henon-heiles", "The Hénon–Heiles problem", _runs(), _claims, _blocks)

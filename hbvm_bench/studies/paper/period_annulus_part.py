@@ -14,33 +14,28 @@ from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, legend_a
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments import period_annulus as experiment
 from hbvm_bench.studies.paper.experiments.period_annulus import (
-    DEGREES,
     DRAWN,
-    ENDS,
     NODES,
     PRINTED,
-    SHORT_SPAN,
     SPAN,
-    STEPS,
     Edge,
     Path,
     energy,
-)  # fmt: skip
-from hbvm_bench.studies.paper.results import Part, Results, Task
+)
+from hbvm_bench.studies.paper.results import Part, Results, Task, each
 from hbvm_bench.summaries.table import Table
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
-from integrators.protocol import Array
+from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 C_STAR_DIGITS = "0.37570559292634522367"
 PROBLEM = (
-    "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop "
-    "through the saddle P₁. The paper looks for the edge by bisection on the segment from the "
-    "origin to Q = (0, 1), judging each start by the fate of its numerical orbit over 2500 units "
-    "of time, down to an interval of 2⁻⁵². (The printed step 2 lets the segment end in P₁; it has "
-    "to be Q.) A start departs when |q| or |p| exceeds 1. The exact edge is at c* = "
-    f"{C_STAR_DIGITS}."
+    "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop through "
+    "the saddle P₁. The paper looks for the edge by bisection on the segment from the origin to Q = (0, 1), "
+    "judging each start by the fate of its numerical orbit over 2500 units of time, down to an interval of "
+    "2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) A start departs when |q| or |p| "
+    f"exceeds 1. The exact edge is at c* = {C_STAR_DIGITS}."
 )
 LONG_SPAN = (
     "Why the HBVM entries are a few units in the last place off over the span of 2500, and exact "
@@ -65,10 +60,10 @@ def _runs() -> list[Task]:
         *(Task(f"cell {h} {s}", partial(experiment.cell, s, h), 3 / h) for h, s in PRINTED),
         *(Task(f"spread {h} {s}", partial(experiment.spread, s, h), 10 / h) for h, s in PRINTED),
         *(Task(f"limit {h} {s}", partial(experiment.limit, s, h), 2) for h, s in PRINTED),
-        *(Task(f"fates {one}", partial(experiment.fates, one, FATE_GAPS), 5) for one in FATE_METHODS),
+        *each("fates", partial(experiment.fates, gaps=FATE_GAPS), FATE_METHODS, 5),
         Task("drawn", experiment.drawn, 3),
         Task("periods", partial(experiment.periods, PERIOD_GAPS), 2),
-        *(Task(f"other {one}", partial(others.on_period_annulus, one), 8) for one in others.PERIOD_ANNULUS),
+        *each("other", partial(others.measured, "period-annulus"), others.PERIOD_ANNULUS, 8),
     ]
 
 
@@ -86,7 +81,7 @@ def _blocks(results: Results) -> list[Maker]:
         ("the period", lambda: periods(results["periods"], experiment.saddle_rate())),
         (
             "the fates near the edge",
-            lambda: fates([results[f"fates {one}"] for one in FATE_METHODS]),
+            lambda: fates(results.each("fates", FATE_METHODS)),
         ),
         ("the other integrators", lambda: _others(results)),
     ]
@@ -113,9 +108,8 @@ def _claims(results: Results) -> list[Claim]:
     single = [gauss[key] / PRINTED[key][1] for key in PRINTED]
     medians = {key: float(np.median(errors)) for key, errors in _by_entry(results, "spread").items()}
     typical = [medians[key] / PRINTED[key][1] for key in PRINTED]
-    falls = all(medians[h, s] > medians[h, s + 1] for h in STEPS for s in DEGREES[:-1]) and all(
-        medians[1.0, s] > medians[0.5, s] for s in DEGREES
-    )
+    by_order = (medians[h, s] > medians[h, s + 1] for h in experiment.STEPS for s in experiment.DEGREES[:-1])
+    falls = all(by_order) and all(medians[1.0, s] > medians[0.5, s] for s in experiment.DEGREES)
     return [
         Claim(
             "P₁ and P₂ are equilibria, both saddles",
@@ -143,7 +137,7 @@ def _claims(results: Results) -> list[Claim]:
             "2.15e-2 … 2.32e-7",
             f"{number(gauss[1.0, 2], 3)} … {number(gauss[0.5, 5], 3)}; the eight entries are "
             f"{min(single):.2f} to {max(single):.2f} times the printed ones, their medians over "
-            f"{len(ENDS)} bisections {min(typical):.2f} to {max(typical):.2f} times",
+            f"{len(experiment.ENDS)} bisections {min(typical):.2f} to {max(typical):.2f} times",
             "holds" if falls and min(typical) >= 0.5 and max(typical) <= 2.0 else "partly",
         ),
         Claim(
@@ -229,7 +223,7 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
         "other points and ends at other boundaries of the layer. The printed errors are typical draws.",
         words=(),
         key="table-1-spread",
-        groups=(("", 2), ("error in H", 1), (f"here, {len(ENDS)} bisections", 4), ("", 1)),
+        groups=(("", 2), ("error in H", 1), (f"here, {len(experiment.ENDS)} bisections", 4), ("", 1)),
     )
 
 
@@ -240,10 +234,10 @@ def _point(c: float) -> str:
 def _others(results: Results) -> Table:
     return others.table(
         "period-annulus-others",
-        [results[f"other {text}"] for text in others.PERIOD_ANNULUS],
+        results.each("other", others.PERIOD_ANNULUS),
         {"c": ("c", _point), "error in H": ("error", partial(number, digits=3))},
         "The same bisection with other integrators",
-        f"Judged over a span of {SHORT_SPAN:g}; c* = {C_STAR!r}.",
+        f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )
 
 
@@ -317,11 +311,11 @@ def periods(figure: Figure, rows: Sequence[tuple[float, float]], rate: float) ->
 
 
 @drawn("period-annulus-fates", "Beyond the paper · why the Gauss entries are what they are", WIDTH, 4.65)
-def fates(figure: Figure, series: Sequence[Sequence[tuple[float, float | None]]]) -> Said:
+def fates(figure: Figure, series: Mapping[MethodBase, Sequence[tuple[float, float | None]]]) -> Said:
     """Draw when orbits depart, against their distance inside the true edge: why Gauss's entries scatter."""
     panels = figure.subplots(len(series), 1, sharex=True)
     summary = []
-    for axes, method, rows in zip(panels, FATE_METHODS, series, strict=True):
+    for axes, (method, rows) in zip(panels, series.items(), strict=True):
         name, colour = repr(method), COLOURS[method.family]
         gone = np.array([(gap, time) for gap, time in rows if time is not None]).reshape(-1, 2)
         stay = np.array([gap for gap, time in rows if time is None])

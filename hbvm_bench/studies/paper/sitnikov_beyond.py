@@ -12,13 +12,8 @@ from matplotlib.lines import Line2D
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
 from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, heat, number
-from hbvm_bench.studies.paper.experiments.axis_motion import (
-    MAP_ECCENTRICITIES,
-    MAP_SPEEDS,
-    MAP_TURNS,
-    START,
-    Growth,
-)  # fmt: skip
+from hbvm_bench.studies.paper.experiments import axis_motion
+from hbvm_bench.studies.paper.experiments.axis_motion import START, Growth
 from hbvm_bench.studies.paper.experiments.sitnikov import DEGREE, T_END, E, StepRow
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
@@ -223,21 +218,22 @@ def chaos(
 @drawn("sitnikov-territory", "Beyond the paper · who stays on the axis", WIDTH * 0.72, 4.0, values=True)
 def territory(figure: Figure, left_after: Array) -> Said:
     """Where planetoids stay: revolutions until they leave, over eccentricity and speed."""
+    es, speeds, turns = axis_motion.MAP_ECCENTRICITIES, axis_motion.MAP_SPEEDS, axis_motion.MAP_TURNS
     axes = figure.subplots()
-    mesh = heat(axes, MAP_ECCENTRICITIES, MAP_SPEEDS, left_after.T, 0, math.log10(MAP_TURNS))
+    mesh = heat(axes, es, speeds, left_after.T, 0, math.log10(turns))
     bar = figure.colorbar(mesh, ax=axes, pad=0.02, aspect=30)
-    ticks = [value for value in (1, 3, 10, 30, 100, 300) if value <= MAP_TURNS]
+    ticks = [value for value in (1, 3, 10, 30, 100, 300) if value <= turns]
     bar.set_ticks([math.log10(value) for value in ticks], labels=[str(value) for value in ticks])
-    bar.set_label(f"revolutions until |z| > 100; blank: stays for {MAP_TURNS}")
+    bar.set_label(f"revolutions until |z| > 100; blank: stays for {turns}")
     axes.plot(E, START[1], "o", color=COLOURS["motion"], markersize=8, mec=PAPER, mew=1.5, zorder=5)
     say(axes, "the paper's run", (E, START[1]), (-9, -3), ha="right", fontsize=8.5, color=INK)
     axes.set(xlabel="eccentricity e", ylabel="speed through the plane at apocentre")
-    nearest = int(np.argmin(np.abs(np.asarray(MAP_ECCENTRICITIES) - E)))
-    gone = (speed for speed, turns in zip(MAP_SPEEDS, left_after[nearest], strict=True) if turns == turns)
+    nearest = int(np.argmin(np.abs(np.asarray(es) - E)))
+    gone = np.flatnonzero(~np.isnan(left_after[nearest]))
+    edge = speeds[gone[0]] if gone.size else math.nan
     return (
         "For each eccentricity of the primaries and each speed at the start: how long the planetoid "
         "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
         "end of regular motion; the paper's run lies inside it.",
-        f"At e = {MAP_ECCENTRICITIES[nearest]:g} the slowest planetoid that leaves has speed "
-        f"{next(gone, math.nan):.3g}.",
+        f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
     )

@@ -38,52 +38,68 @@ def configuration(figure: Figure, truth: Orbit) -> Said:
     )
 
 
-@drawn("", "", WIDTH, 4.1)
-def trajectories(
-    figure: Figure,
-    run: Orbit,
-    truth: Orbit,
-    family: str,
-    figure_number: int,
-    end: float,
-    caption: str,
-    ellipses: Sequence[Array] = (),
-) -> Said:
-    """sit_fig2, sit_fig3: the primaries in their plane, the planetoid in space and time.
+@drawn("sitnikov-2", f"Figure 2 · Gauss of order four, h = {H:g}", WIDTH, 4.1)
+def thrown_out(figure: Figure, run: Orbit, truth: Orbit, neighbours: str) -> Said:
+    """sit_fig2: the primaries in their plane, the planetoid in space and time; what neighbours do is said."""
+    _trajectories(figure, run, truth, COLOURS["gauss"], T_END)
+    return (
+        "Left: the primaries at every step. Right: the planetoid is thrown out; when, and whether it comes "
+        f"back once more, is decided by the last bit. {neighbours}",
+        _reached(run),
+    )
 
-    ``ellipses``: paths (2, n) of one primary in the `REVOLUTIONS`, drawn as lines.
-    """
-    colour = COLOURS[family]
-    left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
-    for body, shade in ((0, 0.55), (1, 1.0)):
-        left.plot(*run.primaries[:, body].T, ".", color=colour, alpha=shade, markersize=1.6, rasterized=True)
-    for number, (x, y) in zip(REVOLUTIONS, ellipses, strict=False):
+
+@drawn("sitnikov-3", f"Figure 3 · HBVM(18,2), h = {H:g}", WIDTH, 4.1)
+def stays(figure: Figure, run: Orbit, truth: Orbit, ellipses: Sequence[Array]) -> Said:
+    """sit_fig3: as before; the paths (2, n) of one primary in the `REVOLUTIONS` are drawn as lines."""
+    left = _trajectories(figure, run, truth, COLOURS["hbvm"], SHOWN)
+    for number, (x, y) in zip(REVOLUTIONS, ellipses, strict=True):
         left.plot(x, y, color=INK, linewidth=0.9)
         far = int(np.argmax(np.hypot(x, y)))
         look: Any = {"ha": "center", "va": "center", "fontsize": 8, "color": INK}
         left.annotate(str(number), (1.11 * x[far], 1.11 * y[far]), **look)
+    return (
+        "Left: the primaries at every step, and one of them in its 1st, 16th and 31st revolution as a line: "
+        "the ellipses turn, the paper's sham rotation. Right: the planetoid on the paper's range of time, "
+        "over the true motion in grey.",
+        _reached(run),
+    )
+
+
+def _trajectories(figure: Figure, run: Orbit, truth: Orbit, colour: str, end: float) -> Axes:
+    """Draw the primaries in their plane, whose axes are returned, and the planetoid in space and time."""
+    left, right = figure.subplots(1, 2, width_ratios=[0.8, 1.2])
+    for body, shade in ((0, 0.55), (1, 1.0)):
+        left.plot(*run.primaries[:, body].T, ".", color=colour, alpha=shade, markersize=1.6, rasterized=True)
     left.set(xlim=(-REACH, REACH), ylim=(-REACH, REACH), aspect="equal", xlabel="x", ylabel="y")
     left.set_title(f"primaries, every step to t = {run.t[-1]:g}")
-    shown = run.t <= end
+    shown, past = run.t <= end, truth.t <= end
     if run.lost is None:
-        past = truth.t <= end
         right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="true motion")
         right.set(ylim=(-2, 2), title="the planetoid on the axis")
     else:
         right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
-        _before(right, run, colour)
+        _before(right, run, run.lost, colour)
     right.plot(run.t[shown], run.z[shown], color=colour, linewidth=0.9, label=run.method)
     right.set(xlim=(0, end), xlabel="time", ylabel="z")
     if run.lost is None:
         right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
-    name = {"gauss": "Gauss of order four", "hbvm": "HBVM(18,2)"}[family]
-    return (
-        f"sitnikov-{figure_number}",
-        f"Figure {figure_number} · {name}, h = {H:g}",
-        caption,
-        f"{run.method}: largest |z| {np.abs(run.z).max():.4g}, distance of the primaries up to "
-        f"{run.distance.max():.4f}.",
-    )
+    return left
+
+
+def _before(axes: Axes, run: Orbit, lost: float, colour: str) -> None:
+    """Show the oscillations up to the planetoid's loss in an inset, on the empty side."""
+    until = run.t <= lost
+    inset = axes.inset_axes((0.09, 0.12 if run.z[-1] < 0 else 0.5, 0.42, 0.36), zorder=5)
+    inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
+    inset.set(xlim=(0, lost), ylim=(-LOST, LOST))
+    inset.tick_params(labelsize=7)
+    inset.set_title(f"until |z| > {LOST:g}, at t = {lost:g}", color=INK, fontsize=8)
+
+
+def _reached(run: Orbit) -> str:
+    z, apart = np.abs(run.z).max(), run.distance.max()
+    return f"{run.method}: largest |z| {z:.4g}, distance of the primaries up to {apart:.4f}."
 
 
 @drawn("sitnikov-4", "Figure 4 · distance of the primaries", WIDTH, 3.1)
@@ -133,18 +149,6 @@ def errors(figure: Figure, runs: Mapping[str, Orbit]) -> Said:
             for run in shown.values()
         ),
     )
-
-
-def _before(axes: Axes, run: Orbit, colour: str) -> None:
-    """Show the oscillations up to the planetoid's loss in an inset, on the empty side."""
-    assert run.lost is not None
-    until = run.t <= run.lost
-    falls = run.z[-1] < 0
-    inset = axes.inset_axes((0.09, 0.12 if falls else 0.5, 0.42, 0.36), zorder=5)
-    inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
-    inset.set(xlim=(0, run.lost), ylim=(-LOST, LOST))
-    inset.tick_params(labelsize=7)
-    inset.set_title(f"until |z| > {LOST:g}, at t = {run.lost:g}", color=INK, fontsize=8)
 
 
 def _configuration(axes: Axes, truth: Orbit) -> None:

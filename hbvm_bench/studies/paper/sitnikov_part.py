@@ -8,14 +8,13 @@ from itertools import takewhile
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_figures as figures
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.experiments import axis_motion, others, sitnikov
 from hbvm_bench.studies.paper.experiments.axis_motion import Growth
 from hbvm_bench.studies.paper.experiments.sitnikov import Orbit, StepRow
-from hbvm_bench.studies.paper.results import Part, Results, Task, split
+from hbvm_bench.studies.paper.results import Part, Results, Task, each, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
@@ -40,46 +39,33 @@ def _runs() -> list[Task]:
         Task("orbits", sitnikov.orbits, 2),
         Task("ellipses", sitnikov.ellipses),
         Task("neighbours", sitnikov.neighbours),
-        *(Task(f"nodes {h}", partial(sitnikov.energy_by_nodes, h), 3) for h in NODE_STEPS),
+        *each("nodes", sitnikov.energy_by_nodes, NODE_STEPS, 3),
         Task("steps 2", partial(sitnikov.by_step, 2), 4),
         Task("steps 3", partial(sitnikov.by_step, 3, sitnikov.STEPS_SHORT), 4),
         Task("truth", sitnikov.against_truth, 2),
         *split("growth", axis_motion.growth_by_eccentricity, axis_motion.ECCENTRICITIES, 3, 15),
         Task("section", partial(axis_motion.section, sitnikov.E), 4),
         *split("stays", axis_motion.stays, axis_motion.MAP_ECCENTRICITIES, 4, 8),
-        *(Task(f"other {text}", partial(others.on_sitnikov, text), 6) for text in others.SITNIKOV),
+        *each("other", partial(others.measured, "sitnikov"), others.SITNIKOV, 6),
     ]
 
 
 def _blocks(results: Results) -> list[Maker]:
-    def orbit(family: str, figure: int, end: float, words: str, lines: Sequence[Array] = ()) -> Picture:
-        runs: dict[str, Orbit] = results["orbits"]
-        return figures.trajectories(runs[family], runs["fine"], family, figure, end, words, lines)
-
-    def thrown_out() -> Picture:
-        words = (
-            "Left: the primaries at every step. Right: the planetoid is thrown out; when, and whether "
-            f"it comes back once more, is decided by the last bit. {lost_words(results['neighbours'])}"
-        )
-        return orbit("gauss", 2, sitnikov.T_END, words)
-
-    def stays() -> Picture:
-        words = (
-            "Left: the primaries at every step, and one of them in its 1st, 16th and 31st revolution as "
-            "a line: the ellipses turn, the paper's sham rotation. Right: the planetoid on the paper's "
-            "range of time, over the true motion in grey."
-        )
-        return orbit("hbvm", 3, figures.SHOWN, words, results["ellipses"])
+    def run(name: str) -> Orbit:
+        return results["orbits"][name]
 
     return [
         ("the problem", lambda: PROBLEM),
-        ("Figure 1", lambda: figures.configuration(results["orbits"]["fine"])),
-        ("Figure 2", thrown_out),
-        ("Figure 3", stays),
+        ("Figure 1", lambda: figures.configuration(run("fine"))),
+        (
+            "Figure 2",
+            lambda: figures.thrown_out(run("gauss"), run("fine"), lost_words(results["neighbours"])),
+        ),
+        ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
         ("both laws at once", lambda: _both_laws(results["orbits"])),
-        ("nodes", lambda: beyond.by_nodes({h: results[f"nodes {h}"] for h in NODE_STEPS})),
+        ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
         ("the table of steps", lambda: beyond.step_table(_steps(results))),
         ("the true trajectory", lambda: beyond.truth_compared(results["truth"])),
@@ -305,10 +291,10 @@ def _plainly(results: Results) -> str:
 
 
 def _others(results: Results) -> Table:
-    rows: list[others.Row] = [results[f"other {text}"] for text in others.SITNIKOV]
+    rows: dict[str, others.Row] = results.each("other", others.SITNIKOV)
     return others.table(
         "sitnikov-others",
-        [replace(row, remark=row.remark or _remark(row.numbers)) for row in rows],
+        {text: replace(row, remark=row.remark or _remark(row.numbers)) for text, row in rows.items()},
         {
             "energy": ("energy", number),
             "angular momentum": ("momentum", number),
@@ -317,10 +303,9 @@ def _others(results: Results) -> Table:
             "evaluations": ("evaluations", "{:,.0f}".format),
         },
         "The same run with other integrators",
-        "One setting per method, chosen by us for accuracy. Evaluations: of the vector "
-        "field, where the library counts them. `hbvm-bench run sitnikov` has "
-        "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
-        "nothing.",
+        "One setting per method, chosen by us for accuracy. Evaluations: of the vector field, where the "
+        "library counts them. `hbvm-bench run sitnikov` has all settings, with times. Off the axis the "
+        "trajectory is another one, and its other numbers say nothing.",
     )
 
 

@@ -20,7 +20,9 @@ def departure(
     stretch: float,
     every: float | None = None,
 ) -> float | None:
-    """Integrate until a state has departed; return the time of the first such state.
+    """Integrate until a state has departed; return the time of the first such state, or ``None``.
+
+    A trajectory that its method can follow no farther, as in a blow-up, has departed with its last state.
 
     Parameters
     ----------
@@ -31,17 +33,9 @@ def departure(
     departed : callable
         From states (n, dim) to booleans (n,).
     stretch : float
-        Length of the first stretch of time that is integrated without looking;
-        the next ones are longer.
+        Length of the first stretch of time that is integrated without looking; the next ones are longer.
     every : float, optional
-        Look at states so far apart; by default at every step of the method, which
-        costs some libraries dear.
-
-    Returns
-    -------
-    float or None
-        ``None`` where nothing departed up to ``t_end``. A trajectory that its method
-        can follow no farther, as in a blow-up, has departed with its last state.
+        Look at states so far apart; by default at every step of the method, which costs some libraries dear.
     """
     longest = stretch * LONGEST
     ahead = stepper.t

@@ -106,8 +106,8 @@ def escapes(
 
 def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STARTS) -> list[StepRow]:
     """Return what ``gauss``, s = 2, or ``hbvm``, HBVM(4, 2), does with each step."""
-    methods = [Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h) for h in steps]
-    return [StepRow(method.h, escapes(method, range(starts)), agreement(method)) for method in methods]
+    methods = [(h, Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h)) for h in steps]
+    return [StepRow(h, escapes(method, range(starts)), agreement(method)) for h, method in methods]
 
 
 def agreement(method: MethodBase, t_end: float = 100.0) -> float:

@@ -1,7 +1,8 @@
 """The paper's three problems with the established libraries, at one setting each, chosen for accuracy."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -47,7 +48,7 @@ Found = tuple[dict[str, float], str]  # the numbers, and how it ended
 
 def table(
     key: str,
-    rows: Sequence[Row],
+    rows: Mapping[str, Row],
     columns: Mapping[str, tuple[str, Callable[[float], str]]],
     title: str,
     note: str,
@@ -60,31 +61,17 @@ def table(
     return Table(
         title,
         ("method", *columns, "remark"),
-        [(row.method, *cells(row), row.remark) for row in rows],
+        [(row.method, *cells(row), row.remark) for row in rows.values()],
         note,
         words=(0, len(columns) + 1),
         key=key,
     )
 
 
-def on_sitnikov(text: str) -> Row:
-    """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
-    return _row(text, sitnikov.problem(), _on_sitnikov)
-
-
-def on_henon_heiles(text: str) -> Row:
-    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
-    return _row(text, henon_heiles.start(HENON_SPAN), _on_henon_heiles)
-
-
-def on_period_annulus(text: str) -> Row:
-    """Return the edge found over the short span and its error in H."""
-    return _row(text, period_annulus.PROBLEM, _on_period_annulus)
-
-
-def _row(text: str, problem: Problem, run: Callable[[MethodBase, Problem], Found]) -> Row:
-    """Run a method on a problem; one that refuses it, or whose library is not installed, says so itself."""
-    method = make_method(text)
+def measured(place: str, text: str) -> Row:
+    """Run a method on one of the `PLACES`; one that refuses it, or whose library is missing, says why."""
+    run, start = PLACES[place]
+    method, problem = make_method(text), start()
     refused = method.accepts(problem)
     try:
         if refused is None:
@@ -95,6 +82,7 @@ def _row(text: str, problem: Problem, run: Callable[[MethodBase, Problem], Found
 
 
 def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
+    """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
     solution = integrate(problem, method, times=np.arange(0.0, sitnikov.T_END + 0.5, 0.5))
     if solution.status.failed:
         return {}, _ended(solution)
@@ -112,6 +100,7 @@ def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
 
 
 def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
+    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
     times = np.arange(0.0, HENON_SPAN + 1.0)
     solution = integrate(problem, method, times=times)
     truth = integrate(problem, henon_heiles.TRUTH, times=times).y[: len(solution.y)]
@@ -124,8 +113,8 @@ def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
     return numbers, _ended(solution) if solution.status.failed else ""
 
 
-def _on_period_annulus(method: MethodBase, problem: Problem) -> Found:
-    del problem  # the one that the edge belongs to
+def _on_period_annulus(method: MethodBase, _: Problem) -> Found:
+    """Return the edge found over the short span and its error in H."""
     every = None if method.library == "hbvm-bench" else LOOK
     found = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
     return {"c": found.c, "error": period_annulus.error_of(found.c)}, ""
@@ -133,3 +122,10 @@ def _on_period_annulus(method: MethodBase, problem: Problem) -> Found:
 
 def _ended(solution: Solution) -> str:
     return f"{solution.status.replace('_', ' ')} at t = {solution.t_stop:.5g}"
+
+
+PLACES: dict[str, tuple[Callable[[MethodBase, Problem], Found], Callable[[], Problem]]] = {
+    "sitnikov": (_on_sitnikov, sitnikov.problem),
+    "henon-heiles": (_on_henon_heiles, partial(henon_heiles.start, HENON_SPAN)),
+    "period-annulus": (_on_period_annulus, period_annulus.period_annulus),
+}

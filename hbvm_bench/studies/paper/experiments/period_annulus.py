@@ -61,18 +61,8 @@ class Edge:
 def edge(method: MethodBase, span: float, *, every: float | None = None, end: float = 1.0) -> Edge:
     """Find the edge by the paper's steps 1 to 5, on the segment from the origin to Q = (0, 1).
 
-    The printed step 2 lets the segment end in P1; it has to end in Q.
-
-    Parameters
-    ----------
-    method : MethodBase
-        Whose orbits are judged.
-    span : float
-        Time over which they are followed.
-    every : float, optional
-        See `departure`.
-    end : float
-        Another Q = (0, end): the bisection then visits other points.
+    The printed step 2 lets the segment end in P1; it has to end in Q. With another Q = (0, end) the
+    bisection visits other points. Orbits are followed over the span; for ``every`` see `departure`.
     """
     program = method.compile(PROBLEM.system)
     low, high, orbits = 0.0, end, 0

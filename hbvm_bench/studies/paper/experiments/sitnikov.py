@@ -170,14 +170,10 @@ def by_step(s: int, steps: Sequence[float] = STEPS) -> list[StepRow]:
 
 
 def turning(solution: Solution) -> tuple[float, float]:
-    """Return the rate at which the primaries' orbit turns, and how unevenly.
+    """Return the rate at which the primaries' orbit turns, degrees per revolution, and how unevenly.
 
-    The direction is that of the Laplace-Runge-Lenz vector of the relative motion.
-
-    Returns
-    -------
-    rate, unsteady : float
-        Degrees per revolution of a straight fit; rms of its residuals, degrees.
+    The direction is that of the Laplace-Runge-Lenz vector of the relative motion; the rate is that of a
+    straight fit, whose residuals have the rms that is returned, in degrees.
     """
     m1, m2 = solution.problem.par[:2]
     r = solution.y[:, 3:5] - solution.y[:, 0:2]
