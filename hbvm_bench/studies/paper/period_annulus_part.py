@@ -29,13 +29,12 @@ from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
-C_STAR_DIGITS = "0.37570559292634522367"
 PROBLEM = (
     "A planar system of degree five with a centre in the origin; its periodic orbits end at a loop through "
     "the saddle P₁. The paper looks for the edge by bisection on the segment from the origin to Q = (0, 1), "
     "judging each start by the fate of its numerical orbit over 2500 units of time, down to an interval of "
     "2⁻⁵². (The printed step 2 lets the segment end in P₁; it has to be Q.) A start departs when |q| or |p| "
-    f"exceeds 1. The exact edge is at c* = {C_STAR_DIGITS}."
+    "exceeds 1. The exact edge is at c* = 0.37570559292634522367."
 )
 LONG_SPAN = (
     "Why the HBVM entries are a few units in the last place off over the span of 2500, and exact "

@@ -39,12 +39,12 @@ def configuration(figure: Figure, truth: Orbit) -> Said:
 
 
 @drawn("sitnikov-2", f"Figure 2 · Gauss of order four, h = {H:g}", WIDTH, 4.1)
-def thrown_out(figure: Figure, run: Orbit, truth: Orbit, neighbours: str) -> Said:
-    """sit_fig2: the primaries in their plane, the planetoid in space and time; what neighbours do is said."""
+def thrown_out(figure: Figure, run: Orbit, truth: Orbit, neighbours: Sequence[float | None]) -> Said:
+    """sit_fig2: the primaries in their plane, the planetoid in space and time."""
     _trajectories(figure, run, truth, COLOURS["gauss"], T_END)
     return (
         "Left: the primaries at every step. Right: the planetoid is thrown out; when, and whether it comes "
-        f"back once more, is decided by the last bit. {neighbours}",
+        f"back once more, is decided by the last bit. {lost_words(neighbours)}",
         _reached(run),
     )
 
@@ -63,6 +63,17 @@ def stays(figure: Figure, run: Orbit, truth: Orbit, ellipses: Sequence[Array]) -
         "the ellipses turn, the paper's sham rotation. Right: the planetoid on the paper's range of time, "
         "over the true motion in grey.",
         _reached(run),
+    )
+
+
+def lost_words(times: Sequence[float | None]) -> str:
+    """Return what neighbouring starts do, as a sentence: when they lose the planetoid, if they do."""
+    lost = sorted(time for time in times if time is not None)
+    if not lost:
+        return f"None of {len(times)} starts that differ in the last bits of e loses the planetoid."
+    return (
+        f"Of {len(times)} starts that differ in the last bits of e, {len(lost)} lose the planetoid, the "
+        f"first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
     )
 
 

@@ -57,10 +57,7 @@ def _blocks(results: Results) -> list[Maker]:
     return [
         ("the problem", lambda: PROBLEM),
         ("Figure 1", lambda: figures.configuration(run("fine"))),
-        (
-            "Figure 2",
-            lambda: figures.thrown_out(run("gauss"), run("fine"), lost_words(results["neighbours"])),
-        ),
+        ("Figure 2", lambda: figures.thrown_out(run("gauss"), run("fine"), results["neighbours"])),
         ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
@@ -107,7 +104,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
         Claim(
             "Under Gauss of order four the planetoid eventually leaves the system",
             "Figure 2",
-            f"|z| > {sitnikov.LOST:g} at t = {number(gauss.lost)}. {lost_words(times)}",
+            f"|z| > {sitnikov.LOST:g} at t = {number(gauss.lost)}. {figures.lost_words(times)}",
             "holds" if times.count(None) * 2 < len(times) else "partly",
         ),
         Claim(
@@ -210,17 +207,6 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
             "holds" if largest["hbvm"] > largest["gauss"] else "no",
         ),
     ]
-
-
-def lost_words(times: Sequence[float | None]) -> str:
-    """Return what neighbouring starts do, as a sentence: when they lose the planetoid, if they do."""
-    lost = sorted(time for time in times if time is not None)
-    if not lost:
-        return f"None of {len(times)} starts that differ in the last bits of e loses the planetoid."
-    return (
-        f"Of {len(times)} starts that differ in the last bits of e, {len(lost)} lose the planetoid, the "
-        f"first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
-    )
 
 
 def row(steps: Sequence[StepRow], family: str, h: float) -> StepRow:

@@ -8,34 +8,19 @@ from numpy.typing import NDArray
 from integrators.protocol import Array, MethodBase, Stepper
 from problems import Problem
 
+Test = Callable[[Array], NDArray[np.bool_]]  # from states (n, dim) to whether they hold
 GROWTH = 2.0  # of the stretches: short at first, so that an early departure costs little
 LONGEST = 4096.0  # stretch, in units of the first
 
 
 def departure(
-    stepper: Stepper,
-    t_end: float,
-    departed: Callable[[Array], NDArray[np.bool_]],
-    *,
-    stretch: float,
-    every: float | None = None,
+    stepper: Stepper, t_end: float, departed: Test, *, stretch: float, every: float | None = None
 ) -> float | None:
     """Integrate until a state has departed; return the time of the first such state, or ``None``.
 
     A trajectory that its method can follow no farther, as in a blow-up, has departed with its last state.
-
-    Parameters
-    ----------
-    stepper : Stepper
-        A trajectory under way.
-    t_end : float
-        How far to look.
-    departed : callable
-        From states (n, dim) to booleans (n,).
-    stretch : float
-        Length of the first stretch of time that is integrated without looking; the next ones are longer.
-    every : float, optional
-        Look at states so far apart; by default at every step of the method, which costs some libraries dear.
+    A stretch of time is integrated without looking, the next ones are longer; then states ``every`` so far
+    apart are looked at, by default all steps of the method, which costs some libraries dear.
     """
     longest = stretch * LONGEST
     ahead = stepper.t

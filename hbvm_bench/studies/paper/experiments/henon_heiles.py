@@ -32,6 +32,7 @@ MAP_END = 2e4
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 STEP_STARTS = 8
 TRUTH = HBVM(k=15, s=10, h=0.25)
+Floats = Sequence[float]
 AGREES = 1e-2  # distance at which two orbits have parted
 
 
@@ -125,10 +126,7 @@ def parted(t: Array, y: Array, truth: Array) -> float:
 
 
 def escape_map(
-    method: MethodBase,
-    gaps: Sequence[float] = GAPS,
-    directions: Sequence[float] = DIRECTIONS,
-    t_end: float = MAP_END,
+    method: MethodBase, gaps: Floats = GAPS, directions: Floats = DIRECTIONS, t_end: float = MAP_END
 ) -> Array:
     """Return when orbits have left, shape (len(gaps), len(directions)); NaN where the orbit stays.
 

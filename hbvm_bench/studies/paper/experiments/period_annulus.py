@@ -45,7 +45,6 @@ class Edge:
 
     low: float
     high: float
-    orbits: int  # how many were integrated
 
     @property
     def c(self) -> float:
@@ -65,12 +64,11 @@ def edge(method: MethodBase, span: float, *, every: float | None = None, end: fl
     bisection visits other points. Orbits are followed over the span; for ``every`` see `departure`.
     """
     program = method.compile(PROBLEM.system)
-    low, high, orbits = 0.0, end, 0
+    low, high = 0.0, end
     while high - low >= TOLERANCE and (middle := (low + high) / 2) not in (low, high):
         stays = fate(program, middle, span, every) is None
         low, high = (middle, high) if stays else (low, middle)
-        orbits += 1
-    return Edge(low, high, orbits)
+    return Edge(low, high)
 
 
 def fate(program: Program, c: float, span: float, every: float | None = None) -> float | None:
