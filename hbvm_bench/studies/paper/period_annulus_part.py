@@ -51,6 +51,7 @@ FATE_METHODS = (Gauss(s=2, h=1.0), Gauss(s=2, h=0.5), Gauss(s=4, h=0.5), HBVM(k=
 FATE_GAPS = tuple((10.0 ** np.linspace(-8.0, -1.0, 141)).tolist())
 PERIOD_GAPS = tuple((10.0 ** -np.arange(0.5, 15.0, 0.5)).tolist())
 LEVELS = (0.005, 0.02, 0.04, 0.06, 0.08, H_STAR, 0.1, 0.12, 0.15)
+POINT = "{:.16f}".format
 Key = tuple[float, int]  # of an entry of Table 1: h and s
 
 
@@ -77,7 +78,7 @@ def _blocks(results: Results) -> list[Maker]:
         ("how much is chance", lambda: _spread_table(entries("spread"))),
         ("Figure 1", level_curves),
         ("Figure 2", lambda: closeup(results["drawn"])),
-        ("the period", lambda: periods(results["periods"], experiment.saddle_rate())),
+        ("the period", lambda: periods(results["periods"])),
         (
             "the fates near the edge",
             lambda: fates(results.each("fates", FATE_METHODS)),
@@ -93,10 +94,9 @@ def _by_entry(results: Results, what: str) -> dict[Key, Any]:
 
 def _claims(results: Results) -> list[Claim]:
     cells: dict[Key, dict[str, Edge]] = _by_entry(results, "cell")
-    rate = experiment.saddle_rate()
     orbits: dict[str, Path] = results["drawn"]
     rest = max(float(np.abs(experiment.field(point)).max()) for point in (P1, P2))
-    rates = [float(experiment.eigenvalues(point).real.max()) for point in (P1, P2)]
+    rate, other = (float(experiment.eigenvalues(point).real.max()) for point in (P1, P2))
     level = float(energy(np.array([P1]))[0])
     far = np.array(results["periods"])
     slope = float(np.polyfit(np.log(far[8:-4, 0]), far[8:-4, 1], 1)[0])
@@ -113,9 +113,8 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "P₁ and P₂ are equilibria, both saddles",
             "16 digits",
-            f"the field at the printed points is ≤ {number(rest)}; eigenvalues ±{rates[0]:.4f} and "
-            f"±{rates[1]:.4f}",
-            "holds" if rest < 1e-14 and min(rates) > 0 else "no",
+            f"the field at the printed points is ≤ {number(rest)}; eigenvalues ±{rate:.4f} and ±{other:.4f}",
+            "holds" if rest < 1e-14 and min(rate, other) > 0 else "no",
         ),
         Claim("H* = H(P₁)", "9.050199350868576e-2", f"{level!r}", "holds" if level == H_STAR else "partly"),
         Claim(
@@ -163,17 +162,12 @@ def _nearest(orbit: Path) -> float:
 def _table(cells: Mapping[Key, Mapping[str, Edge]]) -> Table:
     rows = []
     for (h, s), (gauss, gauss_error, hbvm, hbvm_error) in PRINTED.items():
-        found = cells[h, s]
-        error = found["gauss"].error
-        rows.append(
-            (
-                *(f"{h:g}", str(s), str(NODES[s])),
-                *(_point(float(gauss)), _point(found["gauss"].c)),
-                *(number(gauss_error, 3), number(error, 3), f"{error / gauss_error:.2f}"),
-                *(_point(float(hbvm)), _point(found["hbvm"].c)),
-                *(number(one, 3) for one in (hbvm_error, found["hbvm"].error, found["hbvm_short"].error)),
-            )
-        )
+        found = [cells[h, s][key] for key in ("gauss", "hbvm", "hbvm_short")]
+        points = (POINT(float(gauss)), POINT(found[0].c), POINT(float(hbvm)), POINT(found[1].c))
+        errors = [number(one, 3) for one in (gauss_error, found[0].error, hbvm_error, found[1].error)]
+        ratio, short = f"{found[0].error / gauss_error:.2f}", number(found[2].error, 3)
+        entry = (f"{h:g}", str(s), str(NODES[s]))
+        rows.append((*entry, *points[:2], *errors[:2], ratio, *points[2:], *errors[2:], short))
     pair = ("c, paper", "c, here", "error, paper", "error, here")
     return Table(
         "Table 1 · the edge found by bisection",
@@ -226,15 +220,11 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
     )
 
 
-def _point(c: float) -> str:
-    return f"{c:.16f}"
-
-
 def _others(results: Results) -> Table:
     return others.table(
         "period-annulus-others",
         results.each("other", others.PERIOD_ANNULUS),
-        {"c": ("c", _point), "error in H": ("error", partial(number, digits=3))},
+        {"c": ("c", POINT), "error in H": ("error", partial(number, digits=3))},
         "The same bisection with other integrators",
         f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )
@@ -289,9 +279,9 @@ def closeup(figure: Figure, orbits: Mapping[str, Path]) -> Said:
 
 
 @drawn("period-annulus-period", "The period grows without bound", WIDTH * 0.62, 3.2)
-def periods(figure: Figure, rows: Sequence[tuple[float, float]], rate: float) -> Said:
+def periods(figure: Figure, rows: Sequence[tuple[float, float]]) -> Said:
     """Draw the period against the distance from H*."""
-    gap, period = np.array(rows).T
+    (gap, period), rate = np.array(rows).T, experiment.saddle_rate()
     axes = figure.subplots()
     anchor = int(np.argmin(np.abs(np.log10(gap) + 7)))
     line = period[anchor] - np.log(gap / gap[anchor]) / rate

@@ -90,22 +90,17 @@ def _trajectories(figure: Figure, run: Orbit, truth: Orbit, colour: str, end: fl
         right.set(ylim=(-2, 2), title="the planetoid on the axis")
     else:
         right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
-        _before(right, run, run.lost, colour)
+        until = run.t <= run.lost  # the oscillations up to the loss, in an inset on the empty side
+        inset = right.inset_axes((0.09, 0.12 if run.z[-1] < 0 else 0.5, 0.42, 0.36), zorder=5)
+        inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
+        inset.set(xlim=(0, run.lost), ylim=(-LOST, LOST))
+        inset.tick_params(labelsize=7)
+        inset.set_title(f"until |z| > {LOST:g}, at t = {run.lost:g}", color=INK, fontsize=8)
     right.plot(run.t[shown], run.z[shown], color=colour, linewidth=0.9, label=run.method)
     right.set(xlim=(0, end), xlabel="time", ylabel="z")
     if run.lost is None:
         right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2)
     return left
-
-
-def _before(axes: Axes, run: Orbit, lost: float, colour: str) -> None:
-    """Show the oscillations up to the planetoid's loss in an inset, on the empty side."""
-    until = run.t <= lost
-    inset = axes.inset_axes((0.09, 0.12 if run.z[-1] < 0 else 0.5, 0.42, 0.36), zorder=5)
-    inset.plot(run.t[until], run.z[until], color=colour, linewidth=0.8)
-    inset.set(xlim=(0, lost), ylim=(-LOST, LOST))
-    inset.tick_params(labelsize=7)
-    inset.set_title(f"until |z| > {LOST:g}, at t = {lost:g}", color=INK, fontsize=8)
 
 
 def _reached(run: Orbit) -> str:

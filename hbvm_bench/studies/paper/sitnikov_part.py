@@ -29,7 +29,7 @@ BLOWN = 1e3  # relative error of H of a run that has no meaning
 # Limits of the verdicts, each with what was measured.
 ALIKE = 0.05  # of the amplitude: two motions that differ by less look the same in a figure; 0.30
 IN_BOUNDS = 1.02  # of the true amplitude; 1.003
-ROUND_OFF = 1e-12  # of Gauss's angular momentum 1.9e-15; of the plane 3.7e-3, of the true one's 3.8e-3
+ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, in truth 3.8e-3
 WITH_THE_ORDER = 10.0  # times as much turning at h = 1/2 as at 1/8; 202
 CRITICAL = 0.725  # the paper's critical eccentricity
 

@@ -44,16 +44,11 @@ class Row:
 
 
 Found = tuple[dict[str, float], str]  # the numbers, and how it ended
+Columns = Mapping[str, tuple[str, Callable[[float], str]]]  # head: name of the number, how it is written
 
 
-def table(
-    key: str,
-    rows: Mapping[str, Row],
-    columns: Mapping[str, tuple[str, Callable[[float], str]]],
-    title: str,
-    note: str,
-) -> Table:
-    """Return what came out; a column has its head, the name of its number, and how that is written."""
+def table(key: str, rows: Mapping[str, Row], columns: Columns, title: str, note: str) -> Table:
+    """Return the table of what came out."""
 
     def cells(row: Row) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
@@ -127,5 +122,5 @@ def _ended(solution: Solution) -> str:
 PLACES: dict[str, tuple[Callable[[MethodBase, Problem], Found], Callable[[], Problem]]] = {
     "sitnikov": (_on_sitnikov, sitnikov.problem),
     "henon-heiles": (_on_henon_heiles, partial(henon_heiles.start, HENON_SPAN)),
-    "period-annulus": (_on_period_annulus, period_annulus.period_annulus),
+    "period-annulus": (_on_period_annulus, lambda: period_annulus.PROBLEM),
 }
