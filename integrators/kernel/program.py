@@ -25,7 +25,7 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.step.rule import FINE, LOG_REST, LOG_REST_FINE, TOLERANCE
+from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, TOLERANCE
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
@@ -403,7 +403,7 @@ class AdaptiveProgram(HBVMProgram):
         context = super()._context(side=True)  # with a matrix of its own
         context.point({"estimators": self._estimators, "extrapolation": self._onward})
         context.varying = 1
-        context.log_rest = LOG_REST_FINE if self.tol <= FINE else LOG_REST
+        context.log_rest = LOG_REST_VARYING
         context.error_degree = self.degree
         context.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None

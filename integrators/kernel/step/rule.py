@@ -23,13 +23,12 @@ FALL = 1e15
 # than rounding adds; with 1e-18 nothing is seen of it. But with 1e-18 an oscillator's energy falls by 2.1e-19
 # of itself in each step of length 0.5 (HBVM(8, 4), 48 starts, +- 0.1e-19); with 3e-19 it rises by 0.3e-19,
 # for a sweep in thirty more, and with 1e-19 nothing is seen, for one in twelve.
-LOG_REST = log2(3e-19)
-# Steps of varying length at the finest tolerances are longer and fewer. With 3e-17 they take a sweep in ten
-# less than with 1e-18, and the energy of 48 outer Solar Systems moves as little in 3e4 steps (rms 4.3e-14
-# and 4.1e-14), as that of Kepler's and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose
-# 1e-18 in each step, with 3e-15 3 to 8e-18. At looser tolerances steps are longer still, and the energy is
-# what is kept: with 3e-17 a pendulum's grows by 2.3e-18 in each step of HBVM(12, 6) at 1e-8, and not else.
-FINE, LOG_REST_FINE = 1e-15, log2(3e-17)
+# Steps of varying length are longer and fewer. With 3e-17 they take a sweep in ten less than with 1e-18, and
+# the energy of 48 outer Solar Systems moves as little in 3e4 steps (rms 4.3e-14 and 4.1e-14), as that of
+# Kepler's and Henon and Heiles' problems does in 1e5 to 3e5. With 3e-16 these lose 1e-18 in each step, with
+# 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of
+# HBVM(12, 6) at 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
+LOG_REST, LOG_REST_VARYING = log2(3e-19), log2(3e-17)
 
 # --- sizes of blocks, which changes are relative to -------------------------------------------------
 
