@@ -12,7 +12,7 @@ import typer
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
-from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
+from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
@@ -67,7 +67,7 @@ def run(
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step, reference)
-    campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
+    campaign = quick_run(campaign) if quick else campaign
     campaign = opened(campaign, name)
     if report_to is not None:
         ensure_writable(report_to, keep=False)

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from hbvm_bench.campaign.file import Campaign, load
-from hbvm_bench.campaign.shorter import chosen
+from hbvm_bench.campaign.shorter import chosen, with_rounds
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store import kept
@@ -77,12 +75,9 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
     problems.errors.InputError
         For an unknown name, or fewer than two rounds.
     """
-    made = chosen(load(NAME), list(names))
-    if rounds is None:
-        return made
-    if rounds < 2:
+    if rounds is not None and rounds < 2:
         raise InputError(f"rounds must be at least 2, not {rounds}.")
-    return replace(made, timing=replace(made.timing, rounds=rounds))
+    return with_rounds(chosen(load(NAME), list(names)), rounds)
 
 
 def keep(run: Kept, directory: Path) -> None:

@@ -1,7 +1,7 @@
 """The report of `endure`, from the stored result alone."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,7 @@ from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look, looks
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.store.records import Law
-from hbvm_bench.studies.endure.law import goals, lines, mean_in_words, rate_in_words
-from hbvm_bench.studies.endure.runs import Endurance
+from hbvm_bench.studies.endure.runs import Endurance, goals, lines
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.laws import power_of
 from hbvm_bench.summaries.rows import seconds
@@ -70,8 +69,8 @@ def tables(result: Endurance) -> list[Table]:
                 *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
                 NONE if law is None else _named(law),
                 NONE if law is None or not law.law else power_of(law),
-                NONE if law is None or law.mean is None else mean_in_words(law),
-                NONE if law is None or law.rate is None else rate_in_words(law),
+                NONE if law is None or law.mean is None else _mean(law),
+                NONE if law is None or law.rate is None else _rate(law),
                 NONE if line.seconds is None else seconds(line.seconds),
                 NONE if line.times_ours is None else f"{line.times_ours:.3g}",
             )
@@ -101,6 +100,18 @@ def _named(law: Law) -> str:
     return drift.LAWS[law.law].removeprefix("grows like ") if law.law else law.why
 
 
+def _mean(law: Law) -> str:
+    """Return the mean over the starts with its standard error and the count of signs."""
+    spread = "" if law.mean_error is None else f" ± {law.mean_error:.1e}"
+    return f"{law.mean:+.1e}{spread} ({law.positive} of {law.starts} positive)"
+
+
+def _rate(law: Law) -> str:
+    """Return the mean drift per year with its interval, which one start does not have."""
+    bare = law.rate_low is None or law.rate_high is None
+    return f"{law.rate:+.1e}" + ("" if bare else f" ({law.rate_low:+.1e} to {law.rate_high:+.1e})")
+
+
 @styled
 def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
@@ -108,7 +119,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
     if not shown:
         return None
-    values = np.concatenate([drift.rms(errors) for _, errors in shown])
+    values = np.array([drift.rms(errors) for _, errors in shown])
     positive = values[values > 0.0]
     low = math.floor(math.log10(positive.min())) if positive.size else -17
     high = math.ceil(math.log10(positive.max())) if positive.size else -14
@@ -117,13 +128,14 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
     log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
     log_axis(axes, "y", low, max(high, low + 1))
-    for method, errors in shown:
-        colour, dash = look[method].light, look[method].dash
+    found, traces = {line.method: line for line in lines(result)}, []
+    for (method, errors), rms in zip(shown, values, strict=True):
+        number, colour, dash = look[method].number, look[method].light, look[method].dash
         for row in np.abs(errors):
             axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
         axes.plot(
             t,
-            drift.rms(errors),
+            rms,
             color=colour,
             dashes=dash or (None, None),
             marker=look[method].marker,
@@ -132,15 +144,22 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
             linewidth=1.6,
             label=method,
         )
+        traces.append(Trace(number, method, t, np.where(rms > 0.0, rms, np.nan)))
+        law = found[method].drift
+        if law is not None and law.law is not None:
+            at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
+            traces.append(Trace(number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law]))
     guide = t[t >= t[-1] / 1e3]
     axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
     axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
-    axes.set(xlabel="years", title="relative energy error, root mean square over the starts")
+    title = "relative energy error, root mean square over the starts"
+    axes.set(xlabel="years", title=title)
     axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
         f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
-        for line in lines(result)
+        for line in found.values()
     )
+    vertical = Axis("rms of the relative energy error", log=True)
     return picture(
         figure,
         "endure",
@@ -148,26 +167,5 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         "Thick: root mean square over the starts; thin: every start. The grey line grows like the square "
         "root of time, as unbiased round-off does.",
         said,
-        Plot([_panel(result, shown, look)]),
-    )
-
-
-def _panel(result: Endurance, shown: Sequence[tuple[str, Array]], look: Mapping[str, Look]) -> Panel:
-    t = result.t
-    found = {line.method: line.drift for line in lines(result)}
-    traces = []
-    for method, errors in shown:
-        rms = drift.rms(errors)
-        traces.append(Trace(look[method].number, method, t, np.where(rms > 0.0, rms, np.nan)))
-        law = found[method]
-        if law is not None and law.law is not None:
-            at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
-            traces.append(
-                Trace(look[method].number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law])
-            )
-    return Panel(
-        "relative energy error, root mean square over the starts",
-        Axis("years", log=True, both=True),
-        Axis("rms of the relative energy error", log=True),
-        traces,
+        Plot([Panel(title, Axis("years", log=True, both=True), vertical, traces)]),
     )

@@ -1,4 +1,4 @@
-"""The campaign that `endure` runs, and what its page is drawn from."""
+"""The campaign that `endure` runs, and what is read off its trajectories: errors, laws, times, goals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import drift, reading
 from hbvm_bench.measure.starts import PERTURBATION
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Law
 from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.goals import Verdict, verdicts
+from hbvm_bench.summaries.points import number
 
 Array = NDArray[np.float64]
 
@@ -101,3 +105,60 @@ def read(directory: Path) -> Endurance:
         t=times[0] if times else np.empty(0),
         errors={method: one["drift.energy"] for method, one in series.items() if "drift.energy" in one},
     )
+
+
+@dataclass(frozen=True)
+class Line:
+    """One method.
+
+    Attributes
+    ----------
+    method : str
+        As it prints.
+    starts, failed : int
+        Trajectories that finished and that did not.
+    rms : dict of float to float
+        Root mean square over the starts of the relative energy error, by time in years.
+    drift : Law or None
+        Of its error; ``None`` without a finished trajectory.
+    seconds : float or None
+        Median of the trajectories.
+    times_ours : float or None
+        Seconds over ours.
+    """
+
+    method: str
+    starts: int
+    failed: int
+    rms: dict[float, float]
+    drift: Law | None
+    seconds: float | None
+    times_ours: float | None
+
+
+def lines(result: Endurance) -> list[Line]:
+    """Return one line per method, in the order of declaration."""
+    ours = standings.best(standings.among(result.run.records, ""), {})
+    years = sorted({*DECADES, result.years}.intersection(result.t.tolist()))
+    made = []
+    for record in result.run.records:
+        errors = result.errors.get(record.case.method, np.empty((0, 0)))
+        rms = drift.rms(errors[:, np.isin(result.t, years)]).tolist() if errors.size else []
+        ratio = standings.compare(ours, record).ratio
+        made.append(
+            Line(
+                method=record.case.method,
+                starts=len(errors),
+                failed=max(result.starts, 1) - len(errors),
+                rms=dict(zip(years, rms, strict=False)),
+                drift=record.result.laws.get("energy") if errors.size else None,
+                seconds=number(record, standings.TIME),
+                times_ours=ratio.median if ratio else None,
+            )
+        )
+    return made
+
+
+def goals(result: Endurance) -> list[Verdict]:
+    """Return the verdicts on what was asked for; none for a span short of a million years."""
+    return verdicts(result.run.index.campaign, result.run.records)

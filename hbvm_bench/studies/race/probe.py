@@ -74,13 +74,15 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 def load_probes(path: Path) -> list[Probe]:
-    """Read the compile times that were measured.
+    """Read the compile times that were measured; none where there is no file.
 
     Raises
     ------
     problems.errors.InputError
         If the file is something else.
     """
+    if not path.is_file():
+        return []
     try:
         return decoded(path.read_bytes(), list[Probe])
     except (OSError, msgspec.MsgspecError, ValueError) as error:

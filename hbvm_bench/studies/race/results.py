@@ -193,7 +193,7 @@ def by_kind(directory: Path) -> dict[str, list[Race]]:
 
 def _in(directory: Path) -> list[Race]:
     runs = kept.load(directory / FILE, NAME) if (directory / FILE).is_file() else []
-    probes = load_probes(directory / PROBES) if (directory / PROBES).is_file() else []
+    probes = load_probes(directory / PROBES)
     found = {race.key: race for run in runs for race in _races(run, probes)}
     order = [name_of(entry) for entry in declared().entries()]
     return sorted(found.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))

@@ -72,7 +72,7 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
         assert {one.repeats for one in side.timing.rounds} == {1}
     assert duel.ours.result.counters.steps < duel.theirs.result.counters.steps / 3
     assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
-    assert (duel.words == "reached") == (duel.ratio.median >= 1.5)
+    assert (duel.words == "reached") == (duel.ratio.median >= duel.goal)
     capsys.readouterr()
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     said = capsys.readouterr().err

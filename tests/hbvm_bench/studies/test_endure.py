@@ -17,7 +17,7 @@ from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.report.write import write
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.store.store import Index, Store
-from hbvm_bench.studies.endure import law, report, runs
+from hbvm_bench.studies.endure import report, runs
 from problems.errors import InputError
 
 OURS = "Gauss(s=8, h=1.0)"
@@ -85,7 +85,7 @@ def test_samples_are_whole_years_with_the_powers_of_ten():
 
 
 def goals_of(result, method):
-    return [goal for goal in law.goals(result) if goal.words.startswith(method)]
+    return [goal for goal in runs.goals(result) if goal.words.startswith(method)]
 
 
 def test_goals_are_reached_by_an_unbiased_walk_and_missed_by_a_biased_one(tmp_path):
@@ -104,7 +104,7 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     small, within = goals_of(result, "a year's step")
     assert (small.reached, within.reached) == (True, False)
     assert float(within.measured) > 2.0  # measured 3.2 times what is called a drift
-    ours, _ = law.lines(result)
+    ours, _ = runs.lines(result)
     assert ours.drift is not None
     assert ours.drift.law == "drift"
     (table, _) = report.tables(result)
@@ -125,11 +125,11 @@ def test_the_stored_report_and_the_readme_say_the_same():
 
 
 def test_a_short_run_has_no_goals(tmp_path):
-    assert law.goals(made(tmp_path, years=1e4)) == []
+    assert runs.goals(made(tmp_path, years=1e4)) == []
 
 
 def test_the_lines_have_rms_law_and_speed(tmp_path):
-    ours, peer = law.lines(made(tmp_path))
+    ours, peer = runs.lines(made(tmp_path))
     assert set(ours.rms) == {1e4, 1e5, 1e6}
     assert ours.drift is not None
     assert ours.drift.law == "square root"
@@ -152,7 +152,7 @@ def test_a_failed_trajectory_is_counted_and_not_averaged(tmp_path):
     _, peer = store.records()
     series = store.series(peer.id)
     store.save(peer, {**series, "drift.energy": series["drift.energy"][:2]})
-    assert [(line.starts, line.failed) for line in law.lines(runs.read(tmp_path))] == [(3, 0), (2, 1)]
+    assert [(line.starts, line.failed) for line in runs.lines(runs.read(tmp_path))] == [(3, 0), (2, 1)]
 
 
 def test_the_report_names_what_was_run_and_is_deterministic(tmp_path):
