@@ -204,14 +204,21 @@ def _value(number: float | str) -> Value:
 
 def _peak_gib(fork: _Fork) -> float:
     """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
-    untouched = 0 if fork.found == "nothing" else _mapped(fork.parent) - _mapped(os.getpid())
+    untouched = 0
+    if fork.found != "nothing":
+        theirs, ours = (kibibytes(pid).get("RssFile", 0) for pid in (fork.parent, os.getpid()))
+        untouched = theirs - ours
     return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + max(untouched, 0)) / 2**20
 
 
-def _mapped(pid: int) -> int:
-    """Return how much of files is in the resident memory of a process, in KiB."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
+def kibibytes(pid: int) -> dict[str, int]:
+    """Return what the system says of the memory of a process, such as ``VmRSS``; nothing if it has ended."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return {}
+    words = (line.split() for line in status.splitlines() if line.endswith(" kB"))
+    return {name.rstrip(":"): int(size) for name, size, _ in words}
 
 
 def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:

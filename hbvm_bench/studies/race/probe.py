@@ -110,19 +110,17 @@ def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Pr
 
 
 def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
-    empty: list[tuple[float, Answer]] = []
-    kernel: list[tuple[float, Answer]] = []
-    full: list[tuple[float, Answer]] = []
+    found: dict[str, list[tuple[float, Answer]]] = {"empty": [], "kernel": [], "full": []}
     try:
         for _ in range(TIMES):
             with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
-                empty.append(_ask(problem, method, Path(cache)))
-                full.append(_ask(problem, method, Path(cache)))
+                found["empty"].append(_ask(problem, method, Path(cache)))
+                found["full"].append(_ask(problem, method, Path(cache)))
             if family == OURS:
                 with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
                     _ask(OTHER, method, Path(cache))
-                    kernel.append(_ask(problem, method, Path(cache)))
-            if empty[0][0] > SLOW:
+                    found["kernel"].append(_ask(problem, method, Path(cache)))
+            if found["empty"][0][0] > SLOW:
                 break
     except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
         reason = f"the process that compiles {method} failed: {type(error).__name__}"
@@ -138,7 +136,7 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
             from_cache=answers[0][1].from_cache,
             reason=answers[0][1].refused,
         )
-        for caches, answers in (("empty", empty), ("kernel", kernel), ("full", full))
+        for caches, answers in found.items()
         if answers
     ]
 
