@@ -114,20 +114,14 @@ def find(spec: Spec) -> Problem | None:
 
 
 def read(text: str) -> Problem:
-    """Run the Python file of a problem, and return the problem.
-
-    Parameters
-    ----------
-    text : str
-        ``"mine.py:swing(g=1.1)"``; the file may lie anywhere.
+    """Run the Python file of a problem, such as ``mine.py:swing(g=1.1)``, and return the problem.
 
     Raises
     ------
     problems.errors.InputError
         If there is no such file, name or argument, if the file raises, or gives no problem.
     """
-    spec = parse_spec(text)
-    return _Files(None).problem(spec)
+    return _Files(None).problem(parse_spec(text))
 
 
 def is_file(text: str) -> bool:
@@ -138,15 +132,8 @@ def is_file(text: str) -> bool:
 def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None]) -> Campaign:
     """Return a campaign whose problems from Python files are kept as formulas; the files are run.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    folder : Path or None
-        Where the campaign's file lies, beside which the Python files must lie. ``None``: they may
-        lie anywhere.
-    tell : callable
-        Called with the name of each file before it is run.
+    The Python files must lie in ``folder``, beside the campaign's, or without one anywhere; ``tell``
+    is called with the name of each before it is run.
 
     Raises
     ------
@@ -182,13 +169,7 @@ def _kept(entry: ProblemEntry, files: "_Files") -> list[ProblemEntry]:
 
 
 class _Files:
-    """Python files, each of which is run once.
-
-    Parameters
-    ----------
-    folder : Path or None
-        The folder in which they must lie; ``None``: anywhere.
-    """
+    """Python files, each of which is run once; they must lie in ``folder``, if there is one."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder

@@ -12,7 +12,7 @@ from rich.text import Text
 import integrators.registry
 import problems
 from hbvm_bench.campaign.file import load, shipped
-from hbvm_bench.campaign.identity import version_of_library
+from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import terminal
 from hbvm_bench.store.records import Record
@@ -89,7 +89,7 @@ def _method(name: str) -> tuple[str, ...]:
         return name, NONE, NONE, f"cannot be imported: {error}"
     said = (inspect.getdoc(cls) or "").partition("\n")[0]
     options = {field.name: field.default for field in dataclasses.fields(cls)}
-    return _call(cls.__name__, options), cls.library, version_of_library(cls.library), said
+    return _call(cls.__name__, options), cls.library, version_of(cls.library), said
 
 
 def _metrics() -> Table:

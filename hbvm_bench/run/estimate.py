@@ -35,21 +35,10 @@ class Estimate:
     def left(
         self, waiting: Sequence[str], running: Mapping[str, float], slots: int
     ) -> tuple[float, float] | None:
-        """Return the range of seconds until all is done.
+        """Return the range of seconds until all is done, ``None`` where too little is known.
 
-        Parameters
-        ----------
-        waiting : sequence of str
-            Ids of cases that have not begun; one that comes twice is run twice.
-        running : mapping of str to float
-            Ids of those that run, and their seconds so far.
-        slots : int
-            Cases side by side.
-
-        Returns
-        -------
-        low, high : float
-            Or ``None`` where too little is known.
+        ``waiting`` has the ids of cases that have not begun, as often as each is to run; ``running`` the
+        seconds of the others so far; ``slots`` run side by side.
         """
         means = {key: self._mean(key) for key in {*waiting, *running}}
         if slots < 1 or None in means.values():

@@ -91,16 +91,9 @@ class _Fork(NamedTuple):
 
 
 def work(path: Path, parent: int, found: Found = "nothing") -> None:
-    """Do what a request asks, as the only thing that this process does.
+    """Do what the request at a path asks, as the only thing that this process does.
 
-    Parameters
-    ----------
-    path : Path
-        Of the request.
-    parent : int
-        The process that has made this one: without it there is nobody to answer.
-    found : {"nothing", "libraries", "code"}
-        What this process has not loaded itself but found loaded, being a fork of ``parent``.
+    It ends with ``parent``, which has made it. What it has ``found`` loaded, as a fork of it, is not counted.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     own.learn(request.beside)

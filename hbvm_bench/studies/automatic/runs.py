@@ -81,16 +81,7 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
 
 
 def keep(run: Kept, directory: Path) -> None:
-    """Write a run beside those of other kinds of processor.
-
-    Problems that were not run this time are kept from the file of the same kind, with the
-    machine, the versions, the command and the date that they were measured with.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory cannot be written, or what lies there is no result.
-    """
+    """Write a run beside those of other kinds of processor; see `hbvm_bench.store.kept.keep`."""
     kept.keep(run, directory / f"{machine.kind(run.machine)}.json", NAME)
 
 

@@ -25,15 +25,7 @@ SECONDS = "seconds for the whole span (median)"
 
 @styled
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
-    """Draw errors against time; ``None`` without a setting that may be compared.
-
-    Parameters
-    ----------
-    race : Race
-        Results of one contest.
-    look : mapping of str to Look
-        By a method's name.
-    """
+    """Draw errors against time; ``None`` without a setting that may be compared."""
     counted = ((row, [one for one in records if counts(one)]) for row, records in race.rows.items())
     rows = {row: records for row, records in counted if records}
     if not rows:

@@ -90,16 +90,9 @@ def load_probes(path: Path) -> list[Probe]:
 
 
 def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Probe]:
-    """Measure the compile times of a problem.
+    """Measure the compile times of a problem, called ``name`` in the race; ``h`` is a step for our method.
 
-    Parameters
-    ----------
-    name, problem : str
-        What the race calls it, and as it prints.
-    h : float
-        A step for our method.
-    families : sequence of str
-        Which families; those that compile nothing are left out.
+    Families that compile nothing are left out.
     """
     return [
         made

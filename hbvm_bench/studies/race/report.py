@@ -56,15 +56,7 @@ RULES = tuple(" ".join(paragraph.split()) for paragraph in RULES_TEXT.strip().sp
 
 
 def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None = None) -> Document:
-    """Return the report.
-
-    Parameters
-    ----------
-    races : sequence of Race
-        One per contest.
-    others : mapping of str to sequence of Race, optional
-        All that was measured, by the kind of processor.
-    """
+    """Return the report on some races, beside all that was measured by the kind of processor."""
     look = looks(family_of(one) for race in races for one in race.records)
     in_order = sorted(races, key=lambda race: race.started)
     last = in_order[-1]
