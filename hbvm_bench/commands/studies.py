@@ -20,9 +20,6 @@ from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.store import kept
 from hbvm_bench.store.files import ensure_writable, write_json
-from hbvm_bench.studies.automatic import runs as duels
-from hbvm_bench.studies.endure import runs as endurance
-from hbvm_bench.studies.endure.runs import Endurance
 from hbvm_bench.studies.race import results, tables
 from hbvm_bench.studies.race.families import FIXED, OURS, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes, probe
@@ -164,6 +161,9 @@ def endure(
     redraw: Redraw = False,
 ) -> None:
     """Follow the energy error of the outer Solar System over a million years, ours beside the peers'."""
+    from hbvm_bench.commands.publishing import publish  # what draws costs seconds to import
+    from hbvm_bench.studies import endure as endurance
+
     directory = out or Path("runs") / ("endure-quick" if quick else "endure")
     if not redraw:
         span = years if years is not None else endurance.QUICK_YEARS if quick else None
@@ -174,27 +174,19 @@ def endure(
         asked = endurance.campaign(span, starts or (endurance.QUICK_STARTS if quick else None), method)
         carry_out(asked, directory, as_typed(context))
     result = endurance.read(directory)
-    from hbvm_bench.commands.publishing import publish
-    from hbvm_bench.studies.endure import report
-
     if as_json:
-        terminal.print_json(_endurance_as_data(result))
-    else:
-        for table in report.tables(result):
-            terminal.print_table(table)
-        terminal.console().print(machine.sentence(result.run.machine), highlight=False)
-    publish(report.document(result), directory)
-
-
-def _endurance_as_data(result: Endurance) -> dict[str, Any]:
-    return {
-        "lines": [
+        lines = [
             msgspec.to_builtins(line) | {"rms": {f"{year:g}": value for year, value in line.rms.items()}}
             for line in endurance.lines(result)
-        ],
-        "goals": goals.as_data(endurance.goals(result)),
-        "result": run_as_json(result.run.index, result.run.records),
-    }
+        ]
+        verdicts = goals.as_data(endurance.goals(result))
+        run = run_as_json(result.run.index, result.run.records)
+        terminal.print_json({"lines": lines, "goals": verdicts, "result": run})
+    else:
+        for table in endurance.tables(result):
+            terminal.print_table(table)
+        terminal.console().print(machine.sentence(result.run.machine), highlight=False)
+    publish(endurance.document(result), directory)
 
 
 def automatic(
@@ -225,7 +217,8 @@ def automatic(
     if general:
         _general(context, problems or [], limit)
         return
-    from hbvm_bench.studies.automatic import report
+    from hbvm_bench.commands.publishing import publish  # what draws costs seconds to import
+    from hbvm_bench.studies import automatic as duels
 
     if not redraw:
         campaign = duels.campaign(problems or [], rounds)
@@ -234,7 +227,7 @@ def automatic(
             ensure_writable(out)
         store = carry_out(campaign, Path("runs") / ("automatic" + "-avx2" * avx2), as_typed(context))
         run = kept.of(store, duels.NAME, reading.records(store))
-        terminal.print_table(report.sides(duels.duels(run)))
+        terminal.print_table(duels.sides(duels.duels(run)))
         terminal.console().print(machine.sentence(run.machine), highlight=False)
         if out is None:
             return
@@ -243,9 +236,7 @@ def automatic(
     found = duels.by_kind(out)
     if not found:
         raise InputError(f"there is no result of automatic in {str(out)!r}; run it with --out first.")
-    from hbvm_bench.commands.publishing import publish
-
-    publish(report.document(found), out)
+    publish(duels.document(found), out)
 
 
 def _general(context: typer.Context, names: list[str], limit: float) -> None:
