@@ -242,4 +242,4 @@ def test_the_second_program_of_a_system_costs_no_compilation(henon_heiles):
     HBVM(k=4, s=2, h=0.1).compile(henon_heiles.system)
     program = HBVM(k=8, s=3, h=0.2).compile(henon_heiles.system)
     assert program.from_cache
-    assert program.compile_seconds < 0.1
+    assert program.compile_seconds < 1.0  # measured 0.06; compiling takes 5 s

@@ -274,14 +274,14 @@ class TestSignals:
         assert words[0] == "interrupted"
         assert int(words[1]) > 100
         # Measured 0.1 to 0.25 s, with the end of the process. A busy machine may take longer.
-        assert seconds < 2.0
+        assert seconds < 10.0
 
     def test_ctrl_c_while_events_are_looked_for(self, path):
         out, seconds = self.child(path, signal.SIGINT, events="events=lambda q: q[0],")
         words = out.split()
         assert words[0] == "interrupted"
         assert int(words[1]) > 100
-        assert seconds < 2.0  # as above
+        assert seconds < 10.0  # as above
 
     def test_kill_leaves_a_whole_file(self, path):
         self.child(path, signal.SIGKILL)

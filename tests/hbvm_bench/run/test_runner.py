@@ -247,7 +247,7 @@ def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
     supervise.stop_all()
     try:
         with pytest.raises(execute.InterruptedRunError):
-            future.result(timeout=10)
+            future.result(timeout=60)
     finally:
         supervise.allow()
         pool.shutdown()
