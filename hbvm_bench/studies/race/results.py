@@ -7,7 +7,6 @@
     DIR/campaign.json, cases/    the store of the run, as every campaign has it
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -170,17 +169,12 @@ def by_kind(directory: Path) -> dict[str, list[Race]]:
 
 
 def _in(directory: Path) -> list[Race]:
-    runs = kept.load(directory / FILE, NAME) if (directory / FILE).is_file() else []
     probes = load_probes(directory / PROBES)
-    found = {race.key: race for run in runs for race in _races(run, probes)}
+    found = {
+        name_of(entry): Race(entry, run, records, [one for one in probes if one.problem == name_of(entry)])
+        for run in kept.load(directory / FILE, NAME)
+        for entry, records in standings.entries(run.index.campaign, run.records)
+        if records
+    }
     order = [name_of(entry) for entry in declared().entries()]
     return sorted(found.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))
-
-
-def _races(run: Kept, probes: Sequence[Probe]) -> list[Race]:
-    made = []
-    for entry, records in standings.entries(run.index.campaign, run.records):
-        if records:
-            here = [one for one in probes if one.problem == name_of(entry)]
-            made.append(Race(entry, run, records, here))
-    return made
