@@ -39,24 +39,14 @@ GROWTH = 2**18  # KiB that a process may have grown by and still be forked from
 
 @dataclass
 class Nest:
-    """A process that has imported the libraries, and those that have done a case, one of each library.
+    """A process that has imported the libraries, and those that have done a case, one of each library."""
 
-    Attributes
-    ----------
-    place : object
-        The environment, the directory and the cores of its processes.
-    process : subprocess.Popen
-        The one that has imported the libraries.
-    asked : socket.socket
-        It is asked there.
-    done : dict of (str, socket.socket)
-        By library, the problem that the other process has done, and where to ask it.
-    """
-
-    place: object
+    place: object  # the environment, the directory and the cores of its processes
     process: "subprocess.Popen[bytes]"
     asked: socket.socket
-    done: dict[str, tuple[str, socket.socket]] = field(default_factory=dict)
+    done: dict[str, tuple[str, socket.socket]] = field(
+        default_factory=dict
+    )  # by library: problem, where to ask
 
     def start(self, path: Path, library: str, problem: str) -> "Fork":
         """Start the process of a request.

@@ -55,7 +55,6 @@ class Endurance:
     run: Kept
     t: Array
     errors: dict[str, Array]
-    perturbation: float = PERTURBATION
 
     @property
     def problem(self) -> str:
@@ -193,7 +192,7 @@ def document(result: Endurance) -> Document:
         [
             "How the energy error grows with time, ours beside the peers', in one run.",
             f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
-            f"position and momentum is changed by up to {result.perturbation} of itself "
+            f"position and momentum is changed by up to {PERTURBATION} of itself "
             "(`hbvm_bench.measure.starts`).",
         ],
         [
