@@ -255,7 +255,13 @@ def _fairness(runs: Sequence[Run], records: Sequence[Record]) -> Section:
     timing = dict.fromkeys(words.timing(one.timing) for one in campaigns if one.timing.rounds)
     rules = (
         *([drawn] if len(records) > DRAWN_CASES else []),
-        *(*words.RULES, *([words.ENDS] if ends else []), *timing, *fairness.sentences(records), *provenance.processors(records)),
+        *(
+            *words.RULES,
+            *([words.ENDS] if ends else []),
+            *timing,
+            *fairness.sentences(records),
+            *provenance.processors(records),
+        ),
     )
     settings = Table(
         "How many settings each method has",

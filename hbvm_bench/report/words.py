@@ -51,10 +51,10 @@ A case that stalls, runs out of time or memory, crashes or is refused is a row w
 numbers of the part that it did run are void.
 """
 TIMES = (
-    "Times are those of whole integrations without output, compiled before, with one thread on one core, in a "
-    "pass of their own with no other case running. {visits} {sample} The table gives the median and the "
-    "quartiles; all samples are in the store. Compilation is stated apart. Each library goes to the end in the "
-    "way of its own documentation; what the bench adds to its time is in a table below."
+    "Times are those of whole integrations without output, compiled before, with one thread on one core, in "
+    "a pass of their own with no other case running. {visits} {sample} The table gives the median and the "
+    "quartiles; all samples are in the store. Compilation is stated apart. Each library goes to the end in "
+    "the way of its own documentation; what the bench adds to its time is in a table below."
 )
 ENDS = "Where the campaign gives the end state itself, that stands in the place of the 128-bit solution."
 WEAKNESSES_TEXT = """
@@ -79,22 +79,19 @@ WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
 
 def timing(plan: TimingPlan) -> str:
     """Return how a campaign takes times."""
+    alike = ", so that a machine that changes its speed touches all alike."
     if plan.interleaved:
-        visits = (
-            f"One process takes all cases of a problem in turn, in {plan.rounds} rounds (slow cases in fewer), "
-            "so that a machine that changes its speed touches all alike."
-        )
-    elif plan.rounds == 1:
-        visits = "Every case is visited once, in a fresh process."
+        rounds = f"in {plan.rounds} rounds (slow cases in fewer)"
+        visits = f"One process takes all cases of a problem in turn, {rounds}{alike}"
+    elif plan.rounds > 1:
+        visits = f"Each of {plan.rounds} rounds visits every case once, in a fresh process{alike}"
     else:
-        visits = (
-            f"Each of {plan.rounds} rounds visits every case once, in a fresh process, so that a machine that "
-            "changes its speed touches all alike."
-        )
-    if plan.clock == "thread":
-        visits += " The seconds are those of the processor for this thread: waiting for others does not count."
-    single = plan.shortest < SHORTEST_RUN
-    sample = "A sample is one integration." if single else f"A sample lasts at least {seconds(plan.shortest)}."
+        visits = "Every case is visited once, in a fresh process."
+    if plan.interleaved and plan.clock == "thread":
+        visits += " The seconds are the processor's for this thread: waiting for others does not count."
+    sample = f"A sample lasts at least {seconds(plan.shortest)}."
+    if plan.shortest < SHORTEST_RUN:
+        sample = "A sample is one integration."
     return TIMES.format(visits=visits, sample=sample)
 
 

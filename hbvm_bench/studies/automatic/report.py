@@ -8,6 +8,7 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Block, Document, Files, Note, Section, attempt
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.studies.automatic.runs import Duel, duels
+from hbvm_bench.summaries import fairness
 from hbvm_bench.summaries.rows import format_metric
 from hbvm_bench.summaries.table import Table
 
@@ -48,7 +49,7 @@ def document(results: Mapping[str, Sequence[Kept]]) -> Document:
 def _run(run: Kept) -> list[Block]:
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     return [
-        Note(machine.sentence(run.machine)),
+        Note(" ".join([machine.sentence(run.machine), *fairness.beside(run.records)])),
         *attempt(("errors and times", partial(sides, duels(run)))),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
     ]
@@ -63,7 +64,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
     for key in dict.fromkeys(key for found in by_problem.values() for key in found):
         of_kind = [found.get(key) for found in by_problem.values()]
         known = [duel for duel in of_kind if duel is not None]
-        goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in known)
+        goals = dict.fromkeys(duel.goal for duel in known)
         settings = dict.fromkeys(duel.theirs.case.method for duel in known)
         rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
     return Table(
@@ -79,7 +80,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
 def _cell(duel: Duel | None) -> str:
     if duel is None:
         return "not run"
-    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}"
+    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}".strip()
 
 
 def sides(found: Sequence[Duel]) -> Table:
@@ -92,7 +93,7 @@ def sides(found: Sequence[Duel]) -> Table:
             rows.append(
                 (
                     duel.problem if first else "",
-                    f"≥ {duel.goal:g}" if first else duel.words,
+                    duel.goal if first else duel.words,
                     f"{ratio.median:.2f}" if first and ratio is not None else "",
                     spread if first and spread else "",
                     side.case.method,

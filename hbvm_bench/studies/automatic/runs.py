@@ -21,25 +21,30 @@ from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
+from hbvm_bench.summaries.points import accurate
 from hbvm_bench.summaries.rows import status_of
+from hbvm_bench.summaries.table import NONE
 from problems.errors import InputError
 
 NAME = "automatic"
+AGAINST = "Taylor"
+NO_WORSE = {"energy_max": 1.0, "position_mean": 1.0}
+"""Our errors are at most so many times theirs where a ratio is compared."""
 
 
 @dataclass(frozen=True)
 class Duel:
-    """What came out on one problem, against the goal on it.
+    """What came out on one problem, against the goal on it, where there is one.
 
     Attributes
     ----------
-    verdict : Verdict
-        On the goal.
+    verdict : Verdict or None
+        On the goal; ``None`` where none was declared.
     ours, theirs : Record
         Both cases, whether they are as accurate as was asked for or not.
     """
 
-    verdict: Verdict
+    verdict: Verdict | None
     ours: Record
     theirs: Record
 
@@ -49,9 +54,9 @@ class Duel:
         return self.theirs.case.problem
 
     @property
-    def goal(self) -> float:
+    def goal(self) -> str:
         """How many times as long the Taylor method should take."""
-        return self.verdict.goal.ratio or 0.0
+        return NONE if self.verdict is None else self.verdict.asked
 
     @property
     def ratio(self) -> Spread | None:
@@ -60,13 +65,14 @@ class Duel:
 
     @property
     def words(self) -> str:
-        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio."""
+        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio; ``""`` without a goal."""
         if self.ratio is None:
             return next(
                 (status_of(one) for one in (self.ours, self.theirs) if not one.timing), "not compared"
             )
-        accurate = self.verdict.comparison.ours is not None
-        return self.verdict.verdict if accurate else "not as accurate"
+        if not accurate(self.ours, standings.no_worse(self.theirs, NO_WORSE)):
+            return "not as accurate"
+        return "" if self.verdict is None else self.verdict.verdict
 
 
 def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
@@ -106,10 +112,10 @@ def by_kind(directory: Path) -> dict[str, list[Kept]]:
 
 def duels(run: Kept) -> list[Duel]:
     """Return what came out, problem by problem."""
-    found = []
-    for verdict in verdicts(run.index.campaign, run.records):
-        ours = standings.among(verdict.records, "")
-        theirs = standings.among(verdict.records, verdict.goal.against)
+    campaign, found = run.index.campaign, []
+    judged = {verdict.entry.use: verdict for verdict in verdicts(campaign, run.records)}
+    for entry, records in standings.entries(campaign, run.records):
+        ours, theirs = standings.among(records, ""), standings.among(records, AGAINST)
         if ours and theirs:
-            found.append(Duel(verdict, ours[0], theirs[0]))
+            found.append(Duel(judged.get(entry.use), ours[0], theirs[0]))
     return found
