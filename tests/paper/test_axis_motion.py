@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.studies.paper import axis_motion
+from hbvm_bench.studies.paper.experiments import axis_motion
 from hbvm_bench.studies.paper.sitnikov_part import chaotic_from
 from integrators import integrate
 from integrators.hbvm import HBVM
@@ -56,7 +56,7 @@ def test_an_offset_from_the_axis_grows_as_with_the_three_bodies():
 
 def test_the_first_eccentricity_whose_rate_no_longer_falls_is_found():
     def row(e, early, late, left=None):
-        return axis_motion.Growth(e=e, speed=0.5, along=[(70, early), (1000, late)], across=0.7, left=left)
+        return axis_motion.Growth(e=e, along=[(70, early), (1000, late)], across=0.7, left=left)
 
     regular, chaotic = row(0.5, 5e-3, 5e-4), row(0.9, 5e-3, 4e-3)
     assert chaotic_from([regular, chaotic]) == 0.9

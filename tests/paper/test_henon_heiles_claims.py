@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hbvm_bench.studies.paper import henon_heiles as experiment
+from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
 from hbvm_bench.studies.paper.henon_heiles_part import kept
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from hbvm_bench.studies.paper import properties
-from hbvm_bench.studies.paper.properties_part import COLLOCATED, MAPPED, PAIRS, REVERSED
+from hbvm_bench.studies.paper.experiments import properties
+from hbvm_bench.studies.paper.experiments.properties import PAIRS
 
 
 @pytest.fixture(scope="module")
 def conserved():
-    return {3: properties.conservation_cubic(), 5: properties.conservation_quintic()}
+    return {nu: properties.conservation(nu) for nu in (3, 5)}
 
 
 def test_the_order_is_2s_for_every_k():
@@ -17,12 +17,12 @@ def test_the_order_is_2s_for_every_k():
 
 
 def test_the_methods_are_symmetric():
-    for method in REVERSED:
-        assert properties.reversal(method) < 1e-13, method  # 6.7e-15 at most
+    for method, back in properties.reversals():
+        assert back < 1e-13, method  # 6.7e-15 at most
 
 
 def test_the_methods_are_perfectly_a_stable():
-    edge, inside = properties.stability(PAIRS)
+    edge, inside = properties.stability()
     assert edge < 1e-12  # 2.2e-14
     assert inside < 1.0  # 1 - 8e-11 close to the imaginary axis
 
@@ -42,14 +42,13 @@ def test_polynomial_energies_are_conserved_from_the_threshold_on(conserved, degr
 
 
 def test_the_block_size_is_s_whatever_k():
-    assert properties.ranks(PAIRS) == [s for _, s in PAIRS]
+    assert properties.ranks() == [s for _, s in PAIRS]
     counts = [count for _, count in properties.iterations()]
     assert max(counts) < 1.15 * min(counts)  # 12.2 to 12.6
 
 
 def test_the_extended_collocation_conditions_hold_from_the_threshold_on():
-    for k, s in COLLOCATED:
-        residual = properties.extended_collocation(k, s)
+    for k, s, residual in properties.extended():
         if 2 * k >= 5 * s:
             assert residual < 5e-14, (k, s)  # 5.3e-15 at most
         else:
@@ -57,9 +56,8 @@ def test_the_extended_collocation_conditions_hold_from_the_threshold_on():
 
 
 def test_gauss_is_symplectic_and_hbvm_is_not():
-    for method in MAPPED:
-        defect = properties.symplectic_defect(method)
-        if method.family == "gauss":
+    for method, defect in properties.defects():
+        if method.startswith("Gauss"):
             assert defect < 1e-11, method  # 7.3e-14
         else:
             assert defect > 1e-6, method  # 2.5e-5 at least

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import problems
-from hbvm_bench.studies.paper import sitnikov
-from hbvm_bench.studies.paper.axis_motion import Growth
-from hbvm_bench.studies.paper.sitnikov_figures import apocentres
-from hbvm_bench.studies.paper.sitnikov_part import beat, dynamics, kept, oscillates, trajectories
+from hbvm_bench.studies.paper.experiments import sitnikov
+from hbvm_bench.studies.paper.experiments.axis_motion import Growth
+from hbvm_bench.studies.paper.sitnikov_part import dynamics, kept, oscillates, trajectories
 from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -34,7 +33,7 @@ def test_the_verdict_on_the_planetoids_motion_follows_from_its_numbers(reached, 
 
 def verdicts(runs, steps):
     """Return the verdicts by the first words of the claims, from made-up scans for what is not varied."""
-    growth = [Growth(e, 1.0, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
+    growth = [Growth(e, [(70, 6e-3), (1000, 5e-4)], 0.8, None) for e in (0.7, 0.75)]
     found = [*trajectories(runs, [100.0] * 20 + [None] * 12), *dynamics(steps, growth)]
     return {claim.words[:14]: claim.verdict for claim in found}
 
@@ -95,7 +94,7 @@ def test_hbvm_has_a_bounded_oscillating_error_in_the_angular_momentum(runs, step
     half = error.size // 2
     assert error.max() == pytest.approx(3.39e-3, rel=0.01)  # 3.388e-3
     assert error[half:].max() == pytest.approx(error[:half].max(), rel=0.01)  # 3.388e-3 in both
-    period = beat(next(row for row in steps if row.family == "hbvm" and row.h == 0.5))
+    period = next(row for row in steps if row.family == "hbvm" and row.h == 0.5).beat
     assert period == pytest.approx(391, abs=3)  # 391.2; the dips of the error are 390, 780, 1180
     index = runs["hbvm"].t.searchsorted([period - 50, period + 50, 1.5 * period - 50, 1.5 * period + 50])
     assert error[index[0] : index[1]].min() < 1e-5  # 4e-6: the dip
@@ -110,9 +109,9 @@ def test_a_line_integral_method_keeps_both_laws(runs):
 
 
 def test_hbvm_preserves_the_apocentre_distance_and_gauss_does_not(runs):
-    low, high = apocentres(runs["hbvm"])
+    low, high = runs["hbvm"].apocentres
     assert 4.99 < low < high < 5.001  # 4.9943, 5.0000
-    low, high = apocentres(runs["gauss"])
+    low, high = runs["gauss"].apocentres
     assert high - low > 0.5  # 1.2 to 1.9
 
 

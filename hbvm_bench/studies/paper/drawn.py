@@ -12,20 +12,19 @@ from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.read_off import read_off
-from hbvm_bench.report.figures.style import TRUTH, looks
+from hbvm_bench.report.figures.style import looks
 from integrators.protocol import Array
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
-GAUSS, HBVM, MOTION = (look.light for look in LOOKS)
+COLOURS: dict[str, str] = dict(zip(("gauss", "hbvm", "motion"), (look.light for look in LOOKS), strict=True))
 NAMES = {1: "Gauss", 2: "HBVM", 3: "the motion itself"}
-FAMILIES = {"gauss": GAUSS, "hbvm": HBVM, "truth": TRUTH}
 SEQUENTIAL = LinearSegmentedColormap.from_list(
     "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
 WIDTH = 10.4  # inches, of a whole line
 P = ParamSpec("P")
-Said = tuple[str, str] | tuple[str, str, str, str]
+Said = tuple[str, str]  # a caption, and a summary for those who do not see the picture
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -47,15 +46,8 @@ def drawn(
 ) -> Callable[[Callable[Concatenate[Figure, P], Said]], Callable[P, Picture]]:
     """Have a function draw on an empty sheet, of which a picture is made; the same gives the same bytes.
 
-    Parameters
-    ----------
-    key, title : str
-        Of the picture; unless they follow from what is drawn: then the function returns both, before
-        the caption and the summary that every such function returns.
-    width, height : float
-        Of the sheet, in inches; it makes room for its labels.
-    values : bool
-        Whether colours mean values.
+    The sheet is ``width`` times ``height`` inches and makes room for its labels; ``values`` says whether
+    colours mean values.
     """
 
     def decorate(draw: Callable[Concatenate[Figure, P], Said]) -> Callable[P, Picture]:
@@ -64,10 +56,9 @@ def drawn(
         def made(*args: P.args, **kwargs: P.kwargs) -> Picture:
             figure = new(width, height)
             figure.set_layout_engine("constrained")
-            *named, caption, summary = draw(figure, *args, **kwargs)
-            key_, title_ = named or (key, title)
+            caption, summary = draw(figure, *args, **kwargs)
             plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
-            return picture(figure, key_, title_, caption, summary, plot, values=values)
+            return picture(figure, key, title, caption, summary, plot, values=values)
 
         return made
 
@@ -78,13 +69,13 @@ def heat(
     axes: Axes, x: Sequence[float] | Array, y: Sequence[float], values: Array, low: float, high: float
 ) -> QuadMesh:
     """Colour cells by the logarithm of their value, from ``low`` to ``high``; blank are those without."""
-    return axes.pcolormesh(
-        x,
-        y,
-        np.ma.masked_invalid(np.log10(values)),
-        cmap=SEQUENTIAL.reversed(),
-        vmin=low,
-        vmax=high,
-        shading="nearest",
-        rasterized=True,
-    )
+    axes.grid(visible=False)
+    logs = np.ma.masked_invalid(np.log10(values))
+    look = {"cmap": SEQUENTIAL.reversed(), "shading": "nearest", "rasterized": True}
+    return axes.pcolormesh(x, y, logs, vmin=low, vmax=high, **look)
+
+
+def legend_above(axes: Axes) -> None:
+    """Name the curves in a line above the axes, as wide as can be seen."""
+    for line in axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.02), ncols=2).get_lines():
+        line.set_linewidth(1.6)

@@ -9,7 +9,7 @@ import re
 import time
 import traceback
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,50 +31,33 @@ SCHEMA = 1
 
 @dataclass(frozen=True)
 class Task:
-    """One computation: a picklable call without arguments.
+    """One computation: a top-level function, or a `functools.partial` of one, that says what it returns."""
 
-    Attributes
-    ----------
-    key : str
-        Under which its result is found.
-    run : callable
-        A top-level function or a `functools.partial` of one, whose return type is annotated.
-    cost : float
-        Rough seconds, so that the long ones start first.
-    """
-
-    key: str
+    key: str  # under which its result is found
     run: Callable[[], Any]
-    cost: float = 1.0
+    cost: float = 1.0  # rough seconds, so that the long ones start first
+
+
+def each(key: str, run: Callable[..., Any], values: Iterable[Any], cost: float) -> list[Task]:
+    """Return the tasks, ``key value``, that each call a function with one of the values."""
+    return [Task(f"{key} {value}", functools.partial(run, value), cost) for value in values]
 
 
 def split(key: str, run: Callable[..., Any], values: Sequence[float], parts: int, cost: float) -> list[Task]:
     """Return the tasks, ``key 0`` to ``key parts-1``, that each call a function with a part of the values."""
-    pieces = np.array_split(np.asarray(values), parts)
-    return [Task(f"{key} {i}", functools.partial(run, one.tolist()), cost) for i, one in enumerate(pieces)]
+    pieces = [piece.tolist() for piece in np.array_split(np.asarray(values), parts)]
+    return [Task(f"{key} {i}", functools.partial(run, piece), cost) for i, piece in enumerate(pieces)]
 
 
 @dataclass(frozen=True)
 class Part:
-    """One of the paper's experiments.
-
-    Attributes
-    ----------
-    key, title : str
-        Its name on the command line, which is its anchor, and its heading.
-    runs : sequence of Task
-        The computations.
-    claims : callable
-        From their results to what the paper says and what came out.
-    blocks : callable
-        From their results to what makes each block that is shown.
-    """
+    """One of the paper's experiments, with its name on the command line and its heading."""
 
     key: str
     title: str
     runs: Sequence[Task]
-    claims: Callable[["Results"], list[Claim]]
-    blocks: Callable[["Results"], list[Maker]]
+    claims: Callable[["Results"], list[Claim]]  # what the paper says and what came out
+    blocks: Callable[["Results"], list[Maker]]  # what makes each block that is shown
 
     @property
     def tasks(self) -> list[Task]:
@@ -111,6 +94,10 @@ class Results:
             self.read[key] = self._one(key) if whole else [row for one in pieces for row in self._one(one)]
         return self.read[key]
 
+    def each(self, name: str, values: Iterable[Any]) -> dict[Any, Any]:
+        """Return what the tasks of `each` returned, by their values."""
+        return {value: self[f"{name} {value}"] for value in values}
+
     def _one(self, key: str) -> Any:
         if key not in self.kept.results:
             raise InputError(f"the computation {key!r} {self.kept.failed.get(key, 'was not run')}.")
@@ -120,22 +107,11 @@ class Results:
 def run_all(
     tasks: Sequence[Task], jobs: int, command: str, directory: Path, done: Callable[[str, str], None]
 ) -> Kept:
-    """Run all tasks; what each returns is kept at once, so that whatever ends this loses no other.
+    """Run tasks in so many processes, or here; keep each result at once, so that an end loses no other.
 
-    Where an earlier run of the same code did not come to its end, this one goes on.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        Independent of one another.
-    jobs : int
-        Processes side by side; 1 runs everything here.
-    command : str
-        What to print as the way to get it again.
-    directory : Path
-        Of the report; exists.
-    done : callable
-        Called with the key of each task and what to say of it when it has ended.
+    Where an earlier run of the same code did not come to its end, this one goes on. ``command`` is printed
+    as the way to get it all again, ``directory`` is the report's, and ``done`` is called with the key of
+    each task that has ended and what to say of it.
     """
     code = digest_of(tuple({function_of(task.run).__module__ for task in tasks}))
     kept = _unfinished(directory, tasks, code) or Kept({}, {}, command, code)
@@ -225,10 +201,9 @@ def _outcome(run: Callable[[], Any]) -> tuple[bytes, str, float]:
     try:
         return packed(run()), "", time.perf_counter() - start
     except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        why = (
-            f"failed with {type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
-        )
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"({Path(last.filename).name}, line {last.lineno})"
+        why = f"failed with {type(error).__name__}: {error} {where}"
         return b"", " ".join(why.split()), time.perf_counter() - start
 
 

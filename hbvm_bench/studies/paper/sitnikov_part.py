@@ -1,20 +1,20 @@
 """Sitnikov's problem in the report: what is computed, drawn and said."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import takewhile
 
 import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
-from hbvm_bench.report.figures.canvas import Picture
-from hbvm_bench.studies.paper import axis_motion, others, sitnikov
 from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_figures as figures
-from hbvm_bench.studies.paper.axis_motion import Growth
 from hbvm_bench.studies.paper.drawn import number
-from hbvm_bench.studies.paper.results import Part, Results, Task, split
-from hbvm_bench.studies.paper.sitnikov import Orbit, StepRow, usable
+from hbvm_bench.studies.paper.experiments import axis_motion, others, sitnikov
+from hbvm_bench.studies.paper.experiments.axis_motion import Growth
+from hbvm_bench.studies.paper.experiments.sitnikov import Orbit, StepRow
+from hbvm_bench.studies.paper.results import Part, Results, Task, each, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 
@@ -29,9 +29,7 @@ BLOWN = 1e3  # relative error of H of a run that has no meaning
 # Limits of the verdicts, each with what was measured.
 ALIKE = 0.05  # of the amplitude: two motions that differ by less look the same in a figure; 0.30
 IN_BOUNDS = 1.02  # of the true amplitude; 1.003
-ROUND_OFF = (
-    1e-12  # of Gauss's angular momentum 1.9e-15; of the plane 3.7e-3, where the true motion has 3.8e-3
-)
+ROUND_OFF = 1e-12  # Gauss's angular momentum 1.9e-15; the primaries' plane 3.7e-3, in truth 3.8e-3
 WITH_THE_ORDER = 10.0  # times as much turning at h = 1/2 as at 1/8; 202
 CRITICAL = 0.725  # the paper's critical eccentricity
 
@@ -41,14 +39,14 @@ def _runs() -> list[Task]:
         Task("orbits", sitnikov.orbits, 2),
         Task("ellipses", sitnikov.ellipses),
         Task("neighbours", sitnikov.neighbours),
-        *(Task(f"nodes {h}", partial(sitnikov.energy_by_nodes, h), 3) for h in NODE_STEPS),
+        *each("nodes", sitnikov.energy_by_nodes, NODE_STEPS, 3),
         Task("steps 2", partial(sitnikov.by_step, 2), 4),
         Task("steps 3", partial(sitnikov.by_step, 3, sitnikov.STEPS_SHORT), 4),
         Task("truth", sitnikov.against_truth, 2),
         *split("growth", axis_motion.growth_by_eccentricity, axis_motion.ECCENTRICITIES, 3, 15),
         Task("section", partial(axis_motion.section, sitnikov.E), 4),
         *split("stays", axis_motion.stays, axis_motion.MAP_ECCENTRICITIES, 4, 8),
-        *others.tasks(others.on_sitnikov, others.SITNIKOV, 6),
+        *each("other", partial(others.measured, "sitnikov"), others.SITNIKOV, 6),
     ]
 
 
@@ -56,31 +54,15 @@ def _blocks(results: Results) -> list[Maker]:
     def run(name: str) -> Orbit:
         return results["orbits"][name]
 
-    def thrown_out() -> Picture:
-        words = (
-            "Left: the primaries at every step. Right: the planetoid is thrown out; when, and whether "
-            f"it comes back once more, is decided by the last bit. {lost_words(results['neighbours'])}"
-        )
-        return figures.trajectories(run("gauss"), run("fine"), "gauss", 2, sitnikov.T_END, words)
-
-    def stays() -> Picture:
-        words = (
-            "Left: the primaries at every step, and one of them in its 1st, 16th and 31st revolution as "
-            "a line: the ellipses turn, the paper's sham rotation. Right: the planetoid on the paper's "
-            "range of time, over the true motion in grey."
-        )
-        lines: list[Array] = results["ellipses"]
-        return figures.trajectories(run("hbvm"), run("fine"), "hbvm", 3, figures.SHOWN, words, lines)
-
     return [
         ("the problem", lambda: PROBLEM),
         ("Figure 1", lambda: figures.configuration(run("fine"))),
-        ("Figure 2", thrown_out),
-        ("Figure 3", stays),
+        ("Figure 2", lambda: figures.thrown_out(run("gauss"), run("fine"), results["neighbours"])),
+        ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
-        ("both laws at once", lambda: _both(results["orbits"])),
-        ("nodes", lambda: beyond.by_nodes({h: results[f"nodes {h}"] for h in NODE_STEPS})),
+        ("both laws at once", lambda: _both_laws(results["orbits"])),
+        ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
         ("the table of steps", lambda: beyond.step_table(_steps(results))),
         ("the true trajectory", lambda: beyond.truth_compared(results["truth"])),
@@ -92,16 +74,17 @@ def _blocks(results: Results) -> list[Maker]:
 
 
 def _claims(results: Results) -> list[Claim]:
-    runs, lost, steps = results["orbits"], results["neighbours"], _steps(results)
+    runs, steps = results["orbits"], _steps(results)
     return [
-        *trajectories(runs, lost),
+        *trajectories(runs, results["neighbours"]),
         *laws(runs, steps, results[f"nodes {sitnikov.H}"]),
         *dynamics(steps, results["growth"]),
     ]
 
 
 def _steps(results: Results) -> list[StepRow]:
-    return [*results["steps 2"], *results["steps 3"][1:]]
+    """Return what Gauss and HBVM do with each step; the first row of either scan is the true motion."""
+    return [*results["steps 2"][1:], *results["steps 3"][1:]]
 
 
 def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> list[Claim]:
@@ -109,15 +92,19 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
     gauss, hbvm, truth = runs["gauss"], runs["hbvm"], runs["truth"]
     apart = np.abs(hbvm.z - truth.z)
     early = float(apart[hbvm.t <= figures.SHOWN].max())
-    spans = {family: figures.apocentres(runs[family]) for family in ("gauss", "hbvm")}
-    axis = max(hbvm.off_axis, gauss.off_axis)
+    spans = {family: runs[family].apocentres for family in ("gauss", "hbvm")}
+    axis, plane = max(hbvm.off_axis, gauss.off_axis), max(hbvm.plane, gauss.plane)
+    exact = "exactly 0, because rounding keeps the symmetry" if axis == 0 else number(axis)
+    moves = (
+        f", that of the true motion by {number(truth.plane)}: the planetoid's momentum is not balanced, "
+        "the barycentre moves"
+    )
     like = oscillates(hbvm.z, truth.z, early)
-    plane = max(hbvm.plane, gauss.plane)
     return [
         Claim(
             "Under Gauss of order four the planetoid eventually leaves the system",
             "Figure 2",
-            f"|z| > {sitnikov.LOST:g} at t = {number(gauss.lost)}. {lost_words(times)}",
+            f"|z| > {sitnikov.LOST:g} at t = {number(gauss.lost)}. {figures.lost_words(times)}",
             "holds" if times.count(None) * 2 < len(times) else "partly",
         ),
         Claim(
@@ -138,15 +125,8 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
         Claim(
             "Both methods leave the primaries' plane and the planetoid's axis invariant",
             "in the text",
-            "off the axis: "
-            + ("exactly 0, because rounding keeps the symmetry" if axis == 0 else number(axis))
-            + f". The plane drifts along z by up to {number(plane)}"
-            + (
-                f", that of the true motion by {number(truth.plane)}: the planetoid's momentum is not "
-                "balanced, the barycentre moves"
-                if plane > ROUND_OFF
-                else ""
-            ),
+            f"off the axis: {exact}. The plane drifts along z by up to {number(plane)}"
+            f"{moves if plane > ROUND_OFF else ''}",
             both(axis == 0, plane <= ROUND_OFF),
         ),
     ]
@@ -185,7 +165,7 @@ def laws(
             "Figure 5 right",
             f"at most {number(first, 3)} in the first half of the run and {number(second, 3)} in the "
             "second; they have the period of the beat between step and revolution, "
-            f"{beat(row(steps, 'hbvm', sitnikov.H)):.0f}",
+            f"{row(steps, 'hbvm', sitnikov.H).beat:.0f}",
             "holds" if second < 1.1 * first else "no",
         ),
     ]
@@ -198,6 +178,8 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
     order = float(np.polyfit(np.log([r.h for r in fits]), np.log([abs(r.turn) for r in fits]), 1)[0])
     at = min(growth, key=lambda found: abs(found.e - sitnikov.E))
     limit = chaotic_from(growth)
+    regular = limit is None or limit > sitnikov.E
+    largest = {family: kept(steps, family) for family in ("gauss", "hbvm")}
     return [
         Claim(
             "The large step causes a sham, uniform rotation that does not destroy the symmetry",
@@ -212,30 +194,19 @@ def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
             f"ē ≃ {CRITICAL}",
             f"with e = {sitnikov.E:g} an offset along the axis grows at a rate of {number(at.along[0][1])} "
             f"over {at.along[0][0]} revolutions and {number(at.along[-1][1])} over {at.along[-1][0]}, "
-            f"as for a {'regular' if limit is None or limit > sitnikov.E else 'chaotic'} orbit. "
+            f"as for a {'regular' if regular else 'chaotic'} orbit. "
             + (f"This start becomes chaotic at e ≈ {limit:g}. " if limit is not None else "")
             + f"Off the axis offsets grow by a factor e every {1 / at.across:.1f} units of time",
-            "no" if limit is None or limit > sitnikov.E else "holds",
+            "no" if regular else "holds",
         ),
         Claim(
             "HBVM allows larger steps than Gauss",
             "in the text",
-            f"the planetoid stays to t = 1500 for every h tried up to {kept(steps, 'hbvm'):g} with "
-            f"HBVM(18,2), up to {kept(steps, 'gauss'):g} with Gauss",
-            "holds" if kept(steps, "hbvm") > kept(steps, "gauss") else "no",
+            f"the planetoid stays to t = 1500 for every h tried up to {largest['hbvm']:g} with "
+            f"HBVM(18,2), up to {largest['gauss']:g} with Gauss",
+            "holds" if largest["hbvm"] > largest["gauss"] else "no",
         ),
     ]
-
-
-def lost_words(times: Sequence[float | None]) -> str:
-    """Return what neighbouring starts do, as a sentence: when they lose the planetoid, if they do."""
-    lost = sorted(time for time in times if time is not None)
-    if not lost:
-        return f"None of {len(times)} starts that differ in the last bits of e loses the planetoid."
-    return (
-        f"Of {len(times)} starts that differ in the last bits of e, {len(lost)} lose the planetoid, the "
-        f"first at t = {lost[0]:.0f}, the last at {lost[-1]:.0f}."
-    )
 
 
 def row(steps: Sequence[StepRow], family: str, h: float) -> StepRow:
@@ -255,16 +226,10 @@ def chaotic_from(growth: Sequence[Growth]) -> float | None:
     return None
 
 
-def beat(found: StepRow) -> float:
-    """Return after how long the steps fall on the same places of the revolution again."""
-    steps = found.period / found.h
-    return found.period / abs(steps - round(steps))
-
-
 def kept(steps: Sequence[StepRow], family: str) -> float:
     """Return the largest h up to which every step keeps the planetoid to the end."""
     rows = sorted((row for row in steps if row.family == family and row.s == 2), key=lambda row: row.h)
-    return max((row.h for row in takewhile(usable, rows)), default=0.0)
+    return max((row.h for row in takewhile(lambda row: row.usable, rows)), default=0.0)
 
 
 def oscillates(z: Array, true: Array, off: float) -> str:
@@ -280,12 +245,11 @@ def both(first: bool, second: bool) -> str:
     return "holds" if first and second else "partly" if first or second else "no"
 
 
-def _both(runs: dict[str, Orbit]) -> str | None:
+def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
     """Return what the method that keeps both laws does, where there is one."""
-    run = runs.get("both")
-    if run is None:
+    if "both" not in runs:
         return None
-    off = float(abs(run.z[-1] - runs["truth"].z[-1]))
+    run, off = runs["both"], float(abs(runs["both"].z[-1] - runs["truth"].z[-1]))
     axis = "exactly on the axis" if run.off_axis == 0 else f"{number(run.off_axis)} off the axis"
     return (
         f"Beyond the paper, both laws at once. `{run.method}` corrects the polynomial so that two line "
@@ -313,9 +277,10 @@ def _plainly(results: Results) -> str:
 
 
 def _others(results: Results) -> Table:
+    rows: dict[str, others.Row] = results.each("other", others.SITNIKOV)
     return others.table(
-        results,
-        others.SITNIKOV,
+        "sitnikov-others",
+        {text: replace(row, remark=row.remark or _remark(row.numbers)) for text, row in rows.items()},
         {
             "energy": ("energy", number),
             "angular momentum": ("momentum", number),
@@ -324,22 +289,18 @@ def _others(results: Results) -> Table:
             "evaluations": ("evaluations", "{:,.0f}".format),
         },
         "The same run with other integrators",
-        "One setting per method, chosen by us for accuracy. Evaluations: of the vector "
-        "field, where the library counts them. `hbvm-bench run sitnikov` has "
-        "all settings, with times. Off the axis the trajectory is another one, and its other numbers say "
-        "nothing.",
-        _remark,
+        "One setting per method, chosen by us for accuracy. Evaluations: of the vector field, where the "
+        "library counts them. `hbvm-bench run sitnikov` has all settings, with times. Off the axis the "
+        "trajectory is another one, and its other numbers say nothing.",
     )
 
 
-def _remark(row: others.Row) -> str:
-    if row.numbers.get("energy", 0.0) > BLOWN:
+def _remark(numbers: Mapping[str, float]) -> str:
+    if numbers.get("energy", 0.0) > BLOWN:
         return "blows up"
-    if row.numbers.get("off_axis", 0.0) > 1e-6:
+    if numbers.get("off_axis", 0.0) > 1e-6:
         return "thrown off the axis by asymmetric rounding"
-    if row.numbers.get("z", 0.0) > sitnikov.LOST:
-        return "loses the planetoid"
-    return ""
+    return "loses the planetoid" if numbers.get("z", 0.0) > sitnikov.LOST else ""
 
 
 PART = Part("sitnikov", "Sitnikov's problem", _runs(), _claims, _blocks)

@@ -12,8 +12,8 @@ from hbvm_bench.report.document import Claim, Claims, Document, Section
 from hbvm_bench.report.write import write
 from hbvm_bench.studies.endure import report as endure
 from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
-from hbvm_bench.studies.paper.properties import Order
-from hbvm_bench.studies.paper.properties_figures import order
+from hbvm_bench.studies.paper.experiments.properties import Order
+from hbvm_bench.studies.paper.properties_part import order
 from hbvm_bench.studies.race import report as race
 from hbvm_bench.summaries.table import Table
 from tests.hbvm_bench.studies import test_endure

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from integrators.protocol import Array, MethodBase, Stepper
 from problems import Problem
 
-Test = Callable[[Array], NDArray[np.bool_]]
-
+Test = Callable[[Array], NDArray[np.bool_]]  # from states (n, dim) to whether they hold
 GROWTH = 2.0  # of the stretches: short at first, so that an early departure costs little
 LONGEST = 4096.0  # stretch, in units of the first
 
@@ -17,28 +16,11 @@ LONGEST = 4096.0  # stretch, in units of the first
 def departure(
     stepper: Stepper, t_end: float, departed: Test, *, stretch: float, every: float | None = None
 ) -> float | None:
-    """Integrate until a state has departed; return the time of the first such state.
+    """Integrate until a state has departed; return the time of the first such state, or ``None``.
 
-    Parameters
-    ----------
-    stepper : Stepper
-        A trajectory under way.
-    t_end : float
-        How far to look.
-    departed : callable
-        From states (n, dim) to booleans (n,).
-    stretch : float
-        Length of the first stretch of time that is integrated without looking;
-        the next ones are longer.
-    every : float, optional
-        Look at states so far apart; by default at every step of the method, which
-        costs some libraries dear.
-
-    Returns
-    -------
-    float or None
-        ``None`` where nothing departed up to ``t_end``. A trajectory that its method
-        can follow no farther, as in a blow-up, has departed with its last state.
+    A trajectory that its method can follow no farther, as in a blow-up, has departed with its last state.
+    A stretch of time is integrated without looking, the next ones are longer; then states ``every`` so far
+    apart are looked at, by default all steps of the method, which costs some libraries dear.
     """
     longest = stretch * LONGEST
     ahead = stepper.t
@@ -47,9 +29,8 @@ def departure(
         if every is None:
             samples = stepper.advance(np.array([ahead]), sample="steps")
         else:
-            samples = stepper.advance(
-                np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))[1:]
-            )
+            times = np.linspace(start, ahead, max(2, round((ahead - start) / every) + 1))
+            samples = stepper.advance(times[1:])
         if samples.t.size and (found := first(samples.t, departed(samples.y))) is not None:
             return found
         if samples.status.failed:

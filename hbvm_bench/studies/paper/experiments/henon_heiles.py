@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.departure import departure, first, own_steps
+from hbvm_bench.studies.paper.experiments.departure import departure, first, own_steps
 from integrators import integrate
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
@@ -19,6 +19,7 @@ H, T_END = 1.0, 5e4
 GAUSS = Gauss(s=2, h=H)
 HBVM_4 = HBVM(k=4, s=2, h=H)
 
+PRINTED = 7000.0  # the paper's escape time, "t ≃ 7000"
 GAP = 2e-4  # 1/6 - H0; the paper says "very close to 1/6" and gives no start
 START = (0.0, 0.5, 0.5)  # q1, q2 and the momentum's angle
 GONE = 2.0  # |q| from which no orbit comes back
@@ -31,58 +32,35 @@ MAP_END = 2e4
 STEPS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 STEP_STARTS = 8
 TRUTH = HBVM(k=15, s=10, h=0.25)
+Floats = Sequence[float]
 AGREES = 1e-2  # distance at which two orbits have parted
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A run at its own steps.
+    """A run at its own steps."""
 
-    Attributes
-    ----------
-    method : str
-        As it prints.
-    t, q, energy : ndarray, shapes (n,), (n, 2), (n,)
-        Times, positions, values of H.
-    error : float
-        Largest relative error of H.
-    left : float or None
-        When |q| exceeded `GONE`.
-    outside : int
-        Number of steps outside the triangle before that.
-    """
-
-    method: str
-    t: Array
-    q: Array
-    energy: Array
-    error: float
-    left: float | None
-    outside: int
+    method: str  # as it prints
+    t: Array  # shape (n,)
+    q: Array  # shape (n, 2)
+    energy: Array  # shape (n,), values of H
+    error: float  # largest relative error of H
+    left: float | None  # when |q| exceeded `GONE`
+    outside: int  # number of steps outside the triangle before that
 
 
 @dataclass(frozen=True)
 class StepRow:
-    """What a method does with a step.
-
-    Attributes
-    ----------
-    h : float
-        The step.
-    left : list of (float or None)
-        When the orbits from neighbouring starts have left.
-    agrees : float
-        Time up to which the orbit is within `AGREES` of the true one.
-    """
+    """What a method does with a step h."""
 
     h: float
-    left: list[float | None]
-    agrees: float
+    left: list[float | None]  # when the orbits from neighbouring starts have left
+    agrees: float  # time up to which the orbit is within `AGREES` of the true one
 
 
-def start(t_end: float = T_END) -> Problem:
-    """Return the problem from our start."""
-    return henon_heiles(energy=1 / 6 - GAP, q1=START[0], q2=START[1], direction=START[2], t_end=t_end)
+def start(t_end: float = T_END, gap: float = GAP, direction: float = START[2]) -> Problem:
+    """Return the problem from our start, or with another energy 1/6 - gap or direction of the momentum."""
+    return henon_heiles(energy=1 / 6 - gap, q1=START[0], q2=START[1], direction=direction, t_end=t_end)
 
 
 def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END) -> Orbit:
@@ -110,25 +88,27 @@ def neighbour(y0: Array, offset: int) -> Array:
     return y
 
 
+def gauss_orbit() -> tuple[int, Orbit]:
+    """Return the neighbouring start whose escape is nearest to the paper's time, and its orbit."""
+    times = escapes(GAUSS, t_end=2 * PRINTED)
+    nearest = min(range(len(times)), key=lambda i: abs((times[i] or np.inf) - PRINTED))
+    return nearest, orbit(GAUSS, offset=nearest)
+
+
 def escapes(
     method: MethodBase, offsets: Sequence[int] = range(NEIGHBOURS), t_end: float = T_END
 ) -> list[float | None]:
     """Return when the orbits from neighbouring starts have left."""
     problem = start()
     program = method.compile(problem.system)
-    return [
-        departure(program.start(neighbour(problem.y0, i), problem.par, 0.0), t_end, _gone, stretch=256 * H)
-        for i in offsets
-    ]
+    starts = [neighbour(problem.y0, i) for i in offsets]
+    return [departure(program.start(y0, problem.par), t_end, _gone, stretch=256 * H) for y0 in starts]
 
 
 def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STARTS) -> list[StepRow]:
     """Return what ``gauss``, s = 2, or ``hbvm``, HBVM(4, 2), does with each step."""
-    rows = []
-    for h in steps:
-        method = Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h)
-        rows.append(StepRow(h, escapes(method, range(starts)), agreement(method)))
-    return rows
+    methods = [(h, Gauss(s=2, h=h) if family == "gauss" else HBVM(k=4, s=2, h=h)) for h in steps]
+    return [StepRow(h, escapes(method, range(starts)), agreement(method)) for h, method in methods]
 
 
 def agreement(method: MethodBase, t_end: float = 100.0) -> float:
@@ -146,27 +126,19 @@ def parted(t: Array, y: Array, truth: Array) -> float:
 
 
 def escape_map(
-    method: MethodBase,
-    gaps: Sequence[float] = GAPS,
-    directions: Sequence[float] = DIRECTIONS,
-    t_end: float = MAP_END,
+    method: MethodBase, gaps: Floats = GAPS, directions: Floats = DIRECTIONS, t_end: float = MAP_END
 ) -> Array:
-    """Return when orbits have left, for energies 1/6 - gap and directions of the momentum at the start.
+    """Return when orbits have left, shape (len(gaps), len(directions)); NaN where the orbit stays.
 
-    Returns
-    -------
-    ndarray, shape (len(gaps), len(directions))
-        Times; NaN where the orbit stays.
+    A gap is 1/6 less the energy, a direction that of the momentum at the start.
     """
     program = method.compile(henon_heiles().system)
-    times = np.full((len(gaps), len(directions)), np.nan)
-    for i, gap in enumerate(gaps):
-        for j, angle in enumerate(directions):
-            problem = henon_heiles(energy=1 / 6 - gap, q1=START[0], q2=START[1], direction=angle)
-            stepper = program.start(problem.y0, problem.par, 0.0)
-            left = departure(stepper, t_end, _gone, stretch=128 * H)
-            times[i, j] = np.nan if left is None else left
-    return times
+
+    def left(gap: float, direction: float) -> float | None:
+        problem = start(t_end, gap, direction)
+        return departure(program.start(problem.y0, problem.par), t_end, _gone, stretch=128 * H)
+
+    return np.array([[left(gap, direction) for direction in directions] for gap in gaps], dtype=float)
 
 
 def true_orbit(t_end: float = 300.0) -> Array:

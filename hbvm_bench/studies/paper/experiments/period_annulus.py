@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.departure import departure, own_steps
+from hbvm_bench.studies.paper.experiments.departure import departure, own_steps
 from integrators.gauss import Gauss
 from integrators.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
@@ -21,6 +21,9 @@ NODES: dict[int, int] = dict(zip(DEGREES, (5, 8, 10, 13), strict=True))  # k >= 
 STEPS = (1.0, 0.5)
 ENDS = tuple(1.0 + i / 64 for i in range(12))  # of the segment; the paper's first
 PROBLEM = period_annulus()
+DRAWN = {"gauss": Gauss(s=2, h=1.0), "hbvm": HBVM(k=5, s=2, h=1.0)}
+PERIOD_STEP = 1 / 16
+PERIOD_METHOD = HBVM(k=15, s=6, h=PERIOD_STEP)
 
 # Table 1 of the paper: (h, s) -> Gauss point, its error in H, HBVM point, its error in H.
 PRINTED = {
@@ -33,98 +36,68 @@ PRINTED = {
     (0.5, 4): ("3.757049796804918e-1", 3.98e-6, "3.757055929263451e-1", 4.60e-16),
     (0.5, 5): ("3.757055571549585e-1", 2.32e-7, "3.757055929263451e-1", 4.60e-16),
 }
+Path = tuple[Array, Array]  # times (n,) and states (n, 2)
 
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a method puts the edge of the annulus.
-
-    Attributes
-    ----------
-    low, high : float
-        The last interval of the bisection: (0, low) stays, (0, high) departs.
-    orbits : int
-        How many orbits were integrated.
-    """
+    """Where a method puts the edge of the annulus: (0, low) stays, (0, high) departs."""
 
     low: float
     high: float
-    orbits: int
 
     @property
     def c(self) -> float:
         """The middle of the last interval."""
         return (self.low + self.high) / 2
 
+    @property
+    def error(self) -> float:
+        """The error in H of that point."""
+        return error_of(self.c)
 
-def edge(
-    method: MethodBase,
-    span: float,
-    program: Program | None = None,
-    *,
-    every: float | None = None,
-    end: float = 1.0,
-) -> Edge:
+
+def edge(method: MethodBase, span: float, *, every: float | None = None, end: float = 1.0) -> Edge:
     """Find the edge by the paper's steps 1 to 5, on the segment from the origin to Q = (0, 1).
 
-    The printed step 2 lets the segment end in P1; it has to end in Q.
-
-    Parameters
-    ----------
-    method : MethodBase
-        Whose orbits are judged.
-    span : float
-        Time over which they are followed.
-    program : Program, optional
-        The method compiled.
-    every : float, optional
-        See `departure`.
-    end : float
-        Another Q = (0, end): the bisection then visits other points.
+    The printed step 2 lets the segment end in P1; it has to end in Q. With another Q = (0, end) the
+    bisection visits other points. Orbits are followed over the span; for ``every`` see `departure`.
     """
-    program = program or method.compile(PROBLEM.system)
-    low, high, orbits = 0.0, end, 0
-    while high - low >= TOLERANCE:
-        middle = (low + high) / 2
-        if middle in (low, high):
-            break
-        if fate(program, middle, span, every) is None:
-            low = middle
-        else:
-            high = middle
-        orbits += 1
-    return Edge(low, high, orbits)
+    program = method.compile(PROBLEM.system)
+    low, high = 0.0, end
+    while high - low >= TOLERANCE and (middle := (low + high) / 2) not in (low, high):
+        stays = fate(program, middle, span, every) is None
+        low, high = (middle, high) if stays else (low, middle)
+    return Edge(low, high)
 
 
 def fate(program: Program, c: float, span: float, every: float | None = None) -> float | None:
     """Return when the numerical orbit from (0, c) departs, or ``None``; see `departure` for ``every``."""
-    stepper = program.start(np.array([0.0, c]), PROBLEM.par, 0.0)
+    stepper = program.start(np.array([0.0, c]), PROBLEM.par)
     return departure(stepper, span, _departed, stretch=SHORT_SPAN, every=every)
 
 
 def cell(s: int, h: float) -> dict[str, Edge]:
     """Return the entries of Table 1 for one s and h: ``gauss`` and ``hbvm``, each over both spans."""
-    made = {}
-    for family, method in (("gauss", Gauss(s=s, h=h)), ("hbvm", HBVM(k=NODES[s], s=s, h=h))):
-        program = method.compile(PROBLEM.system)
-        for name, span in ((family, SPAN), (f"{family}_short", SHORT_SPAN)):
-            made[name] = edge(method, span, program)
-    return made
+    methods = {"gauss": Gauss(s=s, h=h), "hbvm": HBVM(k=NODES[s], s=s, h=h)}
+    return {
+        name + suffix: edge(method, span)
+        for name, method in methods.items()
+        for suffix, span in (("", SPAN), ("_short", SHORT_SPAN))
+    }
 
 
-def limit(s: int, h: float, span: float = SPAN) -> tuple[float, float]:
+def limit(s: int, h: float) -> tuple[float, float]:
     """Return when the first start beyond the edge by HBVM departs, and how far H/H* rises until then."""
     method = HBVM(k=NODES[s], s=s, h=h)
-    t, y = orbit(method, edge(method, span).high, span)
+    t, y = orbit(method, edge(method, SPAN).high)
     values = energy(y)
     return float(t[-1]), float((values - values[0]).max() / H_STAR)
 
 
 def spread(s: int, h: float, ends: Sequence[float] = ENDS) -> list[float]:
     """Return the errors in H of Gauss(s) over the paper's span, from bisections with other ends."""
-    method = Gauss(s=s, h=h)
-    program = method.compile(PROBLEM.system)
-    return [error_of(edge(method, SPAN, program, end=end).c) for end in ends]
+    return [edge(Gauss(s=s, h=h), SPAN, end=end).error for end in ends]
 
 
 def error_of(c: float) -> float:
@@ -143,33 +116,32 @@ def fates(method: MethodBase, gaps: Sequence[float], span: float = SPAN) -> list
     return [(gap, fate(program, C_STAR * (1 - gap), span)) for gap in gaps]
 
 
-def orbit(method: MethodBase, c: float, span: float = SPAN) -> tuple[Array, Array]:
+def orbit(method: MethodBase, c: float, span: float = SPAN) -> Path:
     """Return the times and states at the own steps of the orbit from (0, c), up to its departure."""
     t, y, _ = own_steps(PROBLEM, method, np.array([0.0, c]), span)
     far = np.flatnonzero(_departed(y))
     return (t[: far[0]], y[: far[0]]) if far.size else (t, y)
 
 
-def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
-    """Return, for c = (1 - gap) c*, the relative distance of H from H* and the orbit's period.
+def drawn() -> dict[str, Path]:
+    """Return the orbits of Figure 2: each method from the last point it finds periodic."""
+    return {family: orbit(method, edge(method, SPAN).low) for family, method in DRAWN.items()}
 
-    The period ends at the return to the positive p axis; the root is found by secants, and
-    every state between steps is a partial step.
-    """
-    h = 1 / 16
-    program = HBVM(k=15, s=6, h=h).compile(PROBLEM.system)
-    return [(error_of(C_STAR * (1 - gap)), _period(program, C_STAR * (1 - gap), h)) for gap in gaps]
+
+def periods(gaps: Sequence[float]) -> list[tuple[float, float]]:
+    """Return, for c = (1 - gap) c*, the relative distance of H from H* and the orbit's period."""
+    return [(error_of(c), _period(c)) for c in (C_STAR * (1 - gap) for gap in gaps)]
+
+
+def field(point: Sequence[float]) -> Array:
+    """Return (q', p') at a point (q, p)."""
+    return emit.numpy(PROBLEM.system, "field")(0.0, np.array(point), PROBLEM.par)
 
 
 def eigenvalues(point: Sequence[float]) -> NDArray[np.complex128]:
     """Return the two eigenvalues of the field linearised at a point (q, p), by central differences."""
-    field = emit.numpy(PROBLEM.system, "field")
-    J = np.empty((2, 2))
-    for j in range(2):
-        step = np.zeros(2)
-        step[j] = 1e-5
-        ahead, behind = (field(0.0, np.array(point) + side * step, PROBLEM.par) for side in (1, -1))
-        J[:, j] = (ahead - behind) / 2e-5
+    steps = 1e-5 * np.eye(2)
+    J = np.stack([(field(point + step) - field(point - step)) / 2e-5 for step in steps], axis=1)
     return np.linalg.eigvals(J).astype(complex)
 
 
@@ -178,22 +150,21 @@ def saddle_rate() -> float:
     return float(eigenvalues(P1).real.max())
 
 
-def _period(program: Program, c: float, h: float) -> float:
-    stepper = program.start(np.array([0.0, c]), PROBLEM.par, 0.0)
+def _period(c: float) -> float:
+    """Return when the orbit from (0, c) is back on the positive p axis, by secants over partial steps."""
+    stepper = PERIOD_METHOD.compile(PROBLEM.system).start(np.array([0.0, c]), PROBLEM.par)
     while True:
-        kept, t0 = stepper.checkpoint(), stepper.t
-        samples = stepper.advance(np.array([t0 + 64 * h]), sample="steps")
-        q, p = samples.y[:, 0], samples.y[:, 1]
+        kept = stepper.checkpoint()
+        samples = stepper.advance(np.array([stepper.t + 64 * PERIOD_STEP]), sample="steps")
+        q, p = samples.y.T
         back = np.flatnonzero((q[:-1] < 0) & (q[1:] >= 0) & (p[1:] > 0))
         if back.size:
             break
-    a, b = float(samples.t[back[0]]), float(samples.t[back[0] + 1])
-    qa, qb = float(q[back[0]]), float(q[back[0] + 1])
+    (a, b), (qa, qb) = samples.t[back[0] :][:2].tolist(), q[back[0] :][:2].tolist()
     for _ in range(20):
         middle = b - qb * (b - a) / (qb - qa)
         stepper.restore(kept)
-        value = float(stepper.advance(np.array([middle])).y[0, 0])
-        a, qa, b, qb = b, qb, middle, value
+        a, qa, b, qb = b, qb, middle, float(stepper.advance(np.array([middle])).y[0, 0])
         if abs(b - a) < 1e-13 * b or qa == qb:
             break
     return b

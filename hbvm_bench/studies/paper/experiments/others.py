@@ -1,6 +1,6 @@
 """The paper's three problems with the established libraries, at one setting each, chosen for accuracy."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -8,12 +8,11 @@ import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
 from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper import henon_heiles, period_annulus, sitnikov
-from hbvm_bench.studies.paper.results import Results, Task
+from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus, sitnikov
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
-from problems import Problem, load
+from problems import Problem
 from problems.catalogue.henon_heiles import beyond_triangle
 from problems.errors import InputError
 
@@ -37,88 +36,37 @@ LOOK = 4.0  # time between two looks at a library's orbit; one that departs blow
 
 @dataclass(frozen=True)
 class Row:
-    """One method on one problem.
+    """One method on one problem."""
 
-    Attributes
-    ----------
-    method : str
-        As written.
-    numbers : dict of str to float
-        By name; those that have no meaning are missing.
-    remark : str
-        Why it refused, how it ended.
-    """
-
-    method: str
-    numbers: dict[str, float]
-    remark: str
+    method: str  # as written
+    numbers: dict[str, float]  # by name; those that have no meaning are missing
+    remark: str  # why it refused, how it ended
 
 
-Format = Callable[[float], str]
 Found = tuple[dict[str, float], str]  # the numbers, and how it ended
+Columns = Mapping[str, tuple[str, Callable[[float], str]]]  # head: name of the number, how it is written
 
 
-def tasks(run: Callable[[str], Row], methods: Sequence[str], cost: float) -> list[Task]:
-    """Return the computations of a part with every method."""
-    return [Task(f"other {text}", partial(run, text), cost) for text in methods]
-
-
-def table(
-    results: Results,
-    methods: Sequence[str],
-    columns: Mapping[str, tuple[str, Format]],
-    title: str,
-    note: str,
-    remark: Callable[[Row], str] = lambda row: "",
-) -> Table:
-    """Return what came out with every method.
-
-    Parameters
-    ----------
-    results : Results
-        Of `tasks`.
-    methods : sequence of str
-        As written.
-    columns : mapping of str to (str, callable)
-        From the head of a column to the name of its number, and how it is written.
-    title, note : str
-        Of the table.
-    remark : callable
-        What to say of a row that says nothing itself.
-    """
-    rows: list[Row] = [results[f"other {text}"] for text in methods]
+def table(key: str, rows: Mapping[str, Row], columns: Columns, title: str, note: str) -> Table:
+    """Return the table of what came out."""
 
     def cells(row: Row) -> list[str]:
         return [write(row.numbers[name]) if name in row.numbers else NONE for name, write in columns.values()]
 
     return Table(
-        key=f"{results.part}-others",
-        title=title,
-        head=("method", *columns, "remark"),
-        rows=[(row.method, *cells(row), row.remark or remark(row)) for row in rows],
+        title,
+        ("method", *columns, "remark"),
+        [(row.method, *cells(row), row.remark) for row in rows.values()],
+        note,
         words=(0, len(columns) + 1),
-        note=note,
+        key=key,
     )
 
 
-def on_sitnikov(text: str) -> Row:
-    """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
-    return _row(text, load("sitnikov", e=sitnikov.E, d=sitnikov.D, t_end=sitnikov.T_END), _on_sitnikov)
-
-
-def on_henon_heiles(text: str) -> Row:
-    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
-    return _row(text, henon_heiles.start(HENON_SPAN), _on_henon_heiles)
-
-
-def on_period_annulus(text: str) -> Row:
-    """Return the edge found over the short span and its error in H."""
-    return _row(text, period_annulus.PROBLEM, _on_period_annulus)
-
-
-def _row(text: str, problem: Problem, run: Callable[[MethodBase, Problem], Found]) -> Row:
-    """Run a method on a problem; one that refuses it, or whose library is not installed, says so itself."""
-    method = make_method(text)
+def measured(place: str, text: str) -> Row:
+    """Run a method on one of the `PLACES`; one that refuses it, or whose library is missing, says why."""
+    run, start = PLACES[place]
+    method, problem = make_method(text), start()
     refused = method.accepts(problem)
     try:
         if refused is None:
@@ -129,6 +77,7 @@ def _row(text: str, problem: Problem, run: Callable[[MethodBase, Problem], Found
 
 
 def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
+    """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
     solution = integrate(problem, method, times=np.arange(0.0, sitnikov.T_END + 0.5, 0.5))
     if solution.status.failed:
         return {}, _ended(solution)
@@ -146,6 +95,7 @@ def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
 
 
 def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
+    """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
     times = np.arange(0.0, HENON_SPAN + 1.0)
     solution = integrate(problem, method, times=times)
     truth = integrate(problem, henon_heiles.TRUTH, times=times).y[: len(solution.y)]
@@ -158,8 +108,8 @@ def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
     return numbers, _ended(solution) if solution.status.failed else ""
 
 
-def _on_period_annulus(method: MethodBase, problem: Problem) -> Found:
-    del problem  # the one that the edge belongs to
+def _on_period_annulus(method: MethodBase, _: Problem) -> Found:
+    """Return the edge found over the short span and its error in H."""
     every = None if method.library == "hbvm-bench" else LOOK
     found = period_annulus.edge(method, period_annulus.SHORT_SPAN, every=every)
     return {"c": found.c, "error": period_annulus.error_of(found.c)}, ""
@@ -167,3 +117,10 @@ def _on_period_annulus(method: MethodBase, problem: Problem) -> Found:
 
 def _ended(solution: Solution) -> str:
     return f"{solution.status.replace('_', ' ')} at t = {solution.t_stop:.5g}"
+
+
+PLACES: dict[str, tuple[Callable[[MethodBase, Problem], Found], Callable[[], Problem]]] = {
+    "sitnikov": (_on_sitnikov, sitnikov.problem),
+    "henon-heiles": (_on_henon_heiles, partial(henon_heiles.start, HENON_SPAN)),
+    "period-annulus": (_on_period_annulus, lambda: period_annulus.PROBLEM),
+}

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from integrators.gauss import Gauss
-from integrators.protocol import Array, Program
+from integrators.protocol import Array
 from problems import Hamiltonian, VectorField
 
 HALF_DISTANCE = 2.5  # of the primaries at apocentre: the paper's d/2
@@ -43,25 +43,12 @@ MAP_TURNS = 100
 
 @dataclass(frozen=True)
 class Growth:
-    """Growth rates of small offsets, per unit of time.
-
-    Attributes
-    ----------
-    e, speed : float
-        Eccentricity and speed through the primaries' plane at the start.
-    along : list of (int, float)
-        Revolutions and rate along the axis.
-    across : float
-        Rate off the axis, over the last of these spans.
-    left : int or None
-        Revolution in which |z| exceeded `FAR`, if it did; the rates end there.
-    """
+    """Growth rates of small offsets from the paper's start, or from another speed, per unit of time."""
 
     e: float
-    speed: float
-    along: list[tuple[int, float]]
-    across: float
-    left: int | None
+    along: list[tuple[int, float]]  # revolutions, and the rate along the axis
+    across: float  # rate off the axis, over the last of these spans
+    left: int | None  # revolution in which |z| exceeded `FAR`, if it did; the rates end there
 
 
 def period(e: float) -> float:
@@ -111,17 +98,17 @@ AXIS = Hamiltonian(_energy, dof=1, parameters={"e": 0.75}, name="axis")
 OFFSETS = VectorField(_with_offsets, dim=10, parameters={"e": 0.75}, name="axis_with_offsets")
 
 
-def growth(e: float, speed: float, turns: Sequence[int] = TURNS, program: Program | None = None) -> Growth:
+def growth(e: float, speed: float = START[1], turns: Sequence[int] = TURNS) -> Growth:
     """Return how fast offsets along the axis and off it grow, from the apocentre on."""
-    program = program or METHOD.compile(OFFSETS)
     y0 = [START[0], speed, 0.6, 0.8, 0.0, 0.5, 0.5, 0.5, 0.5, 0.0]
-    y, left = _every_turn(program, OFFSETS.pack({"e": e}), y0, max(turns))
+    y, left = _every_turn(OFFSETS, e, y0, max(turns))
     length = period(e)
-    spans = sorted({min(turn, len(y)) for turn in turns} - {0})
     return Growth(
         e=e,
-        speed=speed,
-        along=[(turn, float(y[turn - 1, 4] / (turn * length))) for turn in spans],
+        along=[
+            (turn, float(y[turn - 1, 4] / (turn * length)))
+            for turn in sorted({min(turn, len(y)) for turn in turns} - {0})
+        ],
         across=float(y[-1, 9] / (len(y) * length)) if len(y) else math.nan,
         left=left,
     )
@@ -129,32 +116,33 @@ def growth(e: float, speed: float, turns: Sequence[int] = TURNS, program: Progra
 
 def growth_by_eccentricity(es: Sequence[float] = ECCENTRICITIES) -> list[Growth]:
     """Return `growth` for the paper's start."""
-    program = METHOD.compile(OFFSETS)
-    return [growth(e, START[1], TURNS, program) for e in es]
+    return [growth(e) for e in es]
 
 
 def section(
     e: float, speeds: Sequence[float] = SECTION_SPEEDS, turns: int = 400
 ) -> list[tuple[float, Array]]:
-    """Return (z, velocity) at every apocentre of the primaries, for several speeds at the start.
+    """Return the speeds at the start, each with (z, velocity) at every apocentre of the primaries, (n, 2).
 
-    Returns
-    -------
-    list of (float, ndarray of shape (n, 2))
-        The speed, and the points up to the one where |z| exceeded `FAR`.
+    The points end with the last one where |z| is below `FAR`.
     """
-    program = METHOD.compile(AXIS)
-    par = AXIS.pack({"e": e})
-    made = []
-    for speed in speeds:
-        y, _ = _every_turn(program, par, [START[0], speed], turns)
-        made.append((speed, np.vstack([[START[0], speed], y])))
-    return made
+    starts = [(START[0], speed) for speed in speeds]
+    return [(start[1], np.vstack([start, _every_turn(AXIS, e, start, turns)[0]])) for start in starts]
 
 
-def _every_turn(program: Program, par: Array, y0: Sequence[float], turns: int) -> tuple[Array, int | None]:
+def stays(
+    es: Sequence[float] = MAP_ECCENTRICITIES, speeds: Sequence[float] = MAP_SPEEDS, turns: int = MAP_TURNS
+) -> Array:
+    """Return after how many revolutions planetoids have gone far away, (len(es), len(speeds)); NaN: never."""
+    found = [[_every_turn(AXIS, e, (START[0], speed), turns)[1] for speed in speeds] for e in es]
+    return np.array(found, dtype=float)
+
+
+def _every_turn(
+    system: Hamiltonian | VectorField, e: float, y0: Sequence[float], turns: int
+) -> tuple[Array, int | None]:
     """Return the states at the apocentres 1 .. turns, and where the planetoid went far away."""
-    stepper = program.start(np.array(y0), par, math.pi)
+    stepper = METHOD.compile(system).start(np.array(y0), system.pack({"e": e}), math.pi)
     made = np.empty((0, len(y0)))
     while len(made) < turns:
         ahead = np.arange(len(made) + 1.0, min(len(made) + 50, turns) + 1)
@@ -165,23 +153,3 @@ def _every_turn(program: Program, par: Array, y0: Sequence[float], turns: int) -
             n = int(far[0]) if far.size else len(made)
             return made[:n], n + 1
     return made, None
-
-
-def stays(
-    es: Sequence[float] = MAP_ECCENTRICITIES, speeds: Sequence[float] = MAP_SPEEDS, turns: int = MAP_TURNS
-) -> Array:
-    """Return after how many revolutions planetoids have gone far away.
-
-    Returns
-    -------
-    ndarray, shape (len(es), len(speeds))
-        Revolutions; NaN where the planetoid stays.
-    """
-    program = METHOD.compile(AXIS)
-    made = np.full((len(es), len(speeds)), np.nan)
-    for i, e in enumerate(es):
-        par = AXIS.pack({"e": e})
-        for j, speed in enumerate(speeds):
-            _, left = _every_turn(program, par, [START[0], speed], turns)
-            made[i, j] = np.nan if left is None else left
-    return made
