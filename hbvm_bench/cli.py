@@ -34,15 +34,13 @@ SEPARATE = {
     command: f"hbvm_bench.commands.{module}"
     for module, commands in {
         "about": ("advise", "engines", "inspect"),
-        "automatic": ("automatic",),
         "doctor": ("doctor", "warm"),
-        "endure": ("endure",),
         "paper": ("paper",),
         "plugins": ("plugins",),
-        "race": ("race",),
         "reports": ("gallery", "headline", "report"),
         "run": ("run",),
         "stores": ("compare", "export", "merge"),
+        "studies": ("automatic", "endure", "race"),
     }.items()
     for command in commands
 }

@@ -3,7 +3,7 @@
 import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, get_args
@@ -123,22 +123,16 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def _count(self) -> int:
         """Return how many cases there are, without making any."""
-        runs = [
-            _combinations(entry.sweep) * _combinations(method.sweep) * len(method.texts)
+        pairs = [
+            (entry.sweep, method)
             for entry in self.entries()
             for method in self.methods
             if not method.only or name_of(entry) in method.only
-        ]
-        many = [
-            _combinations(method.sweep) * len(method.texts)
-            for entry in self.ensembles
-            for method in entry.methods
-        ]
-        return sum(runs) + sum(many)
-
-
-def _combinations(sweep: Mapping[str, Sequence[object]]) -> int:
-    return math.prod(len(values) for values in sweep.values())
+        ] + [({}, method) for entry in self.ensembles for method in entry.methods]
+        return sum(
+            len(method.texts) * math.prod(map(len, [*sweep.values(), *method.sweep.values()]))
+            for sweep, method in pairs
+        )
 
 
 def name_of(entry: ProblemEntry) -> str:
@@ -233,12 +227,7 @@ def file_of(name_or_path: str) -> Path:
 
 
 def load(name_or_path: str) -> Campaign:
-    """Read a campaign.
-
-    Parameters
-    ----------
-    name_or_path : str
-        The name of a shipped campaign, or the path of a TOML file.
+    """Read a campaign: a shipped one, by its name, or a TOML file.
 
     Raises
     ------

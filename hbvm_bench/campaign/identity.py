@@ -145,18 +145,28 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
 def versions_of(method: MethodBase) -> dict[str, str]:
     """Return the versions of Python and of the libraries that a method's numbers depend on."""
     names = COMPUTES_WITH.get(method.library.lower(), (method.library,))
-    return {"python": platform.python_version()} | {name: _version(name) for name in names}
+    return {"python": platform.python_version()} | {name: version_of(name) for name in names}
 
 
-def version_of_library(library: str) -> str:
-    """Return the installed version of a method's library, or ``"not installed"``."""
-    return _version(library.lower())
+@cache
+def version_of(library: str) -> str:
+    """Return the installed version of a library, or ``"not installed"``."""
+    try:
+        return version(library.lower())
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def fixed_step(method: MethodBase) -> float | None:
     """Return the length that all steps of a method have; ``None`` where it chooses its steps."""
     tolerances = (getattr(method, name, None) for name in TOLERANCES)
     return None if any(tolerances) else getattr(method, "h", None)
+
+
+def of_method(method: MethodBase) -> dict[str, Any]:
+    """Return what a record says of a method: its role, library and order."""
+    role = "ours" if is_ours(method) else "peer"
+    return {"role": role, "library": method.library, "order": method.order}
 
 
 def is_ours(method: MethodBase) -> bool:
@@ -224,7 +234,8 @@ def _read(module: str, path: Path) -> tuple[str, list[str]]:
     """Return the digest of a file's code and the modules that it names; kept by its content."""
     content = path.read_bytes()
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    key = kept.key("source", _rule(), platform.python_version(), package, content)
+    rule = Path(__file__).read_bytes()  # digests that another version of this module made are of no use
+    key = kept.key("source", rule, platform.python_version(), package, content)
     if (known := kept.get(key)) is not None:
         return json.loads(known)
     try:
@@ -236,16 +247,10 @@ def _read(module: str, path: Path) -> tuple[str, list[str]]:
         if isinstance(body := getattr(node, "body", None), list):
             body[:] = [part for part in body if not _is_text(part)]
         if isinstance(node, ast.FunctionDef):  # what a problem says of itself is words too
-            node.decorator_list = [part for part in node.decorator_list if not _is_entry(part)]
+            node.decorator_list = [part for part in node.decorator_list if _called(part) != "entry"]
     made = hashlib.sha256(ast.dump(tree, annotate_fields=False).encode()).hexdigest(), sorted(imported)
     kept.put(key, json.dumps(made).encode())
     return made
-
-
-@cache
-def _rule() -> bytes:
-    # digests that another version of this module made are of no use
-    return Path(__file__).read_bytes()
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -253,9 +258,8 @@ def _is_text(node: ast.AST) -> bool:
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 
-def _is_entry(node: ast.expr) -> bool:
-    """Whether a decorator is that of `problems.entry`."""
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "entry"
+def _called(node: ast.expr) -> str:
+    return getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
 
 
 def _imported(tree: ast.Module, package: str) -> set[str]:
@@ -275,11 +279,3 @@ def _imported(tree: ast.Module, package: str) -> set[str]:
                 block = getattr(node, blocks, ())
                 left += block if isinstance(block, list) else ()
     return found
-
-
-@cache
-def _version(distribution: str) -> str:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return "not installed"

@@ -103,31 +103,22 @@ def find(spec: Spec) -> Problem | None:
     place = _Place.of(spec)
     if not place.file:
         return None
-    if str(spec) not in _formulas:
-        why = (
-            "its formula should lie beside the results of its run, and does not"
-            if place.digest
-            else "no Python file is run here"
-        )
-        raise InputError(f"the problem {shown(str(spec))} is not known: {why}.")
-    return _unpacked(_formulas[str(spec)])
+    if text := formula(str(spec)):
+        return _unpacked(text)
+    why = "its formula should lie beside the results of its run, and does not"
+    why = why if place.digest else "no Python file is run here"
+    raise InputError(f"the problem {shown(str(spec))} is not known: {why}.")
 
 
 def read(text: str) -> Problem:
-    """Run the Python file of a problem, and return the problem.
-
-    Parameters
-    ----------
-    text : str
-        ``"mine.py:swing(g=1.1)"``; the file may lie anywhere.
+    """Run the Python file of a problem, such as ``mine.py:swing(g=1.1)``, and return the problem.
 
     Raises
     ------
     problems.errors.InputError
         If there is no such file, name or argument, if the file raises, or gives no problem.
     """
-    spec = parse_spec(text)
-    return _Files(None).problem(spec)
+    return _Files(None).problem(parse_spec(text))
 
 
 def is_file(text: str) -> bool:
@@ -138,15 +129,8 @@ def is_file(text: str) -> bool:
 def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None]) -> Campaign:
     """Return a campaign whose problems from Python files are kept as formulas; the files are run.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    folder : Path or None
-        Where the campaign's file lies, beside which the Python files must lie. ``None``: they may
-        lie anywhere.
-    tell : callable
-        Called with the name of each file before it is run.
+    The Python files must lie in ``folder``, beside the campaign's, or without one anywhere; ``tell``
+    is called with the name of each before it is run.
 
     Raises
     ------
@@ -155,8 +139,8 @@ def opened(campaign: Campaign, folder: Path | None, tell: Callable[[str], None])
     """
     files = _Files(folder)
     texts = [text_of(entry) for entry in campaign.entries()] + [one.problem for one in campaign.ensembles]
-    asked = [_Place.of(parse_spec(text)).file for text in texts if is_file(text)]
-    for file in dict.fromkeys(asked):
+    asked = dict.fromkeys(file_of(text) for text in texts if is_file(text))
+    for file in asked:
         files.path(file)
         tell(file)
     if not asked:
@@ -182,13 +166,7 @@ def _kept(entry: ProblemEntry, files: "_Files") -> list[ProblemEntry]:
 
 
 class _Files:
-    """Python files, each of which is run once.
-
-    Parameters
-    ----------
-    folder : Path or None
-        The folder in which they must lie; ``None``: anywhere.
-    """
+    """Python files, each of which is run once; they must lie in ``folder``, if there is one."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
@@ -270,9 +248,8 @@ def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
     """Return what a name of a module is or, as a function, gives."""
     what = f"{place.file}:{place.function}"
     if not hasattr(module, place.function) or place.function.startswith("_"):
-        known = {
-            key for key, one in vars(module).items() if isinstance(one, Problem) or _is_function(one, module)
-        }
+        named = vars(module).items()
+        known = {key for key, one in named if isinstance(one, Problem) or _is_function(one, module)}
         raise unknown(f"problem of {place.file}", place.function, known)
     made = getattr(module, place.function)
     if isinstance(made, Problem):
@@ -286,12 +263,9 @@ def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
             signature = inspect.signature(made)
         except (TypeError, ValueError):
             raise InputError(f"{what} does not tell its arguments; wrap it in a function of yours.") from None
-        named = [
-            one
-            for one in signature.parameters.values()
-            if one.kind not in (one.VAR_POSITIONAL, one.VAR_KEYWORD)
-        ]
-        if len(named) == len(signature.parameters):
+        if not any(
+            one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in signature.parameters.values()
+        ):
             calls.check(what, signature, (), spec.arguments, "argument")
     with _one_sentence(Path(str(module.__file__)), f"{spec} cannot be made"):
         found = made(**spec.arguments)
@@ -312,9 +286,8 @@ def _one_sentence(path: Path, what: str) -> Iterator[None]:
     except InputError as error:
         raise InputError(f"{what}: {error}") from error
     except (Exception, SystemExit) as error:
-        lines = [
-            frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)
-        ]
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(path)]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
         words = error.msg if isinstance(error, SyntaxError) else " ".join(str(error).split()).rstrip(".")
         where = "" if line is None else f" in line {line}"

@@ -46,18 +46,23 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
     )
 
 
-def quick_run(campaign: Campaign, rounds: int) -> Campaign:
+def with_rounds(campaign: Campaign, rounds: int | None) -> Campaign:
+    """Return a campaign with another number of rounds of timing; with its own for ``None``."""
+    return replace(campaign, timing=replace(campaign.timing, rounds=rounds)) if rounds else campaign
+
+
+def quick_run(campaign: Campaign) -> Campaign:
     """Return a campaign over a tenth of each span, with the settings marked for it and fewer rounds.
 
     Of ensembles, a tenth of the trajectories.
     """
-    return replace(
+    short = replace(
         campaign,
         problems=[_shortened(entry) for entry in campaign.entries()],
         ensembles=[replace(one, count=max(1, int(QUICK_SHARE * one.count))) for one in campaign.ensembles],
         quick=True,
-        timing=replace(campaign.timing, rounds=rounds),
     )
+    return with_rounds(short, QUICK_ROUNDS)
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:

@@ -31,14 +31,7 @@ def names(text: str) -> set[str]:
 
 
 def fill(text: str, values: Mapping[str, Scalar]) -> str:
-    """Return a specification with its placeholders filled.
-
-    Parameters
-    ----------
-    text : str
-        Such as ``"Leapfrog(h={step*f}, order=8)"``.
-    values : mapping
-        Values by name.
+    """Return a specification, such as ``"Leapfrog(h={step*f}, order=8)"``, with its placeholders filled.
 
     Raises
     ------

@@ -71,16 +71,7 @@ def advise(
                 "accuracy": accuracy,
                 "reached": advice.reached,
                 "why": advice.why,
-                "proposals": [
-                    {
-                        "method": repr(one.method),
-                        "position": one.position,
-                        "energy": one.energy,
-                        "seconds": one.seconds,
-                        "steps": one.steps,
-                    }
-                    for one in advice.proposals
-                ],
+                "proposals": [{**vars(one), "method": repr(one.method)} for one in advice.proposals],
             }
         )
         return

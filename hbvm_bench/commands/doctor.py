@@ -90,9 +90,7 @@ def _print(findings: dict[str, list[examining.Finding]]) -> None:
                 found.append(f"; {one.advice}", style="dim")
             table.add_row("", Text(words, style=style), Text(one.what), found)
         console.print(table)
-    installed, timings = (
-        all(one.state != "bad" for one in findings[key]) for key in ("installed", "timings")
-    )
+    installed, timings = (all(one.state != "bad" for one in findings[key]) for key in HEADINGS)
     console.print(
         f"{'Nothing is missing' if installed else 'Something is missing'}; times measured here now "
         f"{'can be trusted' if timings else 'are doubtful'}."

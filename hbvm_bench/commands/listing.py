@@ -3,7 +3,7 @@
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
@@ -12,26 +12,18 @@ from rich.text import Text
 import integrators.registry
 import problems
 from hbvm_bench.campaign.file import load, shipped
-from hbvm_bench.campaign.identity import version_of_library
+from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import terminal
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index
 from hbvm_bench.summaries import export, goals
 from hbvm_bench.summaries.table import NONE
-from integrators.protocol import MethodBase
 from problems.errors import unknown
-
-KINDS = ("problems", "methods", "metrics", "campaigns")
 
 
 def tables(what: str = "") -> list[Table]:
-    """Return the tables that ``hbvm-bench list`` prints.
-
-    Parameters
-    ----------
-    what : str
-        One of `KINDS`; all when empty.
+    """Return the tables that ``hbvm-bench list`` prints: one of `KINDS`, or all of them.
 
     Raises
     ------
@@ -40,18 +32,11 @@ def tables(what: str = "") -> list[Table]:
     """
     if what and what not in KINDS:
         raise unknown("list", what, KINDS)
-    made = {"problems": _problems, "methods": _methods, "metrics": _metrics, "campaigns": _campaigns}
-    return [made[kind]() for kind in ([what] if what else KINDS)]
+    return [KINDS[kind]() for kind in ([what] if what else KINDS)]
 
 
 def citations(texts: Sequence[str]) -> list[str]:
-    """Return the citations of methods, each BibTeX entry once.
-
-    Parameters
-    ----------
-    texts : sequence of str
-        Names or calls; all methods when empty.
-    """
+    """Return the citations of methods, given by names or calls, each BibTeX entry once; of all for none."""
     names = [text.partition("(")[0].strip() for text in texts] or integrators.registry.names()
     found = [integrators.registry.get(name).citation.strip() for name in names]
     return list(dict.fromkeys(entry for text in found if text for entry in re.split(r"\n+(?=@)", text)))
@@ -82,7 +67,7 @@ def _problems() -> Table:
     loaded = [(name, problems.load(name)) for name in problems.names()]
     rows = [
         (
-            _signature(name, one.arguments),
+            _call(name, one.arguments),
             str(one.system.dim),
             ", ".join(one.system.invariant_names),
             one.title or "",
@@ -93,9 +78,8 @@ def _problems() -> Table:
 
 
 def _methods() -> Table:
-    return _table(
-        "methods", ("method", "library", "version", "what"), map(_method, integrators.registry.names())
-    )
+    rows = map(_method, integrators.registry.names())
+    return _table("methods", ("method", "library", "version", "what"), rows)
 
 
 def _method(name: str) -> tuple[str, ...]:
@@ -104,7 +88,8 @@ def _method(name: str) -> tuple[str, ...]:
     except ImportError as error:
         return name, NONE, NONE, f"cannot be imported: {error}"
     said = (inspect.getdoc(cls) or "").partition("\n")[0]
-    return _options(cls), cls.library, version_of_library(cls.library), said
+    options = {field.name: field.default for field in dataclasses.fields(cls)}
+    return _call(cls.__name__, options), cls.library, version_of(cls.library), said
 
 
 def _metrics() -> Table:
@@ -118,13 +103,9 @@ def _campaigns() -> Table:
     return _table("campaigns", ("campaign", "cases", "what"), rows)
 
 
-def _options(cls: type[MethodBase]) -> str:
-    words = []
-    for field in dataclasses.fields(cls):
-        default = "..." if field.default is dataclasses.MISSING else repr(field.default)
-        words.append(f"{field.name}={default}")
-    return f"{cls.__name__}({', '.join(words)})"
+def _call(name: str, arguments: Mapping[str, Any]) -> str:
+    words = {key: "..." if value is dataclasses.MISSING else repr(value) for key, value in arguments.items()}
+    return f"{name}({', '.join(f'{key}={word}' for key, word in words.items())})"
 
 
-def _signature(name: str, arguments: Any) -> str:
-    return f"{name}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
+KINDS = {"problems": _problems, "methods": _methods, "metrics": _metrics, "campaigns": _campaigns}

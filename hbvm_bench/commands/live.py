@@ -48,19 +48,7 @@ class Live:
             self._live.stop()
 
     def phase(self, title: str, left: Sequence[str], done: int, estimate: Estimate) -> None:
-        """Begin a phase.
-
-        Parameters
-        ----------
-        title : str
-            What is done in it.
-        left : sequence of str
-            Ids of the cases to come, each as often as it comes.
-        done : int
-            Cases that need not run again.
-        estimate : Estimate
-            Is told what finished.
-        """
+        """Begin a phase: with the ids of the cases to come, each as often as it comes, after those done."""
         self._title, self._estimate = title, estimate
         self._total, self._count, self._left = len(left) + done, done, Counter(left)
         self._since = {}

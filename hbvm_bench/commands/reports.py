@@ -11,8 +11,7 @@ from hbvm_bench.measure import machine
 from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.automatic import report as automatic
-from hbvm_bench.studies.automatic.runs import by_kind
+from hbvm_bench.studies import automatic
 from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
 
@@ -61,7 +60,7 @@ def headline(
     that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.
     """
     races = results.by_kind(reports / "race")
-    duels = by_kind(reports / "automatic")
+    duels = automatic.by_kind(reports / "automatic")
     if not races and not duels:
         raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
     parts = []

@@ -2,7 +2,6 @@
 
 import shlex
 import sys
-from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +11,7 @@ import typer
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
-from hbvm_bench.campaign.shorter import QUICK_ROUNDS, quick_run
+from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
@@ -67,7 +66,7 @@ def run(
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
     campaign = _campaign(name, problem, method, step, reference)
-    campaign = quick_run(campaign, QUICK_ROUNDS) if quick else campaign
+    campaign = quick_run(campaign) if quick else campaign
     campaign = opened(campaign, name)
     if report_to is not None:
         ensure_writable(report_to, keep=False)
@@ -83,7 +82,11 @@ def run(
 
 def opened(campaign: Campaign, name: str | None) -> Campaign:
     """Run the Python files beside a campaign's, or those that a command line names; see `own.opened`."""
-    return own.opened(campaign, None if name is None else file_of(name).parent, partial(_say_run, name))
+
+    def tell(file: str) -> None:
+        _say(f"running the Python file {file}" + (f", which {name} names" if name else ""))
+
+    return own.opened(campaign, None if name is None else file_of(name).parent, tell)
 
 
 def show(campaign: Campaign, store: Store) -> None:
@@ -134,18 +137,7 @@ def carry_out(
     jobs: int | None = None,
     timing: bool = True,
 ) -> Store:
-    """Run what is missing of a campaign in a directory, and return its store.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        What to run.
-    directory : Path
-        Where results go.
-    command : str
-        How to run it again.
-    executor, jobs, timing
-        As of `run`.
+    """Run what is missing of a campaign in a directory, and return its store; ``command`` runs it again.
 
     Raises
     ------
@@ -161,7 +153,16 @@ def carry_out(
         store.prepare()
         if references.make_missing(campaign, store, _say):  # to which the grid and the ids belong
             cases = loop.plan(campaign)
-        _measure(campaign, cases, store, pool, timing, command)
+        with store.locked():
+            ids = [case.id for case in cases]
+            index = Index(campaign=campaign, ids=ids, version=version("hbvm-bench"), command=command)
+            store.write_index(index)
+            try:
+                _run(campaign, cases, store, pool, timing)
+            except (KeyboardInterrupt, InterruptedRunError):
+                raise _given_up("interrupted", ids, store, INTERRUPTED) from None
+            except UnfinishedRunError as error:
+                raise _given_up(str(error), ids, store, UNFINISHED) from None
     return store
 
 
@@ -169,34 +170,11 @@ def _say(sentence: str) -> None:
     print(f"hbvm-bench: {sentence}", file=sys.stderr)
 
 
-def _say_run(campaign: str | None, file: str) -> None:
-    _say(f"running the Python file {file}" + (f", which {campaign} names" if campaign else ""))
-
-
-def _measure(
-    campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, timing: bool, command: str
-) -> None:
-    with store.locked():
-        index = Index(
-            campaign=campaign,
-            ids=[case.id for case in cases],
-            version=version("hbvm-bench"),
-            command=command,
-        )
-        store.write_index(index)
-        try:
-            _run(campaign, cases, store, pool, timing)
-        except (KeyboardInterrupt, InterruptedRunError):
-            raise _given_up("interrupted", cases, store, INTERRUPTED) from None
-        except UnfinishedRunError as error:
-            raise _given_up(str(error), cases, store, UNFINISHED) from None
-
-
-def _given_up(why: str, cases: list[Resolved], store: Store, code: int) -> typer.Exit:
+def _given_up(why: str, ids: list[str], store: Store, code: int) -> typer.Exit:
     supervise.stop_all()
-    kept = sum(store.load(case.id) is not None for case in cases)
-    message = f"{why}: {kept} of {len(cases)} cases are kept in {store.directory}; "
-    print(f"hbvm-bench: {message}run the same command again to go on.", file=sys.stderr)
+    kept = sum(store.load(key) is not None for key in ids)
+    done = f"{why}: {kept} of {len(ids)} cases are kept in {store.directory}"
+    _say(f"{done}; run the same command again to go on.")
     return typer.Exit(code)
 
 
@@ -246,11 +224,9 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, ti
 
 def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
     """Return what the same problems and methods took in this directory before, stale or not."""
-    before = (
-        {(record.case.problem, record.case.method): record.seconds for record in store.everything()}
-        if missing
-        else {}
-    )
+    if not missing:
+        return {}
+    before = {(one.case.problem, one.case.method): one.seconds for one in store.everything()}
     keys = {case.id: (case.case.problem, case.case.method) for case in missing}
     return {id_: before[key] for id_, key in keys.items() if key in before}
 

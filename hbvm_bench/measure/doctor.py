@@ -14,7 +14,7 @@ from typing import Literal
 import psutil
 
 import integrators.registry
-from hbvm_bench.campaign.identity import version_of_library
+from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.timing import calibrate
 from problems.errors import InputError
@@ -122,7 +122,7 @@ def methods() -> list[Finding]:
         else:
             known = {known for names in EXTRAS.values() for known in names} | {"hbvm-bench", "scipy"}
             if library.lower() not in known:
-                found.append(Finding(name, "ok", f"{library} {version_of_library(library)}"))
+                found.append(Finding(name, "ok", f"{library} {version_of(library)}"))
     return found
 
 

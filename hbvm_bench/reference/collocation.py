@@ -6,33 +6,33 @@ Legendre coefficients of the field: the last of s is of the size h^{s-1}, the
 error of the step about its square.
 """
 
-import ast
 import hashlib
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import mpmath
 import numpy as np
 from numba import njit
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hbvm_bench.reference import extended
-from hbvm_bench.reference.extended import number, plus, row, times
+from hbvm_bench.reference.extended import compiled, minus, plus, times
+from integrators import legendre
 from problems import emit
+from problems.analysis.double_double import DD
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.base import System
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.complex128]  # double-double, see `hbvm_bench.reference.extended`
 
 STAGES = 16
 DECAY = 1e-17  # of the last Legendre coefficient; its square is the size of the error
 MOST_ITERATIONS = 200
 
 
-def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
+def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Numbers:
     """Return the solution at given times as double-double numbers.
 
     Parameters
@@ -46,8 +46,8 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
 
     Returns
     -------
-    ndarray, shape (n, dim, 2)
-        The states are ``[..., 0] + [..., 1]``.
+    ndarray of complex, shape (n, dim)
+        Each number is the sum of its real and its imaginary part.
 
     Raises
     ------
@@ -55,14 +55,13 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
         If the iteration does not converge, or the step shrinks to nothing; for functions that
         double-double arithmetic does not have.
     """
-    advance = _program(problem.system)
-    nodes, weights, matrix, legendre = _tables(STAGES)
-    y, par = (np.stack([x, np.zeros_like(x)], axis=1) for x in (problem.y0, problem.par))
-    out = np.empty((len(at), *y.shape))
+    advance, tables = _program(problem.system), _tables(STAGES)
+    y, par = problem.y0.astype(complex), problem.par.astype(complex)
+    out = np.empty((len(at), y.size), complex)
     t, h = float(problem.t0), 0.0
     for i, end in enumerate(np.asarray(at, dtype=np.float64).tolist()):
         try:
-            code, h = advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay)
+            code, h = advance(t, end, h, y, par, *tables, decay)
         except NumbaError:
             raise InputError(
                 f"the field of {problem!r} has a function or a table that is not to be had in double-double."
@@ -74,55 +73,16 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Array:
     return out
 
 
-def decimals(states: Array) -> list[list[Any]]:
-    """Return states as mpmath numbers."""
-    with mpmath.workdps(50):
-        return [[mpmath.mpf(hi) + mpmath.mpf(lo) for hi, lo in state] for state in states.tolist()]
-
-
 @cache
-def _tables(s: int) -> tuple[Array, Array, Array, Array]:
-    """Return nodes and weights (s, 2), coefficients (s, s, 2), and some b_l P_j(c_l)."""
-    with mpmath.workdps(60):
-        roots = [_root(s, x) for x in np.polynomial.legendre.leggauss(s)[0].tolist()]
-        slopes = [_slope(s, x) for x in roots]
-        b = [1 / ((1 - x * x) * d * d) for x, d in zip(roots, slopes, strict=True)]
-        c = [(1 + x) / 2 for x in roots]
-        value = [[mpmath.sqrt(2 * j + 1) * mpmath.legendre(j, x) for j in range(s)] for x in roots]
-        integral = [[_integral(j, x) for j in range(s)] for x in roots]
-        a = [
-            [b[m] * mpmath.fsum(i * v for i, v in zip(integral[l], value[m], strict=True)) for m in range(s)]
-            for l in range(s)
-        ]
-        # Of the first Legendre coefficient and the last two.
-        projection = np.array([[_pair(b[l] * value[l][j]) for l in range(s)] for j in (0, s - 2, s - 1)])
-        nodes = np.array([_pair(x) for x in c])
-        matrix = np.array([[_pair(x) for x in line] for line in a])
-        return nodes, np.array([_pair(x) for x in b]), matrix, projection
-
-
-def _slope(s: int, x: Any) -> Any:
-    return s * (x * mpmath.legendre(s, x) - mpmath.legendre(s - 1, x)) / (x * x - 1)
-
-
-def _root(s: int, guess: float) -> Any:
-    x = mpmath.mpf(guess)
-    for _ in range(4):  # Newton's: 16, 32, 64 digits
-        x -= mpmath.legendre(s, x) / _slope(s, x)
-    return x
-
-
-def _integral(j: int, x: Any) -> Any:
-    """Return the integral of P_j from 0 to c = (1 + x)/2."""
-    if j == 0:
-        return (1 + x) / 2
-    root = mpmath.sqrt(2 * j + 1)
-    return (mpmath.legendre(j + 1, x) - mpmath.legendre(j - 1, x)) / (2 * root)
-
-
-def _pair(value: Any) -> tuple[float, float]:
-    high = float(value)
-    return high, float(value - mpmath.mpf(high))
+def _tables(s: int) -> list[Numbers]:
+    """Return nodes and weights (s,), coefficients (s, s), and b_l P_j(c_l) for the first and last two j."""
+    made = legendre.tables(s, s)
+    integrals, projection = (DD(table.hi, table.lo) for table in (made.integrals, made.projection))
+    matrix = DD(np.zeros((s, s)))
+    for j in range(s):
+        matrix = matrix + integrals[:, j, None] * projection[j]
+    found = made.nodes, made.weights, matrix, projection[[0, -2, -1]]
+    return [one.hi + 1j * one.lo for one in found]
 
 
 _programs: dict[str, Callable[..., Any]] = {}
@@ -133,35 +93,17 @@ def _program(system: System) -> Callable[..., Any]:
     made = emit.source(system, "field", "numba", limit=0)
     key = hashlib.sha256(made.text.encode()).hexdigest()
     if key not in _programs:
-        namespace: dict[str, Any] = {"np": np, "number": number, **extended.FUNCTIONS}
-        tree = ast.fix_missing_locations(_Numerators().visit(ast.parse(made.text)))
-        exec(compile(tree, "<field>", "exec"), namespace)  # noqa: S102 -- emitted from a graph
-        _programs[key] = _compiled(njit(namespace[made.name]))
+        _programs[key] = _integrator(compiled(made.text, made.name))
     return _programs[key]
 
 
-class _Numerators(ast.NodeTransformer):
-    """Turns literals that are divided into double-double numbers: 1.0/30.0 is no double."""
-
-    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        self.generic_visit(node)
-        if isinstance(node.op, ast.Div) and isinstance(node.left, ast.Constant):
-            zero = ast.Constant(0.0)
-            node.left = ast.Call(ast.Name("number", ast.Load()), [node.left, zero], [])
-        return node
-
-
-def _compiled(field: Any) -> Any:
+def _integrator(field: Any) -> Any:
     @njit
-    def evaluate(t, y, par, out):
-        field(t, row(y), row(par), row(out))
-
-    @njit
-    def advance(t, end, h, y, par, nodes, weights, matrix, legendre, decay):
+    def advance(t, end, h, y, par, nodes, weights, matrix, projection, decay):
         s, dim = len(nodes), len(y)
-        slope = np.zeros((s, dim, 2))
-        new = np.zeros((s, dim, 2))
-        stage = np.zeros((dim, 2))
+        slope = np.zeros((s, dim), np.complex128)
+        new = np.zeros((s, dim), np.complex128)
+        stage = np.zeros(dim, np.complex128)
         direction = 1.0 if end > t else -1.0
         if h == 0.0:
             h = direction * 1e-3 * abs(end - t)
@@ -172,30 +114,22 @@ def _compiled(field: Any) -> Any:
                 return 2, h
             after = end if last else t + step
             step = after - t
-            exact = plus(number(after, 0.0), number(-t, 0.0))  # from one double to the next
-            evaluate(number(t, 0.0), y, par, new[0])
+            exact = minus(after, t)  # from one double to the next
+            field(complex(t), y, par, new[0])
             for i in range(s):
                 slope[i] = new[0]
             before, change = np.inf, np.inf
             for _ in range(MOST_ITERATIONS):
                 for i in range(s):
                     for d in range(dim):
-                        total = number(0.0, 0.0)
-                        for j in range(s):
-                            a = number(matrix[i, j, 0], matrix[i, j, 1])
-                            total = plus(total, times(a, number(slope[j, d, 0], slope[j, d, 1])))
-                        total = times(total, exact)
-                        total = plus(number(y[d, 0], y[d, 1]), total)
-                        stage[d, 0] = total.hi
-                        stage[d, 1] = total.lo
-                    moment = times(exact, number(nodes[i, 0], nodes[i, 1]))
-                    evaluate(plus(number(t, 0.0), moment), stage, par, new[i])
+                        stage[d] = plus(y[d], times(_weighted(matrix[i], slope[:, d]), exact))
+                    field(plus(t, times(exact, nodes[i])), stage, par, new[i])
                 change, size = 0.0, 1e-300
                 for d in range(dim):
                     for i in range(s):
-                        gap = (new[i, d, 0] - slope[i, d, 0]) + (new[i, d, 1] - slope[i, d, 1])
-                        change = max(change, abs(gap))
-                        size = max(size, abs(new[i, d, 0]))
+                        gap = new[i, d] - slope[i, d]
+                        change = max(change, abs(gap.real + gap.imag))
+                        size = max(size, abs(new[i, d].real))
                 slope[:] = new
                 change /= size
                 if not change < np.inf:
@@ -208,20 +142,14 @@ def _compiled(field: Any) -> Any:
                     return 1, h
                 h = 0.25 * step
                 continue
-            ratio = _decay(slope, legendre)
+            ratio = _decay(slope, projection)
             factor = 0.9 * (decay / max(ratio, 1e-300)) ** (1.0 / (s - 1))
             factor = min(2.0, max(0.1, factor))
             if ratio > 30.0 * decay:
                 h = step * factor
                 continue
             for d in range(dim):
-                total = number(0.0, 0.0)
-                for j in range(s):
-                    b = number(weights[j, 0], weights[j, 1])
-                    total = plus(total, times(b, number(slope[j, d, 0], slope[j, d, 1])))
-                total = plus(number(y[d, 0], y[d, 1]), times(total, exact))
-                y[d, 0] = total.hi
-                y[d, 1] = total.lo
+                y[d] = plus(y[d], times(_weighted(weights, slope[:, d]), exact))
             t = after
             if not last:
                 h = step * factor
@@ -231,18 +159,20 @@ def _compiled(field: Any) -> Any:
 
 
 @njit
-def _decay(slope, legendre):
+def _weighted(weights, values):
+    """Return the sum of weights times values."""
+    total = complex(0.0)
+    for i in range(len(weights)):
+        total = plus(total, times(weights[i], values[i]))
+    return total
+
+
+@njit
+def _decay(slope, projection):
     """Return the largest of the last two Legendre coefficients relative to the largest of the first."""
-    s, dim, _ = slope.shape
     top, tail = 1e-300, 0.0
-    for j in range(3):
-        for d in range(dim):
-            total = number(0.0, 0.0)
-            for i in range(s):
-                weight = number(legendre[j, i, 0], legendre[j, i, 1])
-                total = plus(total, times(weight, number(slope[i, d, 0], slope[i, d, 1])))
-            if j == 0:
-                top = max(top, abs(total.hi))
-            else:
-                tail = max(tail, abs(total.hi))
+    for d in range(slope.shape[1]):
+        top = max(top, abs(_weighted(projection[0], slope[:, d]).real))
+        for j in range(1, 3):
+            tail = max(tail, abs(_weighted(projection[j], slope[:, d]).real))
     return tail / top

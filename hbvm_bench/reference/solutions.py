@@ -29,7 +29,27 @@ TOLERANCE = "1e-28"
 LONG = "long"  # the folder of those for long spans, whose two computations agree on fewer digits
 
 
-class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class Reference:
+    """A trusted solution, each number as an unevaluated sum of two doubles.
+
+    Attributes
+    ----------
+    t : ndarray, shape (n,)
+        The times.
+    high, low : ndarray, shape (n, dim)
+        The states are ``high + low``.
+    provenance : dict of str
+        What computed it, and what a second computation says.
+    """
+
+    t: Array
+    high: Array
+    low: Array
+    provenance: dict[str, str]
+
+
+class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
     """A stored reference as it stands in its file.
 
     Attributes
@@ -53,25 +73,18 @@ class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     t: list[str]
     y: list[list[str]]
 
+    @cached_property
+    def reference(self) -> Reference:
+        """Its states as pairs of doubles."""
+        exact = [[Decimal(value) for value in row] for row in self.y]
+        high = np.array([[float(value) for value in row] for row in exact])
+        low = np.array([[float(_CONTEXT.subtract(v, Decimal(float(v)))) for v in row] for row in exact])
+        return Reference(np.array([float.fromhex(t) for t in self.t]), high, low, self.provenance)
 
-@dataclass(frozen=True)
-class Reference:
-    """A trusted solution, each number as an unevaluated sum of two doubles.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        The times.
-    high, low : ndarray, shape (n, dim)
-        The states are ``high + low``.
-    provenance : dict of str
-        What computed it, and what a second computation says.
-    """
-
-    t: Array
-    high: Array
-    low: Array
-    provenance: dict[str, str]
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 of its times and states."""
+        return hashlib.sha256(msgspec.json.encode([self.t, self.y])).hexdigest()
 
 
 def folder() -> Path:
@@ -89,19 +102,23 @@ def find(problem: Problem) -> Reference | None:
         references the one that has the problem's end time is returned, or else the first. One that
         was made here (`know`) is preferred: it has this very span and formula.
     """
-    found = _stored(problem)
+    found = find_file(problem)
     return None if found is None else found.reference
 
 
 def find_file(problem: Problem) -> ReferenceFile | None:
     """Return the reference of a problem with all its digits, or ``None``; see `find`."""
-    found = _stored(problem)
-    return None if found is None else found.file
+    if _made_here and (found := _made_here.get(_key(problem))) is not None:
+        return found
+    wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
+    stored = _of_name(problem.name or "")
+    fitting = [one for one in stored if (one.start, one.parameters) == wanted]
+    return next((one for one in fitting if end in one.t), fitting[0] if fitting else None)
 
 
 def digest(problem: Problem) -> str:
     """Return the SHA-256 of the times and states of a problem's reference; ``""`` where it has none."""
-    found = _stored(problem)
+    found = find_file(problem)
     return "" if found is None else found.digest
 
 
@@ -113,36 +130,21 @@ def know(text: str) -> None:
     ValueError, LookupError
         If it is none.
     """
-    found = _Stored(msgspec.json.decode(text, type=ReferenceFile))
-    said = found.file.provenance
-    key = (*found.file.start, *found.file.parameters, said["field"], float(said["t_end"]).hex())
-    if found.reference.high.shape != found.reference.low.shape or len(found.reference.t) != len(found.file.y):
+    found = msgspec.json.decode(text, type=ReferenceFile)
+    if len(found.reference.t) != len(found.y):
         raise ValueError("a reference must have one state for each of its times")
+    said = found.provenance
+    key = (*found.start, *found.parameters, said["field"], float(said["t_end"]).hex())
     _made_here[key] = found
 
 
 def made_here(problem: Problem) -> str:
     """Return the text of a problem's reference that does not come with the package; ``""`` without one."""
     found = _made_here.get(_key(problem))
-    return "" if found is None else encode(found.file)
+    return "" if found is None else encode(found)
 
 
-class _Stored:
-    """A reference as its file has it, and what is made of it when it is asked for."""
-
-    def __init__(self, file: ReferenceFile) -> None:
-        self.file = file
-
-    @cached_property
-    def reference(self) -> Reference:
-        return parse(self.file)
-
-    @cached_property
-    def digest(self) -> str:
-        return hashlib.sha256(msgspec.json.encode([self.file.t, self.file.y])).hexdigest()
-
-
-_made_here: dict[tuple[str, ...], _Stored] = {}
+_made_here: dict[tuple[str, ...], ReferenceFile] = {}
 
 
 def _key(problem: Problem) -> tuple[str, ...]:
@@ -150,21 +152,25 @@ def _key(problem: Problem) -> tuple[str, ...]:
     return (*start(problem), *hexadecimal(problem.par), emit.fingerprint(problem.system), end)
 
 
-def _stored(problem: Problem) -> _Stored | None:
-    if _made_here and (found := _made_here.get(_key(problem))) is not None:
-        return found
-    wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
-    name = problem.name or ""
-    stored = _of_name(name) if name.isidentifier() else []
-    fitting = [one for one in stored if (one.file.start, one.file.parameters) == wanted]
-    return next((one for one in fitting if end in one.file.t), fitting[0] if fitting else None)
-
-
 @lru_cache(maxsize=64)
-def _of_name(name: str) -> list[_Stored]:
+def _of_name(name: str) -> list[ReferenceFile]:
     """Return the references that come with the package for problems of a name."""
+    if not name.isidentifier():
+        return []
     places = (folder(), folder() / LONG)
-    return [_Stored(read(path)) for place in places for path in sorted(place.glob(f"{name}*.json"))]
+    return [read(path) for place in places for path in sorted(place.glob(f"{name}*.json"))]
+
+
+def of(problem: Problem, times: Array, states: list[list[str]], made: dict[str, str]) -> ReferenceFile:
+    """Return the reference of a problem: states as text at some times, and how they were made."""
+    return ReferenceFile(
+        problem=repr(problem),
+        start=start(problem),
+        parameters=hexadecimal(problem.par),
+        provenance=made | {"field": emit.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
+        t=hexadecimal(times),
+        y=states,
+    )
 
 
 def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:
@@ -177,18 +183,8 @@ def of_end(problem: Problem, end: Sequence[float]) -> ReferenceFile:
     """
     if len(end) != problem.system.dim or not np.isfinite(end).all():
         raise InputError(f"end={list(end)!r} of {problem!r} must be {problem.system.dim} finite numbers.")
-    return ReferenceFile(
-        problem=repr(problem),
-        start=start(problem),
-        parameters=hexadecimal(problem.par),
-        provenance={
-            "method": "the end state that the campaign gives",
-            "field": emit.fingerprint(problem.system),
-            "t_end": repr(float(problem.t_end)),
-        },
-        t=hexadecimal(np.array([problem.t_end])),
-        y=[[repr(float(value)) for value in end]],
-    )
+    states = [[repr(float(value)) for value in end]]
+    return of(problem, np.array([problem.t_end]), states, {"method": "the end state that the campaign gives"})
 
 
 def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
@@ -205,14 +201,8 @@ def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
 
 def encode(stored: ReferenceFile) -> str:
     """Return the text of a reference file, one state a line."""
-    head = {
-        "problem": stored.problem,
-        "provenance": stored.provenance,
-        "start": stored.start,
-        "parameters": stored.parameters,
-        "t": stored.t,
-    }
-    lines = [f"{_text(key)}: {_text(value)}" for key, value in head.items()]
+    order = ("problem", "provenance", "start", "parameters", "t")
+    lines = [f'"{key}": {_text(getattr(stored, key))}' for key in order]
     rows = ",\n".join(f"  {_text(row)}" for row in stored.y)
     return "{" + ",\n".join([*lines, f'"y": [\n{rows}\n]']) + "}\n"
 
@@ -237,14 +227,6 @@ def start(problem: Problem) -> list[str]:
 def read(path: Path) -> ReferenceFile:
     """Return a stored reference with all its digits."""
     return msgspec.json.decode(path.read_bytes(), type=ReferenceFile)
-
-
-def parse(stored: ReferenceFile) -> Reference:
-    """Return a stored reference as pairs of doubles."""
-    exact = [[Decimal(value) for value in row] for row in stored.y]
-    high = np.array([[float(value) for value in row] for row in exact])
-    low = np.array([[float(_CONTEXT.subtract(v, Decimal(float(v)))) for v in row] for row in exact])
-    return Reference(np.array([float.fromhex(t) for t in stored.t]), high, low, stored.provenance)
 
 
 def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "real128") -> list[list[Decimal]]:

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from decimal import Context, Decimal
 from importlib.metadata import version
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.reference import collocation, solutions
 from hbvm_bench.reference.solutions import ReferenceFile
-from problems import emit
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -30,6 +28,7 @@ ROWS = ((20, 50), (SMALL, 20), (100, 10))
 FEW_ROWS = 4  # of larger systems
 FEW_DIGITS = 21  # above SMALL unknowns
 LONG_DOUBLE_TOLERANCE = "1e-20"
+_EXACT = Context(prec=36)
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,7 @@ class Opinions:
     @property
     def agreed(self) -> int:
         """How many of the times come before they differ by more than what is wanted."""
-        return (
-            int(np.argmax(self.apart > self.wanted)) if (self.apart > self.wanted).any() else len(self.times)
-        )
+        return int((self.apart <= self.wanted).sum())
 
 
 def times(problem: Problem, until: float | None = None) -> Array:
@@ -99,13 +96,12 @@ def _places(problem: Problem, count: int) -> NDArray[np.int64]:
 
 def ask(problem: Problem, at: Array) -> Opinions:
     """Compute a problem twice, at the given times."""
-    pairs = collocation.integrate(problem, at)
+    found = collocation.integrate(problem, at)
     gauss = (
         f"Gauss collocation with {collocation.STAGES} stages, double-double arithmetic, "
         f"last Legendre coefficient {collocation.DECAY:g}"
     )
-    with mpmath.workdps(40):
-        collocated = [[Decimal(str(mpmath.nstr(x, 36))) for x in row] for row in collocation.decimals(pairs)]
+    collocated = [[_EXACT.add(Decimal(x.real), Decimal(x.imag)) for x in row] for row in found.tolist()]
     if problem.system.dim <= SMALL:
         states = solutions.taylor(problem, at, solutions.TOLERANCE)
         made = f"heyoka taylor_adaptive, fp_type=real128, tol={solutions.TOLERANCE}, high_accuracy=True"
@@ -145,11 +141,12 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             f"t = {float(opinions.times[1])!r}; ask for less with until=."
         )
     horizon = "the whole span" if opinions.times[kept - 1] == problem.t_end else "this horizon"
-    return ReferenceFile(
-        problem=repr(problem),
-        start=solutions.start(problem),
-        parameters=solutions.hexadecimal(problem.par),
-        provenance={
+    text = str if problem.system.dim <= SMALL else _few_digits
+    return solutions.of(
+        problem,
+        opinions.times[:kept],
+        [[text(value) for value in row] for row in opinions.states[:kept]],
+        {
             "method": opinions.first,
             "check": opinions.second,
             "agreement": (
@@ -158,32 +155,21 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             ),
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
-            "field": emit.fingerprint(problem.system),
-            "t_end": repr(float(problem.t_end)),
         },
-        t=solutions.hexadecimal(opinions.times[:kept]),
-        y=[[_text(problem, value) for value in row] for row in opinions.states[:kept]],
     )
 
 
-def _text(problem: Problem, value: Decimal) -> str:
-    if problem.system.dim <= SMALL:
-        return str(value)
+def _few_digits(value: Decimal) -> str:
     return str(Context(prec=FEW_DIGITS).plus(value))
 
 
 def _apart(problem: Problem, one: list[list[Decimal]], other: list[list[Decimal]]) -> Array:
-    a, b = (np.array([[float(value) for value in row] for row in rows]) for rows in (one, other))
-    gap = np.array(
-        [
-            [float(abs(x - y)) for x, y in zip(row, rest, strict=True)]
-            for row, rest in zip(one, other, strict=True)
-        ]
-    )
+    first, second = np.array(one), np.array(other)  # of decimals
+    a, b, gap = (np.abs(states).astype(float) for states in (first, second, first - second))
     found = np.zeros(len(gap))
     dof = problem.system.dof or problem.system.dim
     for block in (slice(0, dof), slice(dof, None)):
         if gap[:, block].size:
-            size = max(np.abs(a[:, block]).max(), np.abs(b[:, block]).max())
+            size = max(a[:, block].max(), b[:, block].max())
             found = np.maximum(found, gap[:, block].max(axis=1) / (size or 1.0))
     return np.maximum.accumulate(found)

@@ -35,59 +35,35 @@ class Estimate:
     def left(
         self, waiting: Sequence[str], running: Mapping[str, float], slots: int
     ) -> tuple[float, float] | None:
-        """Return the range of seconds until all is done.
+        """Return the range of seconds until all is done, ``None`` where too little is known.
 
-        Parameters
-        ----------
-        waiting : sequence of str
-            Ids of cases that have not begun; one that comes twice is run twice.
-        running : mapping of str to float
-            Ids of those that run, and their seconds so far.
-        slots : int
-            Cases side by side.
-
-        Returns
-        -------
-        low, high : float
-            Or ``None`` where too little is known.
+        ``waiting`` has the ids of cases that have not begun, as often as each is to run; ``running`` the
+        seconds of the others so far; ``slots`` run side by side.
         """
-        means = {key: self._mean(key) for key in {*waiting, *running}}
-        if slots < 1 or None in means.values():
+        taken = self._taken
+        means = {key: seconds * self._speed() for key, seconds in self._known.items()} | taken
+        strangers = [key for key in waiting if key not in means]
+        if slots < 1 or (len(taken) < FEWEST and (strangers or not running.keys() <= means.keys())):
             return None
-        mean = {key: seconds or 0.0 for key, seconds in means.items()}
-        rest = [self._rest(mean[key], ran) for key, ran in running.items()]
-        total = sum(mean[key] for key in waiting) + sum(rest)
-        doubt = 2 * math.sqrt(self._variance(waiting, mean))
+        usual = fmean(taken.values()) if taken else 0.0
+        mean = {key: means.get(key, usual) for key in {*waiting, *running}}
+        rest = [  # one that is overdue may take as long again
+            mean[key] - ran if ran < mean[key] else max(min(ran, self._limit - ran), 0.0)
+            for key, ran in running.items()
+        ]
+        scatter = sum((SPREAD * mean[key]) ** 2 for key in waiting if key in means)
+        if strangers:
+            scatter += variance(taken.values()) * (len(strangers) + len(strangers) ** 2 / len(taken))
+        total, doubt = sum(mean[key] for key in waiting) + sum(rest), 2 * math.sqrt(scatter)
         most = self._limit * math.ceil((len(waiting) + len(running)) / slots)
         low = max((total - doubt) / slots, 0.0)
         return low, max(min(max((total + doubt) / slots, max(rest, default=0.0)), most), low)
-
-    def _rest(self, mean: float, ran: float) -> float:
-        """Return the seconds left of a case; one that is overdue may take as long again."""
-        return mean - ran if ran < mean else max(min(ran, self._limit - ran), 0.0)
-
-    def _mean(self, key: str) -> float | None:
-        if key in self._taken:
-            return self._taken[key]
-        if key in self._known:
-            return self._known[key] * self._speed()
-        if len(self._taken) < FEWEST:
-            return None
-        return fmean(self._taken.values())
 
     def _speed(self) -> float:
         """Return how much longer this run takes than the earlier one."""
         both = self._taken.keys() & self._known.keys()
         before = sum(self._known[key] for key in both)
         return sum(self._taken[key] for key in both) / before if before > 0 else 1.0
-
-    def _variance(self, waiting: Sequence[str], mean: Mapping[str, float]) -> float:
-        familiar = [key for key in waiting if key in self._known or key in self._taken]
-        found = sum((SPREAD * mean[key]) ** 2 for key in familiar)
-        if strangers := len(waiting) - len(familiar):
-            taken = self._taken.values()
-            found += variance(taken) * (strangers + strangers**2 / len(taken))
-        return found
 
 
 def in_words(left: tuple[float, float] | None) -> str:

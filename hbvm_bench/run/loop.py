@@ -59,19 +59,10 @@ def run_accuracy(
 ) -> Iterator[Record]:
     """Run cases side by side, store each as it finishes, and yield its record.
 
-    Parameters
-    ----------
-    cases : sequence of Resolved
-        What to run.
-    store : Store
-        This process alone writes there; the executor's may be other machines.
-    limits : Limits
-        Of each case.
-    pool : Pool
-        The executor. It has as many cases as it has slots, and never a long queue, so that
-        what runs is known, and little is left behind where the run is stopped.
-    tell : callable, optional
-        Called with the running cases, whenever they change and about once a second.
+    This process alone writes in the store; the executor's may be other machines. The executor has as many
+    cases as it has slots, and never a long queue, so that what runs is known, and little is left
+    behind where the run is stopped. ``tell`` is called with the running cases, whenever they change
+    and about once a second.
 
     Raises
     ------

@@ -19,19 +19,8 @@ def make_missing(campaign: Campaign, store: Store, tell: Callable[[str], None]) 
     see `hbvm_bench.reference.trusted`; where they differ too early there is none, and the report says
     that no position was measured.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        Its problems say ``reference`` or ``end``.
-    store : Store
-        They are kept there.
-    tell : callable
-        Called with a sentence before and after each.
-
-    Returns
-    -------
-    bool
-        Whether there are new ones.
+    They are kept in the store; ``tell`` is called with a sentence before and after each. Return whether
+    there are new ones.
 
     Raises
     ------

@@ -16,11 +16,13 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import psutil
 
 from hbvm_bench.campaign.file import Limits
+from hbvm_bench.run.warm import Fork
+from hbvm_bench.run.worker import kibibytes
 
 Cause = Literal["exit", "compiling", "timeout", "memory", "stopped"]
 POLL = 0.02  # seconds, at first
@@ -56,36 +58,24 @@ class Ended:
     @property
     def words(self) -> str:
         """Say how it ended, as part of a sentence."""
-        if self.code < 0:
-            return f"ended by signal {_signal_name(-self.code)}"
-        return f"ended with exit code {self.code}"
+        if self.code >= 0:
+            return f"ended with exit code {self.code}"
+        known = {one.value: one.name for one in signal.Signals}
+        return f"ended by signal {known.get(-self.code, -self.code)}"
 
 
-class Process(Protocol):
-    """A process that can be watched.
+class Fresh:
+    """A process that begins with nothing: a command, whose environment is added to this one's.
+
+    It leads a session of its own, as a `hbvm_bench.run.warm.Fork` does, which can be watched likewise.
 
     Attributes
     ----------
     pid : int
-        It leads a session of its own.
+        Of the process.
     output : int
         The file descriptor where what it prints is read.
     """
-
-    pid: int
-    output: int
-
-    def wait(self, seconds: float | None = None) -> int | None:
-        """Return its exit code, or ``None`` where it still runs after so many seconds."""
-        ...
-
-    def kill(self) -> None:
-        """Kill it and what it has started, unless it has ended."""
-        ...
-
-
-class Fresh:
-    """A process that begins with nothing: a command, whose environment is added to this one's."""
 
     def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
         self.output, out = os.pipe()
@@ -118,17 +108,17 @@ class Fresh:
             os.killpg(self.pid, signal.SIGKILL)
 
 
-_children: set[Process] = set()
+_children: set[Fresh | Fork] = set()
 _lock = threading.Lock()
 _stopping = threading.Event()
 
 
-def watch(child: Process, limits: Limits, compiled: Path | None = None) -> Ended:
+def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> Ended:
     """Wait for the end of a process, or end it at its limits.
 
     Parameters
     ----------
-    child : Process
+    child : Fresh or Fork
         It has just been started.
     limits : Limits
         Wall seconds and resident memory.
@@ -201,15 +191,9 @@ def _drain(output: int, kept: deque[bytes]) -> None:
 
 
 def _peak_gib(pid: int) -> float:
-    try:
-        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return 0.0
-    sizes = {name: value for name, _, value in (line.partition(":") for line in status.splitlines())}
-    peak, resident, swapped = (
-        int((sizes.get(name) or "0").split()[0]) for name in ("VmHWM", "VmRSS", "VmSwap")
-    )
-    return max(peak, resident + swapped) / 2**20  # what was swapped out is eaten, too
+    sizes = kibibytes(pid)
+    resident = sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)  # what was swapped out is eaten, too
+    return max(sizes.get("VmHWM", 0), resident) / 2**20
 
 
 def _together_gib(session: int) -> float:
@@ -229,10 +213,3 @@ def _share_gib(process: psutil.Process) -> float:
         memory = process.memory_full_info()
         return (memory.pss + memory.swap) / 2**30
     return 0.0
-
-
-def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return str(number)

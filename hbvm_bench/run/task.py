@@ -14,7 +14,7 @@ import msgspec
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits
-from hbvm_bench.campaign.identity import Resolved, is_ours, resolve, versions_of
+from hbvm_bench.campaign.identity import Resolved, of_method, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.run import supervise, warm
@@ -104,9 +104,7 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     record = Record(
         id=resolved.id,
         case=resolved.case,
-        role="ours" if is_ours(resolved.method) else "peer",
-        library=resolved.method.library,
-        order=resolved.method.order,
+        **of_method(resolved.method),
         result=result,
         limits=asked.limits,
         seconds=round(ended.seconds, 3),

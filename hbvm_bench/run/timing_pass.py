@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-import msgspec
+from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits, TimingPlan
@@ -20,7 +20,9 @@ from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
 
 Tell = Callable[[int, Resolved], None]
+Machine = dict[str, str | int]
 OFF = "on another trajectory, so that its time has no meaning"
+ENDINGS = {"timeout": "the time limit", "compiling": "still compiling", "memory": "the memory limit"}
 
 
 def time_cases(
@@ -56,37 +58,26 @@ def time_cases(
     here = machine.describe(measure=True)
     failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
-        if plan.interleaved:
-            for group in _missing_together(cases, store, plan, here):
-                _visit_together(group, store, plan, limits, core, here, tell)
-            return
-        for number in range(plan.rounds):
-            for resolved in cases:
-                record = store.load(resolved.id)
-                if record is None or not timeable(record) or resolved.id in failed:
-                    continue
-                timing = _timing_of(record, here)
-                if len(timing.rounds) > number:
-                    continue
-                tell(number, resolved)
-                timing = _visit(resolved, timing, plan, limits, core)
-                failed |= {resolved.id} if timing.why else set()
-                store.save(_with_timing(store, record, resolved, timing))
+        for number, group in _missing(cases, store, plan, here):
+            records = [record for one in group if (record := store.load(one.id)) is not None]
+            if len(records) < len(group) or group[0].id in failed:
+                continue
+            tell(number, group[0])
+            if plan.interleaved:
+                timings = _together(group, records, plan, limits, core, here)
+            else:
+                (made,) = _asked(group, plan, limits, core)
+                before = _timing_of(records[0], here)
+                rounds = [*before.rounds, *made.rounds]
+                timings = [Timing(rounds=rounds, why=made.why, machine=before.machine)]
+                failed |= {group[0].id} if made.why else set()
+            for one, record, timing in zip(group, records, timings, strict=True):
+                store.save(_with_timing(store, record, one, timing))
 
 
 def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> list[str]:
     """Return the ids that `time_cases` has to visit, each as often as it does, at most."""
-    here = machine.describe()
-    if plan.interleaved:
-        return [group[0].id for group in _missing_together(cases, store, plan, here)]
-    records = [record for case in cases if (record := store.load(case.id)) and timeable(record)]
-    timings = {record.id: _timing_of(record, here) for record in records}
-    return [
-        key
-        for number in range(plan.rounds)
-        for key, timing in timings.items()
-        if len(timing.rounds) <= number
-    ]
+    return [group[0].id for _, group in _missing(cases, store, plan, machine.describe())]
 
 
 def timeable(record: Record) -> bool:
@@ -94,70 +85,57 @@ def timeable(record: Record) -> bool:
     return record.result.outcome == "ok" and record.result.status == "finished"
 
 
-def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timing) -> Record:
-    series = store.series(record.id)
-    known = solutions.find(resolved.problem)
-    measured = measure.restore(resolved.problem, series, record.result, known, timing)
-    result = msgspec.structs.replace(
-        record.result, metrics=record.result.metrics | evaluate(measured, TIMING_KEYS)
-    )
-    return msgspec.structs.replace(record, result=result, timing=timing)
+def _missing(
+    cases: Sequence[Resolved], store: Store, plan: TimingPlan, here: Machine
+) -> list[tuple[int, list[Resolved]]]:
+    """Return the visits: of what round each is, and whom one process times in it.
 
-
-def _missing_together(
-    cases: Sequence[Resolved], store: Store, plan: TimingPlan, here: dict[str, str | int]
-) -> list[list[Resolved]]:
-    """Return the cases to be timed, problem by problem: all of those that reached their end, or none.
-
-    Rounds of different processes do not belong together, so that one missing case has all of them visited.
+    Rounds of different processes do not belong together: where one case of a problem is missing among its
+    interleaved times, all of them are visited.
     """
-    groups: dict[object, list[Resolved]] = {}
-    for resolved in cases:
-        record = store.load(resolved.id)
-        if record is not None and timeable(record) and plan.rounds:
-            groups.setdefault((resolved.case.problem, resolved.case.ensemble), []).append(resolved)
-    return [group for group in groups.values() if not _timed_together(group, store, plan, here)]
+    loaded = ((one, store.load(one.id)) for one in cases)
+    known = [(one, record) for one, record in loaded if record is not None and timeable(record)]
+    if not plan.interleaved:
+        taken = {one.id: len(_timing_of(record, here).rounds) for one, record in known}
+        rounds = range(plan.rounds)
+        return [(number, [one]) for number in rounds for one, _ in known if taken[one.id] <= number]
+    groups: dict[object, list[tuple[Resolved, Record]]] = {}
+    for one, record in known if plan.rounds else ():
+        groups.setdefault((one.case.problem, one.case.ensemble), []).append((one, record))
+    return [
+        (0, [one for one, _ in group])
+        for group in groups.values()
+        if not _is_timed([record for _, record in group], plan, here)
+    ]
 
 
-def _timed_together(
-    group: Sequence[Resolved], store: Store, plan: TimingPlan, here: dict[str, str | int]
-) -> bool:
-    kept = [record.timing for one in group if (record := store.load(one.id)) is not None]
-    timings = [timing for timing in kept if timing is not None and machine.same(timing.machine, here)]
+def _is_timed(group: Sequence[Record], plan: TimingPlan, here: Machine) -> bool:
+    """Whether one process has timed all cases of a problem in turn, on this machine."""
+    timings = [one.timing for one in group if one.timing and machine.same(one.timing.machine, here)]
     processes = {timing.process for timing in timings}
     enough = any(len(timing.rounds) >= plan.rounds for timing in timings)
     return len(timings) == len(group) and len(processes) == 1 and "" not in processes and enough
 
 
-def _visit_together(
+def _together(
     group: Sequence[Resolved],
-    store: Store,
+    records: Sequence[Record],
     plan: TimingPlan,
     limits: Limits,
     core: int | None,
-    here: dict[str, str | int],
-    tell: Tell,
-) -> None:
-    tell(0, group[0])
-    records = {one.id: record for one in group if (record := store.load(one.id)) is not None}
-    on = [one for one in group if not records[one.id].result.violation]
-    timings = dict.fromkeys((one.id for one in group), Timing(why=OFF))
+    here: Machine,
+) -> list[Timing]:
+    """Time the cases of a problem in turn in one process, but for those on another trajectory."""
+    on = [one for one, record in zip(group, records, strict=True) if not record.result.violation]
     process = datetime.now(UTC).isoformat()
-    if on:
-        together = msgspec.structs.replace(
-            limits,
-            wall_seconds=limits.wall_seconds * len(on),
-            compile_seconds=limits.compile_seconds * len(on),
-        )
-        timings |= zip((one.id for one in on), _asked(on, plan, together, core), strict=True)
-    for one in group:
-        timing = msgspec.structs.replace(timings[one.id], machine=here, process=process)
-        store.save(_with_timing(store, records[one.id], one, timing))
-
-
-def _visit(resolved: Resolved, timing: Timing, plan: TimingPlan, limits: Limits, core: int | None) -> Timing:
-    (made,) = _asked([resolved], plan, limits, core)
-    return Timing(rounds=[*timing.rounds, *made.rounds], why=made.why, machine=timing.machine)
+    together = replace(
+        limits,
+        wall_seconds=limits.wall_seconds * len(on),
+        compile_seconds=limits.compile_seconds * len(on),
+    )
+    made = zip((one.id for one in on), _asked(on, plan, together, core), strict=True) if on else ()
+    timings = {one.id: Timing(why=OFF) for one in group} | dict(made)
+    return [replace(timing, machine=here, process=process) for timing in timings.values()]
 
 
 def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None) -> list[Timing]:
@@ -169,19 +147,21 @@ def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: in
         reply = decoded(Path(scratch) / REPLY, list[Timing])
     if reply is not None and len(reply) == len(cases):
         return reply
-    words = {
-        "timeout": "the time limit",
-        "compiling": "still compiling",
-        "memory": "the memory limit",
-    }.get(ended.cause, ended.words)
-    return [Timing(why=f"not timed: {words}")] * len(cases)
+    return [Timing(why=f"not timed: {ENDINGS.get(ended.cause, ended.words)}")] * len(cases)
 
 
-def _timing_of(record: Record, here: dict[str, str | int]) -> Timing:
+def _timing_of(record: Record, here: Machine) -> Timing:
     """Return what was timed on this machine; seconds of another one are no rounds of the same pass.
 
     Why a round failed is forgotten: it is tried again.
     """
     if record.timing is None or (record.timing.machine and not machine.same(record.timing.machine, here)):
         return Timing(machine=here)
-    return msgspec.structs.replace(record.timing, why="")
+    return replace(record.timing, why="")
+
+
+def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timing) -> Record:
+    known = solutions.find(resolved.problem)
+    measured = measure.restore(resolved.problem, store.series(record.id), record.result, known, timing)
+    metrics = record.result.metrics | evaluate(measured, TIMING_KEYS)
+    return replace(record, result=replace(record.result, metrics=metrics), timing=timing)

@@ -34,29 +34,19 @@ from hbvm_bench.run import worker
 DONE = b"done"
 LONGEST = 2**16  # bytes of a message: a path
 PATIENCE = 60.0  # seconds for an interpreter to start on a busy machine
-GROWTH = 2**28  # bytes that a process may have grown by and still be forked from
+GROWTH = 2**18  # KiB that a process may have grown by and still be forked from
 
 
 @dataclass
 class Nest:
-    """A process that has imported the libraries, and those that have done a case, one of each library.
+    """A process that has imported the libraries, and those that have done a case, one of each library."""
 
-    Attributes
-    ----------
-    place : object
-        The environment, the directory and the cores of its processes.
-    process : subprocess.Popen
-        The one that has imported the libraries.
-    asked : socket.socket
-        It is asked there.
-    done : dict of (str, socket.socket)
-        By library, the problem that the other process has done, and where to ask it.
-    """
-
-    place: object
+    place: object  # the environment, the directory and the cores of its processes
     process: "subprocess.Popen[bytes]"
     asked: socket.socket
-    done: dict[str, tuple[str, socket.socket]] = field(default_factory=dict)
+    done: dict[str, tuple[str, socket.socket]] = field(
+        default_factory=dict
+    )  # by library: problem, where to ask
 
     def start(self, path: Path, library: str, problem: str) -> "Fork":
         """Start the process of a request.
@@ -84,7 +74,7 @@ class Nest:
 
 
 class Fork:
-    """The process of one case, a fork of a warm one; see `hbvm_bench.run.supervise.Process`.
+    """The process of one case, a fork of a warm one; see `hbvm_bench.run.supervise.watch`.
 
     Attributes
     ----------
@@ -189,13 +179,13 @@ def _new(environment: Mapping[str, str], place: object) -> Nest:
 
 def main(asked: socket.socket) -> None:
     """Be a warm process: what returns from `_fork` is the process of a case, which may become one itself."""
-    cores, size, first = os.sched_getaffinity(0), _size(), True
+    cores, size, first = os.sched_getaffinity(0), _resident(), True
     while True:
         parent, path, runner = _fork(asked)
         code = _code(path, parent, first)
         sys.stdout.flush()
         sys.stderr.flush()
-        if code or not (first and _is_alone() and _size() - size < GROWTH):
+        if code or not (first and _is_alone() and _resident() - size < GROWTH):
             os._exit(code)
         os.sched_setaffinity(0, cores)
         for stream in (1, 2):  # its output has ended
@@ -277,9 +267,8 @@ def _is_alone() -> bool:
     return len(tasks) == 1 and not (tasks[0] / "children").read_text(encoding="ascii")
 
 
-def _size() -> int:
-    """Return the resident memory of this process in bytes."""
-    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+def _resident() -> int:
+    return worker.kibibytes(os.getpid())["VmRSS"]
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -83,24 +83,10 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     core: int | None = None
 
 
-class _Fork(NamedTuple):
-    """The process that this one is a fork of, and what was found loaded."""
-
-    parent: int
-    found: Found
-
-
 def work(path: Path, parent: int, found: Found = "nothing") -> None:
-    """Do what a request asks, as the only thing that this process does.
+    """Do what the request at a path asks, as the only thing that this process does.
 
-    Parameters
-    ----------
-    path : Path
-        Of the request.
-    parent : int
-        The process that has made this one: without it there is nobody to answer.
-    found : {"nothing", "libraries", "code"}
-        What this process has not loaded itself but found loaded, being a fork of ``parent``.
+    It ends with ``parent``, which has made it. What it has ``found`` loaded, as a fork of it, is not counted.
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     own.learn(request.beside)
@@ -111,7 +97,7 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
     try:
         if request.plan is None:
-            reply: object = _measure(request, path.parent, _Fork(parent, found))
+            reply: object = _measured(request, path.parent, parent, found)
         else:
             reply = _time(request, request.plan, path.parent)
         with atomic(path.parent / REPLY) as temporary:
@@ -135,7 +121,15 @@ def limit_and_die_with(parent: int) -> None:
             sys.exit(1)
 
 
-def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
+def _measured(request: Request, directory: Path, parent: int, found: Found) -> Result:
+    result = _measure(request, directory)
+    if result.outcome not in ("ok", "stalled"):
+        return result
+    compiled = None if found == "code" else result.compile  # else the seconds say nothing
+    return msgspec.structs.replace(result, compile=compiled, peak_gib=_peak_gib(parent, found))
+
+
+def _measure(request: Request, directory: Path) -> Result:
     try:
         (resolved,) = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
@@ -147,7 +141,7 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
         program = _compiled(resolved)
         (directory / COMPILED).touch()
         if (asked := resolved.case.ensemble) is not None:
-            return _stored(*ensemble.measure(resolved.problem, program, asked), directory, fork)
+            return _stored(directory, *ensemble.measure(resolved.problem, program, asked))
         integrate = solve_with_bare_end if resolved.case.grid.own_steps else solve
         solution = integrate(resolved.problem, resolved.method, program, grid)
     except OSError as error:
@@ -168,16 +162,11 @@ def _measure(request: Request, directory: Path, fork: _Fork) -> Result:
     except Exception as error:
         traceback.print_exc()
         return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    return _stored(measured, solution.status, solution.reason, directory, fork, solution.warnings)
+    return _stored(directory, measured, solution.status, solution.reason, solution.warnings)
 
 
 def _stored(
-    measured: Measured,
-    status: Status,
-    reason: str,
-    directory: Path,
-    fork: _Fork,
-    said: Sequence[str] = (),
+    directory: Path, measured: Measured, status: Status, reason: str, said: Sequence[str] = ()
 ) -> Result:
     with atomic(directory / "series.npz") as temporary:
         temporary.write_bytes(encode_series(measured.series()))
@@ -187,12 +176,11 @@ def _stored(
         reason=reason,
         t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
         counters=measured.counters,
-        compile=None if fork.found == "code" else measured.compile,  # else the seconds say nothing
+        compile=measured.compile,
         laws=measured.laws,
         trajectories=measured.trajectories,
         warnings=list(said),
         reversal=_value(measured.reversal),
-        peak_gib=_peak_gib(fork),
     )
 
 
@@ -202,16 +190,23 @@ def _value(number: float | str) -> Value:
     return Value(value=number) if np.isfinite(number) else Value(why="not finite")
 
 
-def _peak_gib(fork: _Fork) -> float:
+def _peak_gib(parent: int, found: Found) -> float:
     """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
-    untouched = 0 if fork.found == "nothing" else _mapped(fork.parent) - _mapped(os.getpid())
+    untouched = 0
+    if found != "nothing":
+        theirs, ours = (kibibytes(pid).get("RssFile", 0) for pid in (parent, os.getpid()))
+        untouched = theirs - ours
     return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + max(untouched, 0)) / 2**20
 
 
-def _mapped(pid: int) -> int:
-    """Return how much of files is in the resident memory of a process, in KiB."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("RssFile:")), 0)
+def kibibytes(pid: int) -> dict[str, int]:
+    """Return what the system says of the memory of a process, such as ``VmRSS``; nothing if it has ended."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return {}
+    words = (line.split() for line in status.splitlines() if line.endswith(" kB"))
+    return {name.rstrip(":"): int(size) for name, size, _ in words}
 
 
 def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:

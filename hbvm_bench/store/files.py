@@ -63,7 +63,7 @@ def write_all(files: Mapping[Path, bytes]) -> None:
         If one cannot be written; what there was is left as it was.
     """
     folders = {path.parent for path in files}
-    new = {path for folder in folders for path in (folder, *folder.parents) if not path.exists()}
+    new = _missing(folders)
     try:
         for folder in folders:
             ensure_writable(folder)
@@ -71,9 +71,7 @@ def write_all(files: Mapping[Path, bytes]) -> None:
             for path, content in files.items():
                 stack.enter_context(atomic(path)).write_bytes(content)
     except BaseException:
-        for path in sorted(new, reverse=True):
-            with suppress(OSError):
-                path.rmdir()
+        _remove(new)
         raise
 
 
@@ -85,13 +83,10 @@ def ensure_writable(directory: Path, *, keep: bool = True) -> None:
     problems.errors.InputError
         With the reason.
     """
-    made: list[Path] = []
-    kept = False
+    new, kept = _missing([directory]), False
     try:
-        missing = [path for path in (directory, *directory.parents) if not path.exists()]
-        for path in reversed(missing):
-            path.mkdir(exist_ok=True)
-            made.append(path)
+        if new:
+            directory.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=directory):
             pass
         kept = keep
@@ -99,5 +94,14 @@ def ensure_writable(directory: Path, *, keep: bool = True) -> None:
         raise InputError(f"cannot write to the directory {str(directory)!r}: {error.strerror}.") from None
     finally:
         if not kept:
-            for path in reversed(made):
-                path.rmdir()
+            _remove(new)
+
+
+def _missing(folders: Iterable[Path]) -> set[Path]:
+    return {path for folder in folders for path in (folder, *folder.parents) if not path.exists()}
+
+
+def _remove(folders: Iterable[Path]) -> None:
+    for path in sorted(folders, reverse=True):
+        with suppress(OSError):
+            path.rmdir()

@@ -79,20 +79,22 @@ def keep(run: Kept, path: Path, name: str) -> None:
     again = {one.case.problem for one in run.records}
     old = [
         msgspec.structs.replace(one, records=[kept for kept in one.records if kept.case.problem not in again])
-        for one in (load(path, name) if path.is_file() else [])
+        for one in load(path, name)
     ]
     with atomic(path) as temporary:  # in one line: a race has a thousand records
         temporary.write_bytes(msgspec.json.encode([*(one for one in old if one.records), run]))
 
 
 def load(path: Path, name: str) -> list[Kept]:
-    """Read runs of a campaign from one file, in the order in which they were measured.
+    """Read runs of a campaign from one file, in the order in which they were measured; none without it.
 
     Raises
     ------
     problems.errors.InputError
         If the file is something else.
     """
+    if not path.is_file():
+        return []
     try:
         runs = decoded(path.read_bytes(), list[Kept])
     except (OSError, msgspec.MsgspecError, ValueError) as error:

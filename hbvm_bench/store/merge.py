@@ -21,13 +21,6 @@ def merge(runs: Sequence[Store], out: Store) -> tuple[int, int, int]:
     it (`hbvm_bench.store.store.progress`). The same case under other versions or sources has
     another id and stays a row of its own.
 
-    Parameters
-    ----------
-    runs : sequence of Store
-        At least two.
-    out : Store
-        A directory without a run.
-
     Returns
     -------
     cases, records, left_out : int

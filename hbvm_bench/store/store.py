@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Case
-from hbvm_bench.campaign.identity import is_ours, make_method, make_problem
+from hbvm_bench.campaign.identity import make_method, make_problem, of_method
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.store.files import atomic, ensure_writable, write_json
 from hbvm_bench.store.records import SCHEMA, Outcome, Record, Result, decoded
@@ -237,21 +237,18 @@ class Store:
     def everything(self) -> Iterator[Record]:
         """Yield all records in the directory, those of earlier versions and other settings too."""
         for path in sorted(self.cases.glob("[!.]*.json")):
-            try:
-                record = decoded(path.read_bytes(), Record)
-            except (OSError, ValueError):
-                continue
-            if record.schema == SCHEMA and path == self._record_path(record.id):
-                yield record
+            with suppress(OSError, ValueError):
+                yield self._read(path.stem)
 
     def _read(self, case_id: str) -> Record:
+        """Return the record of a case, by its id or as much of it as is in the file's name."""
         content = self._record_path(case_id).read_bytes()
         schema = decoded(content, _Version).schema
         if schema != SCHEMA:
             when = "an earlier" if schema < SCHEMA else "a later"
             raise OtherVersionError(f"measured by {when} version of hbvm-bench")
         record = decoded(content, Record)
-        if record.id != case_id:
+        if case_id not in (record.id, record.id[:NAME_LENGTH]):
             raise ValueError("it is the record of another case")
         return record
 
@@ -267,22 +264,19 @@ def is_of(stored: Case, asked: Case) -> bool:
     words = msgspec.structs.replace(
         asked, problem=stored.problem, method=stored.method, settings=stored.settings, note=stored.note
     )
-    return (
-        words == stored
-        and _prints_as(asked.problem, stored.problem, _problem)
-        and _prints_as(asked.method, stored.method, _method)
+    texts = (asked.problem, stored.problem, _problem), (asked.method, stored.method, _method)
+    return words == stored and all(
+        ours == theirs or _prints_as(ours, theirs, by) for ours, theirs, by in texts
     )
 
 
 def _prints_as(asked: str, stored: str, printed: Callable[[str], str]) -> bool:
-    if asked == stored:
-        return True
-    try:
-        return printed(asked) == stored
-    except InputError:  # of a plugin that is not here
-        with suppress(InputError):
+    with suppress(InputError):
+        try:
+            return printed(asked) == stored
+        except InputError:  # of a plugin that is not here
             return parse_spec(asked).name == parse_spec(stored).name
-        return False
+    return False
 
 
 def _problem(text: str) -> str:
@@ -299,16 +293,13 @@ def _unread(case_id: str, case: Case, error: Exception, again: str) -> Record:
     reason = f"its record in the store is damaged ({' '.join(str(error).split())}); {again}"
     if isinstance(error, OtherVersionError):
         outcome, reason = "outdated", f"{error}; {again}"
-    result = Result(outcome=outcome, reason=reason)
     with suppress(InputError):
         case = msgspec.structs.replace(case, problem=_problem(case.problem))
-    try:
+    known: dict[str, Any] = {"role": "peer", "library": "", "order": None}  # of a plugin that is not here
+    with suppress(InputError):
         case = msgspec.structs.replace(case, method=_method(case.method))
-        method = make_method(case.method)
-    except InputError:  # of a plugin that is not here
-        return Record(id=case_id, case=case, role="peer", library="", order=None, result=result)
-    role = "ours" if is_ours(method) else "peer"
-    return Record(id=case_id, case=case, role=role, library=method.library, order=method.order, result=result)
+        known = of_method(make_method(case.method))
+    return Record(id=case_id, case=case, result=Result(outcome=outcome, reason=reason), **known)
 
 
 def again(index: Index, directory: Path) -> str:
@@ -319,14 +310,7 @@ def again(index: Index, directory: Path) -> str:
 def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) -> str:
     """Return what is wrong with the series of a case, ``""`` where they are as a run writes them.
 
-    Parameters
-    ----------
-    record : Record
-        One without a trajectory has no series.
-    series : mapping of ndarray
-        As `Store.series` returns them.
-    dim : int
-        Length of a state.
+    A record without a trajectory has none; ``dim`` is the length of a state.
     """
     if record.result.outcome in ("damaged", "outdated"):
         return "there is no record of them"

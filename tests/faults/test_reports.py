@@ -10,8 +10,7 @@ from hbvm_bench import cli
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store import kept
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.automatic import report
-from hbvm_bench.studies.automatic import runs as automatic
+from hbvm_bench.studies import automatic
 from hbvm_bench.studies.race import results
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
@@ -117,7 +116,7 @@ def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
 
 def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
     stored_results(tmp_path)
-    page = markdown(report.document(automatic.by_kind(tmp_path / "automatic")))
+    page = markdown(automatic.document(automatic.by_kind(tmp_path / "automatic")))
     assert "\x1b" not in page
     assert not any(re.search(r"(?<!\\)<script", line) for line in page.splitlines())
 

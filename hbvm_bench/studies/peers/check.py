@@ -137,18 +137,9 @@ def check(
     short: bool = False,
     tell: Callable[[str], None] = print,
 ) -> PeerCheck:
-    """Run every pair.
+    """Run every pair, with at least two rounds, and tell what is about to run.
 
-    Parameters
-    ----------
-    pairs : sequence of Pair
-        Which.
-    rounds : int
-        Samples of each side, in turn; at least 2.
-    short : bool
-        Only each pair's share of its span, and a few starts of a batch.
-    tell : callable
-        Called with what is about to run.
+    A short check takes only each pair's share of its span, and a few starts of a batch.
     """
     described = machine.describe(measure=True)
     rows: list[Row] = []
@@ -218,15 +209,7 @@ def _alone(script: Script) -> tuple[float, int, Array]:
 
 
 def in_a_process(out: Path, rounds: int) -> int:
-    """Run every pair in a process of its own, with one thread for every library; return its exit code.
-
-    Parameters
-    ----------
-    out : Path
-        Where the result is written.
-    rounds : int
-        As of `check`.
-    """
+    """Run every pair in a process that has one thread for every library; return its exit code."""
     command = [sys.executable, "-m", __spec__.name, str(out), str(rounds)]
     environment = {**os.environ, **ENVIRONMENT}
     return subprocess.run(

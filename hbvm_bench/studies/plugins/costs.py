@@ -5,10 +5,11 @@ that the bench runs. Every row is compiled and run once before it is timed; then
 the other, several rounds of it, so that what else the machine does meets them all.
 """
 
-import time
+import gc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from timeit import timeit
 from typing import Any
 
 import numpy as np
@@ -62,19 +63,14 @@ def measure(host: str, rounds: int) -> list[Cost]:
     if host not in HOSTS:
         raise unknown("host", host, HOSTS)
     problem, reference, rows = HOSTS[host]()
-    names = [name for name, _ in rows]
     first = [run() for _, run in rows]
 
-    def sample(run: Run) -> float:
-        start = time.perf_counter()
-        run()
-        return time.perf_counter() - start
-
-    samples = [partial(sample, run) for _, run in rows]
+    samples = [partial(timeit, run, setup=gc.enable, number=1) for _, run in rows]
     seconds = np.array(interleaved(samples, rounds, order="as given"))
     energies = [float(problem.errors(y)["energy"].max()) for y in first]
     true = np.stack([problem.y0, reference])
     positions = [float(position_error(problem, (y[-1] - reference)[None], true)[0]) for y in first]
+    names = (name for name, _ in rows)
     return [Cost(*row) for row in zip(names, energies, positions, seconds, strict=True)]
 
 
@@ -103,13 +99,18 @@ def _native(problem: Problem, method: Any) -> tuple[str, Run]:
     return f"native kernel `{method!r}`", run
 
 
+def _pendulum() -> tuple[Problem, Array]:
+    problem = problems.load("pendulum", t_end=PENDULUM)
+    return problem, np.array([float(x) for x in exact_state(problem, PENDULUM)])
+
+
 def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     import numba
     from scipy.integrate import solve_ivp
 
     from integrators.plugins.scipy import HBVM, field
 
-    problem = problems.load("pendulum", t_end=PENDULUM)
+    problem, end = _pendulum()
     njit: Any = numba.njit
 
     @njit
@@ -132,7 +133,7 @@ def _scipy() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     untraced = Problem(problems.Foreign(compiled, dim=2), y0=problem.y0, t_end=problem.t_end)
     return (
         problem,
-        np.array([float(x) for x in exact_state(problem, problem.t_end)]),
+        end,
         [
             _native(problem, native),
             ("native kernel, numba function", _native(untraced, native)[1]),
@@ -165,7 +166,7 @@ def _diffrax() -> tuple[Problem, Array, list[tuple[str, Run]]]:
     from problems import emit
 
     jax.config.update("jax_enable_x64", True)
-    problem = problems.load("pendulum", t_end=PENDULUM)
+    problem, end = _pendulum()
     term = dx.ODETerm(emit.jax(problem.system, "field"))
     par, times = map(jax.numpy.asarray, (problem.par, np.linspace(0.0, problem.t_end, 11)[1:]))
 
@@ -183,7 +184,7 @@ def _diffrax() -> tuple[Problem, Array, list[tuple[str, Run]]]:
 
     return (
         problem,
-        np.array([float(x) for x in exact_state(problem, problem.t_end)]),
+        end,
         [
             _native(problem, integrators.HBVM(k=8, s=4, h=0.1)),
             ("plugin `HBVM(k=8, s=4)`, `dt0=0.1`", run(HBVM(k=8, s=4), 0.1)),
@@ -231,9 +232,6 @@ def _rebound() -> tuple[Problem, Array, list[tuple[str, Run]]]:
 
         return prepare
 
-    def ias15(simulation: Any) -> None:
-        simulation.integrator = "ias15"
-
     problem = _planets(masses, state(make()))
     reference = integrators.integrate(problem, integrators.Taylor(high_accuracy=True, compact_mode=True)).y[
         -1
@@ -246,7 +244,7 @@ def _rebound() -> tuple[Problem, Array, list[tuple[str, Run]]]:
         [
             _native(problem, ours[0]),
             *((f"plugin `{method!r}`", run(lambda sim, m=method: install(sim, m))) for method in ours),
-            ("`ias15`", run(ias15)),
+            ("`ias15`", run(lambda sim: setattr(sim, "integrator", "ias15"))),
             *(
                 (f"`whfast`, corrector 17, kernel LAZY, dt = {h:g}", run(whfast(h)))
                 for h in (4.0, 1.0, 0.5, 0.25)
@@ -300,6 +298,3 @@ def leak(span: float, parts: int = 10) -> Iterator[tuple[float, dict[str, float]
             (i + 1) * span / parts,
             {name: float(problem.errors(y[None])["energy"][0]) for name, y in states.items()},
         )
-
-
-__all__ = ["Cost", "leak", "measure", "table"]

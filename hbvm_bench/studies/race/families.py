@@ -1,6 +1,5 @@
 """Who takes part in the race, in the words of its pages: families, with a row for either kind of step."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from hbvm_bench.campaign.file import Case
@@ -11,61 +10,34 @@ OURS = ""
 FIXED, OWN = "fixed step", "own steps"
 
 
-@dataclass(frozen=True)
-class Family:
-    """What runs under one name in the race.
-
-    Attributes
-    ----------
-    title, short : str
-        For readers; for column heads.
-    lead : str
-        The method whose colour and marker it has.
-    code : str
-        What machine code runs.
-    """
+class Family(NamedTuple):
+    """What runs under one name in the race: its title, also short, and what its machine code is."""
 
     title: str
     short: str
-    lead: str
     code: str
 
+
+WHEEL = "the wheel's, for any x86-64"
+WHEEL_AND_FORCES = f"{WHEEL}; forces other than gravity compiled here by numba"
 
 FAMILIES: dict[str, Family] = {
     OURS: Family(
         "HBVM and Gauss",
         "HBVM, Gauss",
-        "HBVM",
         "compiled here by numba for this processor, vector instructions as it has them",
     ),
-    "Taylor": Family(
-        "heyoka, Taylor",
-        "heyoka",
-        "Taylor",
-        "compiled here by heyoka's LLVM for this processor",
-    ),
-    "IAS15": Family(
-        "REBOUND, IAS15",
-        "IAS15",
-        "IAS15",
-        "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
-    ),
-    "WHFast": Family("REBOUND, WHFast", "WHFast", "WHFast", "the wheel's, for any x86-64"),
+    "Taylor": Family("heyoka, Taylor", "heyoka", "compiled here by heyoka's LLVM for this processor"),
+    "IAS15": Family("REBOUND, IAS15", "IAS15", WHEEL_AND_FORCES),
+    "WHFast": Family("REBOUND, WHFast", "WHFast", WHEEL),
     "WHFast512": Family(
         "REBOUND, WHFast512",
         "WHFast512",
-        "WHFast512",
         "the wheel's, in AVX-512 instructions; on other processors it does not run",
     ),
-    "Leapfrog": Family(
-        "REBOUND, leapfrog",
-        "leapfrog",
-        "Leapfrog",
-        "the wheel's, for any x86-64; forces other than gravity compiled here by numba",
-    ),
+    "Leapfrog": Family("REBOUND, leapfrog", "leapfrog", WHEEL_AND_FORCES),
     "DOP853": Family(
         "SciPy, DOP853",
-        "DOP853",
         "DOP853",
         "a step loop in Python around a vector field compiled here by numba",
     ),

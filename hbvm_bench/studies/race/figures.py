@@ -20,45 +20,28 @@ from hbvm_bench.summaries.standings import TIME
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
 DOTTED = (0, (1, 1.2))
+SECONDS = "seconds for the whole span (median)"
 
 
 @styled
 def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
-    """Draw errors against time; ``None`` without a setting that may be compared.
-
-    Parameters
-    ----------
-    race : Race
-        Results of one contest.
-    look : mapping of str to Look
-        By a method's name.
-    """
-    shown = [record for record in race.records if counts(record)]
-    if not shown:
+    """Draw errors against time; ``None`` without a setting that may be compared."""
+    counted = ((row, [one for one in records if counts(one)]) for row, records in race.rows.items())
+    rows = {row: records for row, records in counted if records}
+    if not rows:
         return None
-    rows = {row: [one for one in records if counts(one)] for row, records in race.rows.items()}
-    rows = {row: records for row, records in rows.items() if records}
     figure = new(10.4, 4.6)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
-    times = [_seconds(record) for record in shown]
-    low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
-    levels = race.asked
-    panels: list[Panel] = []
     figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
-    for axes, title, level, key in (
-        (left, "energy error", levels[0], ENERGY),
-        (right, "position error at the end", levels[1], POSITION),
-    ):
-        log_axis(axes, "x", low, max(high, low + 1))
-        worst = max(_height(record, key) for record in shown)
-        log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
-        axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
-        for row, records in rows.items():
-            _draw(axes, row, records, key, look)
-        axes.set(xlabel="seconds for the whole span (median)", title=f"{title}, relative")
-        panels.append(_panel(rows, f"{title}, relative", level, key, look))
+    panels = [
+        _panel(axes, f"{title}, relative", level, key, rows, look)
+        for axes, title, level, key in (
+            (left, "energy error", race.asked[0], ENERGY),
+            (right, "position error at the end", race.asked[1], POSITION),
+        )
+    ]
     _legend(side, list(dict.fromkeys(row.family for row in rows)), look)
-    energy, position = (power(level) for level in levels)
+    energy, position = map(power, race.asked)
     return picture(
         figure,
         f"work-precision-{race.key}",
@@ -73,54 +56,51 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
 
 
 def _panel(
-    rows: Mapping[Row, Sequence[Record]], title: str, level: float, key: str, look: Mapping[str, Look]
+    axes: Axes,
+    title: str,
+    level: float,
+    key: str,
+    rows: Mapping[Row, Sequence[Record]],
+    look: Mapping[str, Look],
 ) -> Panel:
-    traces = []
+    """Draw one error against time, and return the same for the page."""
     shown = [record for records in rows.values() for record in records]
-    for record in shown:
-        text = record.case.method
-        spot = np.array([_seconds(record)]), np.array([_error(record, key)])
-        traces.append(Trace(look[family_of(record)].number, text, *spot))
+    times = [_seconds(record) for record in shown]
+    low, high = math.floor(math.log10(min(times))), math.ceil(math.log10(max(times)))
+    worst = max(_height(record, key) for record in shown)
+    log_axis(axes, "x", low, max(high, low + 1))
+    log_axis(axes, "y", FLOOR, max(math.ceil(math.log10(worst)), round(math.log10(level)) + 1), most=9)
+    axes.axhline(level, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
+    marks, lines = [], []
     for row, records in rows.items():
         line = front(records, lambda o: (_seconds(o), _error(o, key)))
+        x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
+        colour, own = look[family_of(records[0])].light, row.steps == OWN
+        axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")
         if len(line) > 1:
-            x, y = np.array([(_seconds(o), _height(o, key)) for o in line]).T
-            number = look[family_of(line[0])].number
-            note = "none of the row's settings is better in both"
-            traces.append(Trace(number, f"best of {row.title}", x, y, "law", note))
-    times = [_seconds(record) for record in shown]
+            number, note = look[family_of(line[0])].number, "none of the row's settings is better in both"
+            lines.append(Trace(number, f"best of {row.title}", x, y, "law", note))
+        for record in records:
+            mark = look[family_of(record)]
+            axes.plot(
+                [_seconds(record)],
+                [_height(record, key)],
+                mark.marker,
+                color=mark.light,
+                markerfacecolor=PAPER if own else mark.light,
+                markersize=5.0 if record in line else 3.6,
+                clip_on=False,
+            )
+            spot = np.array([_seconds(record)]), np.array([_error(record, key)])
+            marks.append(Trace(mark.number, record.case.method, *spot))
+    axes.set(xlabel=SECONDS, title=title)
     asked_for = np.array([min(times), max(times)]), np.array([level, level])
-    traces.append(Trace(0, "what is asked for", *asked_for, "law"))
     return Panel(
         title,
-        Axis("seconds for the whole span (median)", log=True),
+        Axis(SECONDS, log=True),
         Axis(title, log=True, low=FLOOR, high=TOP),
-        traces,
+        [*marks, *lines, Trace(0, "what is asked for", *asked_for, "law")],
     )
-
-
-def _draw(axes: Axes, row: Row, records: Sequence[Record], key: str, look: Mapping[str, Look]) -> None:
-    line = front(records, lambda o: (_seconds(o), _error(o, key)))
-    lead = look[family_of(records[0])].light
-    own = row.steps == OWN
-    axes.plot(
-        [_seconds(o) for o in line],
-        [_height(o, key) for o in line],
-        color=lead,
-        linewidth=1.1,
-        linestyle=DOTTED if own else "solid",
-    )
-    for record in records:
-        mark = look[family_of(record)]
-        axes.plot(
-            [_seconds(record)],
-            [_height(record, key)],
-            mark.marker,
-            color=mark.light,
-            markerfacecolor=PAPER if own else mark.light,
-            markersize=5.0 if record in line else 3.6,
-            clip_on=False,
-        )
 
 
 def _height(record: Record, key: str) -> float:
@@ -139,8 +119,7 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
     axes.set_axis_off()
     handles: list[Line2D] = []
     for family in families:
-        lead = FAMILIES[family].lead
-        for name in (lead, "Gauss") if family == OURS else (lead,):
+        for name in ("HBVM", "Gauss") if family == OURS else (family,):
             if name in look:
                 label = name if family == OURS else FAMILIES[family].title
                 own = look[name]

@@ -74,13 +74,15 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 def load_probes(path: Path) -> list[Probe]:
-    """Read the compile times that were measured.
+    """Read the compile times that were measured; none where there is no file.
 
     Raises
     ------
     problems.errors.InputError
         If the file is something else.
     """
+    if not path.is_file():
+        return []
     try:
         return decoded(path.read_bytes(), list[Probe])
     except (OSError, msgspec.MsgspecError, ValueError) as error:
@@ -88,16 +90,9 @@ def load_probes(path: Path) -> list[Probe]:
 
 
 def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Probe]:
-    """Measure the compile times of a problem.
+    """Measure the compile times of a problem, called ``name`` in the race; ``h`` is a step for our method.
 
-    Parameters
-    ----------
-    name, problem : str
-        What the race calls it, and as it prints.
-    h : float
-        A step for our method.
-    families : sequence of str
-        Which families; those that compile nothing are left out.
+    Families that compile nothing are left out.
     """
     return [
         made
@@ -108,19 +103,17 @@ def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Pr
 
 
 def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
-    empty: list[tuple[float, Answer]] = []
-    kernel: list[tuple[float, Answer]] = []
-    full: list[tuple[float, Answer]] = []
+    found: dict[str, list[tuple[float, Answer]]] = {"empty": [], "kernel": [], "full": []}
     try:
         for _ in range(TIMES):
             with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
-                empty.append(_ask(problem, method, Path(cache)))
-                full.append(_ask(problem, method, Path(cache)))
+                found["empty"].append(_ask(problem, method, Path(cache)))
+                found["full"].append(_ask(problem, method, Path(cache)))
             if family == OURS:
                 with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as cache:
                     _ask(OTHER, method, Path(cache))
-                    kernel.append(_ask(problem, method, Path(cache)))
-            if empty[0][0] > SLOW:
+                    found["kernel"].append(_ask(problem, method, Path(cache)))
+            if found["empty"][0][0] > SLOW:
                 break
     except (subprocess.SubprocessError, msgspec.MsgspecError) as error:
         reason = f"the process that compiles {method} failed: {type(error).__name__}"
@@ -136,7 +129,7 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
             from_cache=answers[0][1].from_cache,
             reason=answers[0][1].refused,
         )
-        for caches, answers in (("empty", empty), ("kernel", kernel), ("full", full))
+        for caches, answers in found.items()
         if answers
     ]
 

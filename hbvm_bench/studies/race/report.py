@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from statistics import median
 
 from hbvm_bench.campaign.file import name_of
+from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Details, Document, Files, Items, Maker, Note, Section, attempt
@@ -13,7 +15,7 @@ from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
-from hbvm_bench.studies.race.results import FILE, Race, calibrated, declared
+from hbvm_bench.studies.race.results import FILE, Race, declared
 from hbvm_bench.summaries.points import family_of
 
 DECLARED = declared()
@@ -54,15 +56,7 @@ RULES = tuple(" ".join(paragraph.split()) for paragraph in RULES_TEXT.strip().sp
 
 
 def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None = None) -> Document:
-    """Return the report.
-
-    Parameters
-    ----------
-    races : sequence of Race
-        One per contest.
-    others : mapping of str to sequence of Race, optional
-        All that was measured, by the kind of processor.
-    """
+    """Return the report on some races, beside all that was measured by the kind of processor."""
     look = looks(family_of(one) for race in races for one in race.records)
     in_order = sorted(races, key=lambda race: race.started)
     last = in_order[-1]
@@ -130,12 +124,15 @@ def short(titles: Sequence[str]) -> list[str]:
 
 def section(race: Race, look: Mapping[str, Look], nav: str) -> Section:
     """Return what the report says about one contest, under a short name for the page's head."""
-    title = race.title
+    title, problem = race.title, race.records[0].case.problem
     shown = (tables.fastest, tables.levels, tables.defaults, tables.compiling)
     return Section(
         title,
         [
-            Note((f"To t = {race.t_end}. " if race.quick else "") + f"{race.rounds} rounds."),
+            Note(
+                (f"To t = {make_problem(problem).t_end}. " if race.quick else "")
+                + f"{race.run.index.campaign.timing.rounds} rounds."
+            ),
             Items(remarks(race)),
             *attempt(
                 (f"Work and precision: {title}", partial(work_precision, race, look)),
@@ -147,7 +144,7 @@ def section(race: Race, look: Mapping[str, Look], nav: str) -> Section:
             ),
         ],
         race.key,
-        code=race.records[0].case.problem,
+        code=problem,
         nav=nav,
     )
 
@@ -164,18 +161,19 @@ def remarks(race: Race) -> list[str]:
         said.append(f"Does not apply: {', '.join(absent)}.")
     if race.quick:
         said.append("This is the quick run: a tenth of the span and few settings; its ratios mean little.")
-    calibration = calibrated(race)
-    if calibration:
+    if race.calibration:
+        calibration = median(race.calibration)
         worst = max(abs(value / calibration - 1.0) for value in race.calibration)
         said.append(
             f"A fixed computation beside it took {calibration * 1e3:.2f} ms, and in its worst round "
             f"{worst:.0%} more or less."
         )
-    if race.load is not None:
-        doubt = "; its times are doubtful" if max(race.load.others, race.load.stolen) > BUSY else ""
+    load = next((one.timing.load for one in race.records if one.timing and one.timing.load), None)
+    if load is not None:
+        doubt = "; its times are doubtful" if max(load.others, load.stolen) > BUSY else ""
         said.append(
-            f"Meanwhile other processes used {race.load.others:.0%} of a core, and the host kept "
-            f"{race.load.stolen:.0%} of one{doubt}."
+            f"Meanwhile other processes used {load.others:.0%} of a core, and the host kept "
+            f"{load.stolen:.0%} of one{doubt}."
         )
     return said
 

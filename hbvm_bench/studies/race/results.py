@@ -7,19 +7,16 @@
     DIR/campaign.json, cases/    the store of the run, as every campaign has it
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from statistics import median
 
 from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.file import load as load_campaign
-from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
-from hbvm_bench.store.records import Load, Record
+from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import OURS, Row, row_of
 from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes
 from hbvm_bench.summaries import standings
@@ -70,19 +67,9 @@ class Race:
         return self.entry.within[ENERGY], self.entry.within[POSITION]
 
     @property
-    def t_end(self) -> float:
-        """The end of the span."""
-        return make_problem(self.records[0].case.problem).t_end
-
-    @property
     def quick(self) -> bool:
         """Whether it was the short run."""
         return self.run.index.campaign.quick
-
-    @property
-    def rounds(self) -> int:
-        """Interleaved rounds of timing."""
-        return self.run.index.campaign.timing.rounds
 
     @property
     def calibration(self) -> list[float]:
@@ -90,11 +77,6 @@ class Race:
         rounds = [one for record in self.records if record.timing for one in record.timing.rounds]
         found = {one.number: one.calibration[0] for one in rounds if one.calibration}
         return [found[place] for place in sorted(found, key=lambda place: place or 0)]
-
-    @property
-    def load(self) -> Load | None:
-        """What else the machine did."""
-        return next((one.timing.load for one in self.records if one.timing and one.timing.load), None)
 
     @property
     def machine(self) -> dict[str, str | int]:
@@ -145,11 +127,6 @@ def counts(record: Record) -> bool:
     )
 
 
-def calibrated(race: Race) -> float | None:
-    """Return the median of the calibration in seconds."""
-    return median(race.calibration) if race.calibration else None
-
-
 def declared() -> Campaign:
     """Return the whole race, as it is declared."""
     return load_campaign(NAME)
@@ -192,17 +169,12 @@ def by_kind(directory: Path) -> dict[str, list[Race]]:
 
 
 def _in(directory: Path) -> list[Race]:
-    runs = kept.load(directory / FILE, NAME) if (directory / FILE).is_file() else []
-    probes = load_probes(directory / PROBES) if (directory / PROBES).is_file() else []
-    found = {race.key: race for run in runs for race in _races(run, probes)}
+    probes = load_probes(directory / PROBES)
+    found = {
+        name_of(entry): Race(entry, run, records, [one for one in probes if one.problem == name_of(entry)])
+        for run in kept.load(directory / FILE, NAME)
+        for entry, records in standings.entries(run.index.campaign, run.records)
+        if records
+    }
     order = [name_of(entry) for entry in declared().entries()]
     return sorted(found.values(), key=lambda race: order.index(race.key) if race.key in order else len(order))
-
-
-def _races(run: Kept, probes: Sequence[Probe]) -> list[Race]:
-    made = []
-    for entry, records in standings.entries(run.index.campaign, run.records):
-        if records:
-            here = [one for one in probes if one.problem == name_of(entry)]
-            made.append(Race(entry, run, records, here))
-    return made

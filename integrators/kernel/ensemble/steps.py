@@ -4,6 +4,7 @@ Every number of a step is a vector, with one trajectory in each lane, so that th
 no sum over lanes. Stages come one after another; each uses the values that the field has had at the stages
 before it in the same sweep (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
 nodes, weights and the state are sums of two doubles, and what is at the size of the state is added last.
+But a step's increment is rounded here, which `integrators.kernel.step.finish` does without.
 
 A trajectory whose iteration has ended keeps its values while the others iterate on: what happens
 in a lane depends on nothing in the others.

@@ -33,7 +33,7 @@ HOPELESS = 4  # corrections that do not decrease, or grow, to give up
 OLDEST = 64  # steps for which a Jacobian is used, so that the contraction is known anew
 GENTLE = 0.25  # contraction of the fixed-point iteration at which that is to be tried again
 CALM = 1e-3  # sizes are measured until changes are this small
-OFF = 0.5  # last coefficient of a step's polynomial relative to the first, after a rescue
+FALLEN = 0.02  # down to this, a step's coefficients must halve from each to the next after a rescue
 
 
 @compiled
@@ -119,13 +119,15 @@ def is_scattered(m):
     The stage equations have other roots than the one that tends to the solution with h, some
     of them beyond a pole; a correction that follows the Jacobian of every stage may find them.
     """
-    first, last = 0.0, 0.0
+    first, last, allowed = 0.0, 0.0, 1.0
+    for _ in range(1, m.s):
+        allowed *= 0.5
     for part in range(m.parts):
         gamma = m.gamma + m.block * part
         for d in range(m.rows):
             first += abs(gamma[8 * d])
             last += abs(gamma[at(m, m.s - 1, d)])
-    return last > OFF * first
+    return last > max(allowed, FALLEN) * first
 
 
 @compiled

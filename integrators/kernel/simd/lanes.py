@@ -143,16 +143,19 @@ def _fma(context, builder, sig, args):
     return llvm_call(builder, "fma", *(args if count is None else spread_to(builder, sig.args, args, count)))
 
 
+def added(builder: Any, x: Any, y: Any) -> tuple[Any, Any]:
+    """Write the instructions of `two_sum`."""
+    s = builder.fadd(x, y)
+    part = builder.fsub(s, x)
+    return s, builder.fadd(builder.fsub(x, builder.fsub(s, part)), builder.fsub(y, part))
+
+
 @intrinsic
 def two_sum(typing, a, b):
     """Return s, e with s = fl(a + b) and s + e = a + b, of numbers or lanes (Knuth)."""
 
     def generate(context, builder, sig, args):
-        x, y = args
-        s = builder.fadd(x, y)
-        part = builder.fsub(s, x)
-        lost = builder.fadd(builder.fsub(x, builder.fsub(s, part)), builder.fsub(y, part))
-        return context.make_tuple(builder, sig.return_type, [s, lost])
+        return context.make_tuple(builder, sig.return_type, added(builder, *args))
 
     return signature(types.UniTuple(a, 2), a, a), generate
 

@@ -22,7 +22,7 @@ from integrators.kernel.simd.emit import (
     splat,
     vector,
 )
-from integrators.kernel.simd.lanes import Lanes, intrinsic
+from integrators.kernel.simd.lanes import Lanes, added, intrinsic
 from integrators.kernel.simd.views import DOUBLES, element
 
 EIGHT = Lanes(WIDTH)
@@ -121,6 +121,18 @@ def _combined(builder: Any, vectors: Any, base: Any, index: Any, count: int, sta
     return chains.total()
 
 
+FOLDS = [
+    (4, indices(0, 1, 2, 3, 8, 9, 10, 11), indices(4, 5, 6, 7, 12, 13, 14, 15)),
+    (2, indices(0, 1, 8, 9, 4, 5, 12, 13), indices(2, 3, 10, 11, 6, 7, 14, 15)),
+    (1, indices(0, 8, 2, 10, 4, 12, 6, 14), indices(1, 9, 3, 11, 5, 13, 7, 15)),
+]
+"""How eight vectors become four, two and one, by adding halves: their number, and which lanes of two."""
+
+
+def _halves(builder: Any, one: Any, two: Any, places: Any) -> list[Any]:
+    return [builder.shuffle_vector(one, two, half) for half in places]
+
+
 @intrinsic
 def sums(typing, v0, v1, v2, v3, v4, v5, v6, v7):
     """Return the sums over the lanes of eight vectors, as one vector.
@@ -130,27 +142,27 @@ def sums(typing, v0, v1, v2, v3, v4, v5, v6, v7):
     """
 
     def generate(context, builder, sig, args):
-        def fold(x: Any, y: Any, low: Any, high: Any) -> Any:
-            return builder.fadd(builder.shuffle_vector(x, y, low), builder.shuffle_vector(x, y, high))
-
-        halves = [
-            fold(args[i], args[i + 4], indices(0, 1, 2, 3, 8, 9, 10, 11), indices(4, 5, 6, 7, 12, 13, 14, 15))
-            for i in range(4)
-        ]
-        quarters = [
-            fold(
-                halves[i],
-                halves[i + 2],
-                indices(0, 1, 8, 9, 4, 5, 12, 13),
-                indices(2, 3, 10, 11, 6, 7, 14, 15),
-            )
-            for i in range(2)
-        ]
-        return fold(
-            quarters[0], quarters[1], indices(0, 8, 2, 10, 4, 12, 6, 14), indices(1, 9, 3, 11, 5, 13, 7, 15)
-        )
+        for n, *places in FOLDS:
+            args = [builder.fadd(*_halves(builder, args[i], args[i + n], places)) for i in range(n)]
+        return args[0]
 
     return signature(EIGHT, *[EIGHT] * 8), generate
+
+
+@intrinsic
+def sums_and_rests(typing, v0, v1, v2, v3, v4, v5, v6, v7):
+    """Return `sums` of eight vectors, and what the last two additions of each round away."""
+
+    def generate(context, builder, sig, args):
+        first, second, last = FOLDS
+        four = [builder.fadd(*_halves(builder, args[i], args[i + 4], first[1:])) for i in range(4)]
+        two = [added(builder, *_halves(builder, four[i], four[i + 2], second[1:])) for i in range(2)]
+        (one, lost), (other, more) = two
+        total, rest = added(builder, *_halves(builder, one, other, last[1:]))
+        less = builder.fadd(*_halves(builder, lost, more, last[1:]))
+        return context.make_tuple(builder, sig.return_type, [total, builder.fadd(rest, less)])
+
+    return signature(types.UniTuple(EIGHT, 2), *[EIGHT] * 8), generate
 
 
 @intrinsic

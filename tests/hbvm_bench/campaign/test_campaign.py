@@ -102,7 +102,7 @@ def test_an_id_changes_with_everything_that_matters(monkeypatch):
         _id(method="HBVM(k=2, s=2, h=0.5)"),
         _id(grid=Grid(step=0.25)),
     ]
-    monkeypatch.setattr("hbvm_bench.campaign.identity._version", lambda name: "0.0")
+    monkeypatch.setattr("hbvm_bench.campaign.identity.version_of", lambda name: "0.0")
     others.append(_id())
     monkeypatch.undo()
     monkeypatch.setattr("hbvm_bench.campaign.identity.source_digest", lambda method, case: "edited")

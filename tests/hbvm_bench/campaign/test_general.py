@@ -11,7 +11,7 @@ from hbvm_bench.campaign.entries import Limits
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.cli import main
-from hbvm_bench.commands import automatic
+from hbvm_bench.commands import studies
 from hbvm_bench.measure import reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.run import references
@@ -78,12 +78,12 @@ def test_a_case_that_takes_too_long_is_given_up_and_says_so(tmp_path):
 def test_a_quick_run_takes_no_time_of_a_reference_that_is_an_end_alone(tmp_path):
     campaign = opened("stiff_chain")
     known(campaign, tmp_path)
-    (entry,) = quick_run(campaign, 3).entries()
+    (entry,) = quick_run(campaign).entries()
     assert make_problem(entry.use).t_end == 1.0
 
 
 def test_a_quick_run_shortens_no_span_of_a_file_and_keeps_no_end_of_another_span(tmp_path):
-    shorter = quick_run(campaigns.load("general"), 3)
+    shorter = quick_run(campaigns.load("general"))
     ends = {campaigns.name_of(entry): entry.end for entry in shorter.entries()}
     assert len(ends["robertson"]) == 3
     assert ends["stiff_chain"] is None
@@ -92,7 +92,7 @@ def test_a_quick_run_shortens_no_span_of_a_file_and_keeps_no_end_of_another_span
 def test_the_command_runs_a_part_of_it(tmp_path, monkeypatch, capsys):
     declared = campaigns.load("general")
     alone = replace(declared, methods=declared.methods[:1], timing=replace(declared.timing, rounds=0))
-    monkeypatch.setattr(automatic, "load", lambda name: alone)
+    monkeypatch.setattr(studies, "load", lambda name: alone)
     monkeypatch.chdir(tmp_path)
     assert main(["automatic", "--general", "driven_pendulum"]) == 0
     (ours,) = reading.records(Store(Path("runs/general")))

@@ -16,8 +16,7 @@ from hbvm_bench.run import timing_pass
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
-from hbvm_bench.studies.automatic import report as automatic
-from hbvm_bench.studies.automatic import runs
+from hbvm_bench.studies import automatic
 from hbvm_bench.studies.race import report, results, tables
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import made_up, save
@@ -128,10 +127,10 @@ def test_a_processor_without_avx2_is_refused(monkeypatch, capsys):
 
 
 def test_results_of_several_kinds_lie_side_by_side(tmp_path):
-    runs.keep(of(ZEN4), tmp_path)
-    runs.keep(of(ZEN5, 3.0), tmp_path)
-    runs.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
-    page = markdown(automatic.document(runs.by_kind(tmp_path)))
+    automatic.keep(of(ZEN4), tmp_path)
+    automatic.keep(of(ZEN5, 3.0), tmp_path)
+    automatic.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
+    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
     assert {path.name for path in tmp_path.iterdir()} == {"znver4-256bit.json", "znver5.json"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
     assert (
@@ -141,7 +140,7 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     assert "256 bits wide" in page
     (tmp_path / "znver4-256bit.json").write_bytes(b"{}")
     with pytest.raises(InputError, match="not the result of automatic"):
-        runs.by_kind(tmp_path)
+        automatic.by_kind(tmp_path)
 
 
 def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
@@ -155,21 +154,21 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
             for one in later.records
         ],
     )
-    runs.keep(first, tmp_path)
-    runs.keep(later, tmp_path)
-    page = markdown(automatic.document(runs.by_kind(tmp_path)))
+    automatic.keep(first, tmp_path)
+    automatic.keep(later, tmp_path)
+    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
     assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [first, later]
     assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
     assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
     again = of(ZEN4)
-    runs.keep(again, tmp_path)
+    automatic.keep(again, tmp_path)
     assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [later, again]
 
 
 def test_arithmetic_of_another_width_is_another_kind(tmp_path):
     for bits, ratio in ((512, 2.0), (256, 3.0)):
-        runs.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path)
-    page = markdown(automatic.document(runs.by_kind(tmp_path)))
+        automatic.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path)
+    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
     assert "| znver5-256bit | znver5-512bit |" in page
     assert re.search(r"\| 3\.00× reached \| 2\.00× reached \|", page)
 
@@ -187,8 +186,8 @@ def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
     text = path.read_text(encoding="utf-8")
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
-    runs.keep(of(ZEN4), tmp_path / "automatic")
-    runs.keep(of(ZEN5, 1.5), tmp_path / "automatic")
+    automatic.keep(of(ZEN4), tmp_path / "automatic")
+    automatic.keep(of(ZEN5, 1.5), tmp_path / "automatic")
     assert main(["headline", str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "was restricted to AVX2" in said

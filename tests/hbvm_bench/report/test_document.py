@@ -37,10 +37,7 @@ from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.html import Place
 from hbvm_bench.report.write import rendered, write
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.automatic import report as automatic
-from hbvm_bench.studies.automatic.runs import by_kind as automatic_by_kind
-from hbvm_bench.studies.endure import report as endure
-from hbvm_bench.studies.endure.runs import read as read_endure
+from hbvm_bench.studies import automatic, endure
 from hbvm_bench.studies.paper import report as paper
 from hbvm_bench.studies.paper import results as kept
 from hbvm_bench.studies.race import report as race
@@ -209,9 +206,9 @@ def stored_document(folder: Path) -> Document:
     if name == "race":
         return race.document(results.load(folder), results.by_kind(folder))
     if name == "endure":
-        return endure.document(read_endure(folder))
+        return endure.document(endure.read(folder))
     if name == "automatic":
-        return automatic.document(automatic_by_kind(folder))
+        return automatic.document(automatic.by_kind(folder))
     return paper.document(kept.load(folder), PARTS)
 
 

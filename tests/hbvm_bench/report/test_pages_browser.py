@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 
 from hbvm_bench.report.document import Claim, Claims, Document, Section
 from hbvm_bench.report.write import write
-from hbvm_bench.studies.endure import report as endure
+from hbvm_bench.studies import endure
 from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
 from hbvm_bench.studies.paper.experiments.properties import Order
 from hbvm_bench.studies.paper.properties_part import order

@@ -14,13 +14,13 @@ from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index, Store
-from hbvm_bench.studies.automatic import report, runs
+from hbvm_bench.studies import automatic
 from problems.errors import InputError, UnknownNameError
 
 
 def made(machine, ratio=2.0, problem="kepler", worse=1.0):
     """Return a run of two rounds on one problem."""
-    campaign = runs.campaign([problem], 2)
+    campaign = automatic.campaign([problem], 2)
     records = []
     cases = [resolve(case) for case in campaign.cases()]
     for case in cases:
@@ -63,7 +63,7 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     store = Store(tmp_path / "runs" / "automatic")
     run = kept.of(store, "automatic", store.records())
-    (duel,) = runs.duels(run)
+    (duel,) = automatic.duels(run)
     for side in (duel.ours, duel.theirs):
         metrics = side.result.metrics
         assert 0.0 < metrics["energy_max"].value < 1e-12  # measured 1e-14 to 5e-14
@@ -82,24 +82,24 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
 
 def test_other_problems_and_too_few_rounds_are_refused(capsys):
     with pytest.raises(UnknownNameError, match="'toda'"):
-        runs.campaign(["toda"])
+        automatic.campaign(["toda"])
     with pytest.raises(InputError, match="rounds must be at least 2, not 1"):
-        runs.campaign(["kepler"], 1)
+        automatic.campaign(["kepler"], 1)
     assert main(["automatic", "keppler"]) == 2
     assert "did you mean 'kepler'" in capsys.readouterr().err
 
 
 def test_a_side_that_is_less_accurate_is_told():
-    ahead, behind = (runs.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
+    ahead, behind = (automatic.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
     assert (ahead.words, behind.words) == ("reached", "not as accurate")
     assert behind.ratio.median == 3.0
 
 
 def test_a_problem_without_a_goal_is_shown_with_its_ratio():
     run = made({"llvm_processor": "x"}, 3.0, problem="pendulum")
-    (duel,) = runs.duels(run)
+    (duel,) = automatic.duels(run)
     assert (duel.goal, duel.words) == ("–", "")
-    assert report.ratios({"x": [run]}).rows[0][2:] == ("–", "3.00×")
+    assert automatic.ratios({"x": [run]}).rows[0][2:] == ("–", "3.00×")
 
 
 def test_a_side_on_another_trajectory_has_no_ratio():
@@ -107,7 +107,7 @@ def test_a_side_on_another_trajectory_has_no_ratio():
     theirs, ours = run.records
     result = msgspec.structs.replace(theirs.result, violation="another trajectory")
     lost = msgspec.structs.replace(theirs, result=result, timing=Timing(machine={}, why="lost"))
-    (duel,) = runs.duels(msgspec.structs.replace(run, records=[lost, ours]))
+    (duel,) = automatic.duels(msgspec.structs.replace(run, records=[lost, ours]))
     assert duel.ratio is None
     assert duel.words == "not compared"
 

@@ -17,7 +17,7 @@ from hbvm_bench.measure.metrics import evaluate
 from hbvm_bench.report.write import write
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
 from hbvm_bench.store.store import Index, Store
-from hbvm_bench.studies.endure import law, report, runs
+from hbvm_bench.studies import endure
 from problems.errors import InputError
 
 OURS = "Gauss(s=8, h=1.0)"
@@ -26,7 +26,7 @@ PEER = "Taylor(tol=1e-16)"
 
 def made(directory, years=1e6, starts=8, size=1e-17, bias=0.0):
     """Store and read a result with random walks for errors."""
-    campaign = runs.campaign(years, starts, [OURS, PEER])
+    campaign = endure.campaign(years, starts, [OURS, PEER])
     store = Store(directory)
     store.prepare()
     rng = np.random.default_rng(7)
@@ -42,7 +42,7 @@ def made(directory, years=1e6, starts=8, size=1e-17, bias=0.0):
     store.write_index(
         Index(campaign=campaign, ids=[case.id for case in cases], version="0", command="hbvm-bench endure")
     )
-    return runs.read(directory)
+    return endure.read(directory)
 
 
 def record(case, t, errors, seconds):
@@ -85,7 +85,7 @@ def test_samples_are_whole_years_with_the_powers_of_ten():
 
 
 def goals_of(result, method):
-    return [goal for goal in law.goals(result) if goal.words.startswith(method)]
+    return [goal for goal in endure.goals(result) if goal.words.startswith(method)]
 
 
 def test_goals_are_reached_by_an_unbiased_walk_and_missed_by_a_biased_one(tmp_path):
@@ -104,10 +104,10 @@ def test_a_small_drift_is_a_drift_all_the_same(tmp_path):
     small, within = goals_of(result, "a year's step")
     assert (small.reached, within.reached) == (True, False)
     assert float(within.measured) > 2.0  # measured 3.2 times what is called a drift
-    ours, _ = law.lines(result)
+    ours, _ = endure.lines(result)
     assert ours.drift is not None
     assert ours.drift.law == "drift"
-    (table, _) = report.tables(result)
+    (table, _) = endure.tables(result)
     assert "0 of 8 positive" in str(table.rows[0])
     assert (
         "more than 3 of its standard errors from 0; of errors that do not drift, chance puts 2 %"
@@ -125,11 +125,11 @@ def test_the_stored_report_and_the_readme_say_the_same():
 
 
 def test_a_short_run_has_no_goals(tmp_path):
-    assert law.goals(made(tmp_path, years=1e4)) == []
+    assert endure.goals(made(tmp_path, years=1e4)) == []
 
 
 def test_the_lines_have_rms_law_and_speed(tmp_path):
-    ours, peer = law.lines(made(tmp_path))
+    ours, peer = endure.lines(made(tmp_path))
     assert set(ours.rms) == {1e4, 1e5, 1e6}
     assert ours.drift is not None
     assert ours.drift.law == "square root"
@@ -143,7 +143,7 @@ def test_a_directory_with_another_campaign_is_refused(tmp_path):
     other = msgspec.structs.replace(index.campaign, name="other")
     store.write_index(msgspec.structs.replace(index, campaign=other))
     with pytest.raises(InputError, match="has results of 'other', not of endure"):
-        runs.read(tmp_path)
+        endure.read(tmp_path)
 
 
 def test_a_failed_trajectory_is_counted_and_not_averaged(tmp_path):
@@ -152,13 +152,13 @@ def test_a_failed_trajectory_is_counted_and_not_averaged(tmp_path):
     _, peer = store.records()
     series = store.series(peer.id)
     store.save(peer, {**series, "drift.energy": series["drift.energy"][:2]})
-    assert [(line.starts, line.failed) for line in law.lines(runs.read(tmp_path))] == [(3, 0), (2, 1)]
+    assert [(line.starts, line.failed) for line in endure.lines(endure.read(tmp_path))] == [(3, 0), (2, 1)]
 
 
 def test_the_report_names_what_was_run_and_is_deterministic(tmp_path):
     result = made(tmp_path, years=1e5, starts=3)
-    first = write(report.document(result), tmp_path / "a")[0].read_bytes()
-    assert write(report.document(result), tmp_path / "b")[0].read_bytes() == first
+    first = write(endure.document(result), tmp_path / "a")[0].read_bytes()
+    assert write(endure.document(result), tmp_path / "b")[0].read_bytes() == first
     for name in ("index.html", "figures/endure.svg", "figures/endure.png", "data/endure.csv"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     assert b"Gauss(s=8, h=1.0)" in first

@@ -143,12 +143,12 @@ def test_references_are_the_exact_solutions_where_there_are_any(stem, exact):
 def test_the_collocation_is_as_exact_as_its_arithmetic():
     problem = problems.load("kepler")
     at = np.array([0.0, 1.0])
-    found = collocation.decimals(collocation.integrate(problem, at))
+    found = collocation.integrate(problem, at)
     with mpmath.workdps(50):
-        for t, row in zip(at.tolist(), found, strict=True):
+        for t, row in zip(at.tolist(), found.tolist(), strict=True):
             solution = kepler.exact_state(problem, mpmath.mpf(t))
-            # Measured 2e-29 at t = 10.
-            assert max(abs(a - b) for a, b in zip(row, solution, strict=True)) < mpmath.mpf("1e-26")
+            gaps = [abs(mpmath.mpf(a.real) + a.imag - b) for a, b in zip(row, solution, strict=True)]
+            assert max(gaps) < mpmath.mpf("1e-26")  # measured 2e-29 at t = 10
 
 
 def test_recomputing_a_reference_gives_it_back():
@@ -170,7 +170,7 @@ def test_where_two_computations_part_the_reference_ends(monkeypatch):
 
     def strayed(problem, at, **options):
         found = true(problem, at, **options)
-        found[np.asarray(at) > 10.0, :, 0] += 1e-15
+        found[np.asarray(at) > 10.0] += 1e-15
         return found
 
     monkeypatch.setattr(collocation, "integrate", strayed)

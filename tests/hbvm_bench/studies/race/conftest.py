@@ -98,7 +98,7 @@ def made_up(**said):
             )
             for one in records
         ]
-    campaign = quick_run(chosen(results.declared(), ["outer_solar_system"]), 3)
+    campaign = quick_run(chosen(results.declared(), ["outer_solar_system"]))
     index = Index(
         campaign=campaign,
         ids=[one.id for one in records],

@@ -5,7 +5,7 @@ import msgspec
 import pytest
 
 from hbvm_bench.campaign.file import name_of
-from hbvm_bench.commands.race import as_data
+from hbvm_bench.commands.studies import race_as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
 from hbvm_bench.studies.race import report, results, tables
@@ -43,7 +43,7 @@ def test_a_race_of_another_version_is_refused(race, tmp_path):
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
-    data = msgspec.json.decode(msgspec.json.encode(as_data([race])))
+    data = msgspec.json.decode(msgspec.json.encode(race_as_data([race])))
     goal = next(goal for goal in data["goals"] if goal["goal"]["against"] == "Taylor")
     assert goal["ratio"] == pytest.approx(15.0)
     assert goal["verdict"] == "reached"

@@ -18,7 +18,7 @@ SETTINGS, QUICK_SETTINGS = 16, 3
 
 def cases(key, *, quick=False):
     campaign = chosen(declared(), [key])
-    return (quick_run(campaign, 3) if quick else campaign).cases()
+    return (quick_run(campaign) if quick else campaign).cases()
 
 
 @pytest.mark.parametrize("key", KEYS)

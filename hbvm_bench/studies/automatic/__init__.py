@@ -1,1 +1,0 @@
-"""HBVM that chooses everything itself."""

@@ -1,0 +1,323 @@
+"""Endurance: its campaign, what is read off the trajectories (errors, laws, times, goals), and its page."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Campaign, load
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import drift, machine, reading
+from hbvm_bench.measure.starts import PERTURBATION
+from hbvm_bench.report.document import Document, Note, attempt
+from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import MUTED, Look, looks
+from hbvm_bench.report.provenance import PEERS, again
+from hbvm_bench.store import kept
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Law
+from hbvm_bench.store.store import Store
+from hbvm_bench.summaries import standings
+from hbvm_bench.summaries.goals import Verdict, verdicts
+from hbvm_bench.summaries.goals import table as goals_table
+from hbvm_bench.summaries.laws import power_of
+from hbvm_bench.summaries.points import number
+from hbvm_bench.summaries.rows import seconds
+from hbvm_bench.summaries.table import NONE, Table
+
+Array = NDArray[np.float64]
+
+NAME = "endure"
+QUICK_YEARS = 1e4
+QUICK_STARTS = 3
+DECADES = (1e4, 1e5, 1e6)
+
+
+@dataclass(frozen=True, eq=False)
+class Endurance:
+    """A run, for its page.
+
+    Attributes
+    ----------
+    run : Kept
+        What was asked for, and the records.
+    t : ndarray, shape (n,)
+        Sampling times after the start, in years.
+    errors : dict of ndarray, shape (starts, n)
+        Signed relative errors of the energy from each start that reached the end, by method.
+    """
+
+    run: Kept
+    t: Array
+    errors: dict[str, Array]
+
+    @property
+    def problem(self) -> str:
+        """The problem, as it prints."""
+        return self.run.records[0].case.problem
+
+    @property
+    def years(self) -> float:
+        """The span."""
+        problem = make_problem(self.problem)
+        return problem.t_end - problem.t0
+
+    @property
+    def starts(self) -> int:
+        """Declared starts of each method."""
+        return self.run.index.campaign.checks.starts
+
+    @property
+    def methods(self) -> list[str]:
+        """The methods, as they print."""
+        return [one.case.method for one in self.run.records]
+
+
+def campaign(
+    years: float | None = None, starts: int | None = None, methods: Sequence[str] | None = None
+) -> Campaign:
+    """Return the campaign with another span, other starts or methods than are declared.
+
+    The goals are about a million years and are left out of shorter runs.
+    """
+    made = load(NAME)
+    (entry,) = made.entries()
+    if years is not None:
+        made = replace(made, problems=[replace(entry, values={"years": years})])
+        made = made if years >= DECADES[-1] else replace(made, goals=[])
+    if starts is not None:
+        made = replace(made, checks=replace(made.checks, starts=starts))
+    if methods:
+        made = replace(made, methods=[replace(made.methods[0], use=list(methods))])
+    return made
+
+
+def read(directory: Path) -> Endurance:
+    """Read a run.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none, or another campaign's.
+    """
+    store = Store(directory)
+    run = kept.of(store, NAME, reading.records(store))
+    series = {one.case.method: store.series(one.id) for one in run.records}
+    times = [one["drift.t"] for one in series.values() if "drift.t" in one]
+    return Endurance(
+        run,
+        t=times[0] if times else np.empty(0),
+        errors={method: one["drift.energy"] for method, one in series.items() if "drift.energy" in one},
+    )
+
+
+@dataclass(frozen=True)
+class Line:
+    """One method.
+
+    Attributes
+    ----------
+    method : str
+        As it prints.
+    starts, failed : int
+        Trajectories that finished and that did not.
+    rms : dict of float to float
+        Root mean square over the starts of the relative energy error, by time in years.
+    drift : Law or None
+        Of its error; ``None`` without a finished trajectory.
+    seconds : float or None
+        Median of the trajectories.
+    times_ours : float or None
+        Seconds over ours.
+    """
+
+    method: str
+    starts: int
+    failed: int
+    rms: dict[float, float]
+    drift: Law | None
+    seconds: float | None
+    times_ours: float | None
+
+
+def lines(result: Endurance) -> list[Line]:
+    """Return one line per method, in the order of declaration."""
+    ours = standings.best(standings.among(result.run.records, ""), {})
+    years = sorted({*DECADES, result.years}.intersection(result.t.tolist()))
+    made = []
+    for record in result.run.records:
+        errors = result.errors.get(record.case.method, np.empty((0, 0)))
+        rms = drift.rms(errors[:, np.isin(result.t, years)]).tolist() if errors.size else []
+        ratio = standings.compare(ours, record).ratio
+        made.append(
+            Line(
+                method=record.case.method,
+                starts=len(errors),
+                failed=max(result.starts, 1) - len(errors),
+                rms=dict(zip(years, rms, strict=False)),
+                drift=record.result.laws.get("energy") if errors.size else None,
+                seconds=number(record, standings.TIME),
+                times_ours=ratio.median if ratio else None,
+            )
+        )
+    return made
+
+
+def goals(result: Endurance) -> list[Verdict]:
+    """Return the verdicts on what was asked for; none for a span short of a million years."""
+    return verdicts(result.run.index.campaign, result.run.records)
+
+
+LAW_POINTS = 40
+FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
+METHOD = """
+The methods run one after the other from each start, in one process on one core. The energy is
+evaluated in double-double arithmetic at whole years, log-spaced, at the methods' own steps or by means
+that cost them nothing. The time of a trajectory contains these few samples and no compilation. Laws: a
+floor and a growth are fitted together to the logarithm of the rms over windows of time
+(`hbvm_bench.measure.drift`).
+"""
+
+
+def document(result: Endurance) -> Document:
+    """Return the report."""
+    look, run = looks(result.methods), result.run
+    return Document(
+        "Endurance: the energy of the outer Solar System",
+        [
+            "How the energy error grows with time, ours beside the peers', in one run.",
+            f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
+            f"position and momentum is changed by up to {PERTURBATION} of itself "
+            "(`hbvm_bench.measure.starts`).",
+        ],
+        [
+            Note(machine.sentence(run.machine)),
+            *attempt(
+                ("the tables", lambda: tables(result)), PEERS, ("the figure", lambda: over_time(result, look))
+            ),
+            Note(METHOD),
+            again("endure", run.command, run.started[:10], run.machine, run.versions),
+        ],
+        list(look.values()),
+    )
+
+
+def tables(result: Endurance) -> list[Table]:
+    """Return the tables: the errors with their laws, and the goals."""
+    found = lines(result)
+    years = sorted({year for line in found for year in line.rms})
+    rows = []
+    for line in found:
+        law = line.drift
+        rows.append(
+            (
+                line.method,
+                f"{line.starts}" + (f", {line.failed} failed" if line.failed else ""),
+                *(f"{line.rms[year]:.1e}" if year in line.rms else NONE for year in years),
+                NONE if law is None else _named(law),
+                NONE if law is None or not law.law else power_of(law),
+                NONE if law is None or law.mean is None else _mean(law),
+                NONE if law is None or law.rate is None else _rate(law),
+                NONE if line.seconds is None else seconds(line.seconds),
+                NONE if line.times_ours is None else f"{line.times_ours:.3g}",
+            )
+        )
+    heads = tuple(f"{year:g}" for year in years)
+    after = ("law", "power of t", "mean", "a year", "time", "× ours")
+    made = [
+        Table(
+            f"Relative energy error over {result.years:g} years",
+            ("method", "starts", *heads, *after),
+            rows,
+            "rms over the starts, at so many years. Mean: over the starts at the end, with its standard "
+            "error, after the offset of each has been taken off. "
+            + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
+            + "Power of t and the drift a year with 95 % "
+            "intervals over the starts. Time: median of one trajectory.",
+            words=(0, 2 + len(heads)),
+            groups=(("", 2), ("rms", len(heads)), ("", 2), ("drift", 2), ("", 2)),
+        )
+    ]
+    if asked := goals(result):
+        made.append(goals_table(asked))
+    return made
+
+
+def _named(law: Law) -> str:
+    return drift.LAWS[law.law].removeprefix("grows like ") if law.law else law.why
+
+
+def _mean(law: Law) -> str:
+    """Return the mean over the starts with its standard error and the count of signs."""
+    spread = "" if law.mean_error is None else f" ± {law.mean_error:.1e}"
+    return f"{law.mean:+.1e}{spread} ({law.positive} of {law.starts} positive)"
+
+
+def _rate(law: Law) -> str:
+    """Return the mean drift per year with its interval, which one start does not have."""
+    bare = law.rate_low is None or law.rate_high is None
+    return f"{law.rate:+.1e}" + ("" if bare else f" ({law.rate_low:+.1e} to {law.rate_high:+.1e})")
+
+
+@styled
+def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
+    """Draw the rms over the starts against time, with every start behind it; ``None`` without any."""
+    t = result.t
+    shown = [(method, errors) for method, errors in result.errors.items() if errors.size]
+    if not shown:
+        return None
+    values = np.array([drift.rms(errors) for _, errors in shown])
+    positive = values[values > 0.0]
+    low = math.floor(math.log10(positive.min())) if positive.size else -17
+    high = math.ceil(math.log10(positive.max())) if positive.size else -14
+    figure = new(8.4, 5.0)
+    axes = figure.subplots()
+    figure.subplots_adjust(left=0.08, right=0.94, top=0.94, bottom=0.1)
+    log_axis(axes, "x", math.floor(math.log10(t[0])), math.ceil(math.log10(t[-1])))
+    log_axis(axes, "y", low, max(high, low + 1))
+    found, traces = {line.method: line for line in lines(result)}, []
+    for (method, errors), rms in zip(shown, values, strict=True):
+        number, colour, dash = look[method].number, look[method].light, look[method].dash
+        for row in np.abs(errors):
+            axes.plot(t, np.where(row > 0.0, row, np.nan), color=colour, linewidth=0.4, alpha=0.18)
+        axes.plot(
+            t,
+            rms,
+            color=colour,
+            dashes=dash or (None, None),
+            marker=look[method].marker,
+            markevery=24,
+            markersize=5,
+            linewidth=1.6,
+            label=method,
+        )
+        traces.append(Trace(number, method, t, np.where(rms > 0.0, rms, np.nan)))
+        law = found[method].drift
+        if law is not None and law.law is not None:
+            at = np.geomspace(t[-1] / FALLS_ON, t[-1], LAW_POINTS)
+            traces.append(Trace(number, method, at, drift.curve(law, at), "law", drift.LAWS[law.law]))
+    guide = t[t >= t[-1] / 1e3]
+    axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
+    axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
+    title = "relative energy error, root mean square over the starts"
+    axes.set(xlabel="years", title=title)
+    axes.legend(loc="upper left", handlelength=4.5)
+    said = "; ".join(
+        f"{line.method}: {', '.join(f'{value:.1e} at {year:g} years' for year, value in line.rms.items())}"
+        for line in found.values()
+    )
+    vertical = Axis("rms of the relative energy error", log=True)
+    return picture(
+        figure,
+        "endure",
+        "Energy error of the outer Solar System over time",
+        "Thick: root mean square over the starts; thin: every start. The grey line grows like the square "
+        "root of time, as unbiased round-off does.",
+        said,
+        Plot([Panel(title, Axis("years", log=True, both=True), vertical, traces)]),
+    )

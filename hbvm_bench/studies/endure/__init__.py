@@ -1,1 +1,0 @@
-"""``hbvm-bench endure``: how the energy error of the outer Solar System grows over a million years."""
