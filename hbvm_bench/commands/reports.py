@@ -54,7 +54,7 @@ def report(
 def headline(
     reports: Annotated[Path, typer.Argument(help="Where race/ and automatic/ lie.")] = Path("reports"),
 ) -> None:
-    """Print the README's tables of times as markdown, from stored results alone.
+    """Print the tables of the race and of `automatic` as markdown, from stored results alone.
 
     For every kind of processor the ratios, the goals with what was measured, and the settings
     that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.

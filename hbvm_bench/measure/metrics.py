@@ -254,7 +254,9 @@ def evaluations(m: Measured) -> float | str:
 
 @metric("time", "time", "s", same_trajectory=True)
 def warm_seconds(m: Measured) -> float | str:
-    """Median wall seconds of a whole integration without output, compiled before, alone."""
+    """Median seconds of a whole integration without output, compiled before, with no other case running;
+    of the wall or of the processor, as the campaign says.
+    """
     if m.timing is None:
         return "not timed"
     return m.timing.summary.get("median", m.timing.why or "not timed")

@@ -142,7 +142,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
             _results(parts, runs, records, look),
             *(overall if len(parts) == 1 else []),
             *(one.section for one in parts),
-            _fairness(records),
+            _fairness(runs, records),
             Section("Raw data", attempt(("the results as files", files)), "data-files", nav="Data"),
             _again(runs, records),
             Section("Sources", [Items([*dict.fromkeys(references), CITE])], "sources"),
@@ -222,12 +222,16 @@ def _results(
     return Section("What came out", blocks, "results", nav="Results")
 
 
-def _fairness(records: Sequence[Record]) -> Section:
+def _fairness(runs: Sequence[Run], records: Sequence[Record]) -> Section:
     """Return the rules, the settings of each method, and what was excluded."""
     drawn = f"Drawn are the first {DRAWN_CASES} of {len(records)} cases; tables and data have all of them."
+    campaigns = [run.index.campaign for run in runs]
+    ends = any(entry.end is not None for campaign in campaigns for entry in campaign.entries())
+    timing = dict.fromkeys(words.timing(one.timing) for one in campaigns if one.timing.rounds)
     rules = (
         *([drawn] if len(records) > DRAWN_CASES else []),
-        *(*words.RULES, *outcomes.sentences(records), *provenance.processors(records)),
+        *(*words.RULES, *([words.ENDS] if ends else []), *timing),
+        *(*outcomes.sentences(records), *provenance.processors(records)),
     )
     rows = []
     for of, members in by(lambda record: (family_of(record), record.library), records).items():

@@ -2,16 +2,18 @@
 
 from collections.abc import Sequence
 
+from hbvm_bench.campaign.file import TimingPlan
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, number
-from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, status_of
+from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, seconds, status_of
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 """The errors in the summary's question "who is fastest among those that are right?\""""
 BEST = 3  # of them
+SHORTEST_RUN = 1e-6  # seconds; no whole integration takes less
 
 WITNESSES = (
     "The position errors are the largest of {} trajectories, taken evenly from all, whose ends are known in "
@@ -40,13 +42,6 @@ Invariants are evaluated in double-double arithmetic from the double states, on 
 common to all. Each method reaches the grid in the way that costs its quality nothing: by its own
 steps, by a partial step aside, by its own step's polynomial at full order, or by landing on it.
 
-Times are those of whole integrations without output, compiled before, with one thread on one core,
-in a pass of their own with no other case running: every round visits every case once in a fresh
-process, so that a machine that changes its speed touches all alike. A sample lasts at least 20 ms.
-The table gives the median and the quartiles; all samples are in the store. Compilation is stated
-apart. Each library goes to the end in the way of its own documentation; what the bench adds to its
-time is in a table below.
-
 heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels
 come, built for any processor of the kind. SciPy's solvers are Python and call a vector field
 compiled by numba.
@@ -54,6 +49,13 @@ compiled by numba.
 A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; the
 numbers of the part that it did run are void.
 """
+TIMES = (
+    "Times are those of whole integrations without output, compiled before, with one thread on one core, in "
+    "a pass of their own with no other case running. {visits} {sample} The table gives the median and the "
+    "quartiles; all samples are in the store. Compilation is stated apart. Each library goes to the end in "
+    "the way of its own documentation; what the bench adds to its time is in a table below."
+)
+ENDS = "Where the campaign gives the end state itself, that stands in the place of the 128-bit solution."
 WEAKNESSES_TEXT = """
 HBVM(k, s) with k > s is not symplectic: it keeps the energy, not the volume in phase space.
 Gauss (k = s) is symplectic and does not keep the energy.
@@ -61,10 +63,9 @@ Gauss (k = s) is symplectic and does not keep the energy.
 Both are implicit: every step solves a nonlinear system, so they need many evaluations of the vector
 field.
 
-HBVM keeps the angular momentum only as far as its order does.
-
 Conserving the energy is not accuracy: it does not say where on the energy surface the state is.
 """
+ANGULAR_MOMENTUM = "HBVM keeps the angular momentum only as far as its order does."
 
 
 def _paragraphs(text: str) -> tuple[str, ...]:
@@ -73,6 +74,24 @@ def _paragraphs(text: str) -> tuple[str, ...]:
 
 RULES = _paragraphs(RULES_TEXT)
 WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
+
+
+def timing(plan: TimingPlan) -> str:
+    """Return how a campaign takes times."""
+    alike = ", so that a machine that changes its speed touches all alike."
+    if plan.interleaved:
+        rounds = f"in {plan.rounds} rounds (slow cases in fewer)"
+        visits = f"One process takes all cases of a problem in turn, {rounds}{alike}"
+    elif plan.rounds > 1:
+        visits = f"Each of {plan.rounds} rounds visits every case once, in a fresh process{alike}"
+    else:
+        visits = "Every case is visited once, in a fresh process."
+    if plan.interleaved and plan.clock == "thread":
+        visits += " The seconds are the processor's for this thread: waiting for others does not count."
+    sample = f"A sample lasts at least {seconds(plan.shortest)}."
+    if plan.shortest < SHORTEST_RUN:
+        sample = "A sample is one integration."
+    return TIMES.format(visits=visits, sample=sample)
 
 
 def summary(records: Sequence[Record]) -> list[str]:
@@ -104,7 +123,8 @@ def summary(records: Sequence[Record]) -> list[str]:
 
 def shortcomings(records: Sequence[Record]) -> list[str]:
     """Return what our own methods do wrong, general facts first, then what this run shows."""
-    shown = list(WEAKNESSES)
+    turning = any(number(record, "angular_momentum_max") is not None for record in records)
+    shown = [*WEAKNESSES, *([ANGULAR_MOMENTUM] if turning else [])]
     for record in records:
         position, energy = number(record, "position_end"), number(record, "energy_max")
         ours = record.role == "ours" and group_of(record) == "on"

@@ -20,28 +20,32 @@ from hbvm_bench.report.document import Block, Document, Files, Note, Section, at
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import standings
+from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
+from hbvm_bench.summaries.points import accurate
 from hbvm_bench.summaries.rows import format_metric, status_of
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 from problems.errors import InputError
 
 NAME = "automatic"
+AGAINST = "Taylor"
+NO_WORSE = {"energy_max": 1.0, "position_mean": 1.0}
+"""Our errors are at most so many times theirs where a ratio is compared."""
 
 
 @dataclass(frozen=True)
 class Duel:
-    """What came out on one problem, against the goal on it.
+    """What came out on one problem, against the goal on it, where there is one.
 
     Attributes
     ----------
-    verdict : Verdict
-        On the goal.
+    verdict : Verdict or None
+        On the goal; ``None`` where none was declared.
     ours, theirs : Record
         Both cases, whether they are as accurate as was asked for or not.
     """
 
-    verdict: Verdict
+    verdict: Verdict | None
     ours: Record
     theirs: Record
 
@@ -51,9 +55,9 @@ class Duel:
         return self.theirs.case.problem
 
     @property
-    def goal(self) -> float:
+    def goal(self) -> str:
         """How many times as long the Taylor method should take."""
-        return self.verdict.goal.ratio or 0.0
+        return NONE if self.verdict is None else self.verdict.asked
 
     @property
     def ratio(self) -> Spread | None:
@@ -62,13 +66,14 @@ class Duel:
 
     @property
     def words(self) -> str:
-        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio."""
+        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio; ``""`` without a goal."""
         if self.ratio is None:
             return next(
                 (status_of(one) for one in (self.ours, self.theirs) if not one.timing), "not compared"
             )
-        accurate = self.verdict.comparison.ours is not None
-        return self.verdict.verdict if accurate else "not as accurate"
+        if not accurate(self.ours, standings.no_worse(self.theirs, NO_WORSE)):
+            return "not as accurate"
+        return "" if self.verdict is None else self.verdict.verdict
 
 
 def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
@@ -96,12 +101,12 @@ def by_kind(directory: Path) -> dict[str, list[Kept]]:
 
 def duels(run: Kept) -> list[Duel]:
     """Return what came out, problem by problem."""
-    found = []
-    for verdict in verdicts(run.index.campaign, run.records):
-        ours = standings.among(verdict.records, "")
-        theirs = standings.among(verdict.records, verdict.goal.against)
+    campaign, found = run.index.campaign, []
+    judged = {verdict.entry.use: verdict for verdict in verdicts(campaign, run.records)}
+    for entry, records in standings.entries(campaign, run.records):
+        ours, theirs = standings.among(records, ""), standings.among(records, AGAINST)
         if ours and theirs:
-            found.append(Duel(verdict, ours[0], theirs[0]))
+            found.append(Duel(judged.get(entry.use), ours[0], theirs[0]))
     return found
 
 
@@ -142,7 +147,7 @@ def document(results: Mapping[str, Sequence[Kept]]) -> Document:
 def _run(run: Kept) -> list[Block]:
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     return [
-        Note(machine.sentence(run.machine)),
+        Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)])),
         *attempt(("errors and times", partial(sides, duels(run)))),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
     ]
@@ -157,7 +162,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
     for key in dict.fromkeys(key for found in by_problem.values() for key in found):
         of_kind = [found.get(key) for found in by_problem.values()]
         known = [duel for duel in of_kind if duel is not None]
-        goals = dict.fromkeys(f"≥ {duel.goal:g}" for duel in known)
+        goals = dict.fromkeys(duel.goal for duel in known)
         settings = dict.fromkeys(duel.theirs.case.method for duel in known)
         rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
     return Table(
@@ -173,7 +178,7 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
 def _cell(duel: Duel | None) -> str:
     if duel is None:
         return "not run"
-    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}"
+    return duel.words if duel.ratio is None else f"{duel.ratio.median:.2f}× {duel.words}".strip()
 
 
 def sides(found: Sequence[Duel]) -> Table:
@@ -186,7 +191,7 @@ def sides(found: Sequence[Duel]) -> Table:
             rows.append(
                 (
                     duel.problem if first else "",
-                    f"≥ {duel.goal:g}" if first else duel.words,
+                    duel.goal if first else duel.words,
                     f"{ratio.median:.2f}" if first and ratio is not None else "",
                     spread if first and spread else "",
                     side.case.method,

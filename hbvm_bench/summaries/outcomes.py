@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from statistics import median
 from typing import Literal, NamedTuple
 
-from hbvm_bench.store.records import Record, TimingRound
+from hbvm_bench.store.records import Load, Record, TimingRound
 from hbvm_bench.summaries.points import by_family, by_problem, family_of, singles
 from hbvm_bench.summaries.rows import group_of, reason_of
 from hbvm_bench.summaries.table import Table
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
+BUSY = 0.05  # of a core: more than this beside the timings makes them doubtful
 
 State = Literal["on", "off", "ended", "refused", "absent"]
 
@@ -99,7 +100,7 @@ def sentences(records: Sequence[Record]) -> list[str]:
 
 def doubts(records: Sequence[Record]) -> list[str]:
     """Return sentences on what to distrust: times taken on a busy machine, several machines, limits."""
-    said = disturbed(records)
+    said = disturbed(records) + beside(records)
     rounds = _rounds(records)
     calibrations = sorted(seconds for one in rounds for seconds in one.calibration)
     if len(calibrations) >= 4:
@@ -135,6 +136,32 @@ def disturbed(records: Sequence[Record]) -> list[str]:
         f"The times are disturbed: the machine had other work and left half of the visits less "
         f"than {share:.0%} of a core. Ratios below 2 say nothing."
     ]
+
+
+def beside(records: Sequence[Record]) -> list[str]:
+    """Return a sentence on what else ran while interleaved times were taken, where that was looked at."""
+    if not (loads := _loads(records)):
+        return []
+    others, stolen = (_shares([getattr(load, of) for load in loads]) for of in ("others", "stolen"))
+    doubt = "; the times are doubtful" if busy(records) else ""
+    return [
+        f"While times were taken, other processes used {others} of a core, and the host kept {stolen} of "
+        f"one{doubt}."
+    ]
+
+
+def busy(records: Sequence[Record]) -> bool:
+    """Whether the machine had so much other work that interleaved times are doubtful."""
+    return any(max(load.others, load.stolen) > BUSY for load in _loads(records))
+
+
+def _loads(records: Sequence[Record]) -> list[Load]:
+    return [record.timing.load for record in records if record.timing and record.timing.load]
+
+
+def _shares(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.0%}", f"{max(values):.0%}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _rounds(records: Sequence[Record]) -> list[TimingRound]:

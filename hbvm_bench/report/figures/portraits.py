@@ -20,6 +20,7 @@ PAGE_POINTS = 700  # and that the page carries
 FEWEST_CROSSINGS = 20
 FARTHEST = 3.0  # times the usual width: a wider cloud is cut at the edge of its panel
 COARSEST = 0.5  # of the largest |q1| between two samples: beyond, a crossing is a guess
+GUESSES = 0.1  # of the crossings: with more of them samples are too far apart for a section
 
 
 def portrait(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
@@ -30,8 +31,9 @@ def portrait(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
         [(case, *case.series["y"][:, :2].T) for case in cases if len(case.series["y"]) > 2],
         "phase-portrait",
         "Phase portrait",
-        "All samples of each case. The true motion stays on one closed curve; a spread across it is an error "
-        "of the energy.",
+        "All samples of each case."
+        + " The true motion stays on one closed curve; a spread across it is an error of the energy."
+        * ("energy" in problem.system.invariant_names),
         ("q", "p"),
     )
 
@@ -63,7 +65,11 @@ def crossings(y: Array) -> tuple[Array, Array]:
         return np.empty(0), np.empty(0)
     before, after = y[:-1], y[1:]
     size = float(np.max(np.abs(y[:, 0])))
-    up = (before[:, 0] < 0.0) & (after[:, 0] >= 0.0) & (after[:, 0] - before[:, 0] < COARSEST * size)
+    up = (before[:, 0] < 0.0) & (after[:, 0] >= 0.0)
+    near = after[:, 0] - before[:, 0] < COARSEST * size
+    if np.sum(up & ~near) > GUESSES * np.sum(up):
+        return np.empty(0), np.empty(0)
+    up &= near
     share = -before[up, 0] / (after[up, 0] - before[up, 0])
     at = before[up] + share[:, None] * (after[up] - before[up])
     return at[:, 1], at[:, 3]

@@ -85,7 +85,8 @@ def table(rows: list[Cost]) -> Table:
         low, middle, high = (1e3 * float(f(row.seconds)) for f in (np.min, np.median, np.max))
         errors = f"{row.energy:.1e}", f"{row.position:.1e}"
         cells.append((row.name, *errors, f"{middle:.3g} ms", f"{low:.3g} .. {high:.3g}", f"{low / base:.3g}"))
-    return Table("", ("method", "energy", "position", "median", "rounds", "to the native kernel"), cells)
+    last = "fastest round, to the native kernel's"
+    return Table("", ("method", "energy", "position", "median", "rounds", last), cells)
 
 
 def _native(problem: Problem, method: Any) -> tuple[str, Run]:

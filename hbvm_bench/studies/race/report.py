@@ -16,10 +16,10 @@ from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
 from hbvm_bench.studies.race.results import FILE, Race, declared
+from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.points import family_of
 
 DECLARED = declared()
-BUSY = 0.05  # of a core: more than this beside the race makes its times doubtful
 
 RULES_TEXT = f"""
 Fixed steps and steps that a method chooses itself are rows of their own, for every family that has both:
@@ -168,14 +168,7 @@ def remarks(race: Race) -> list[str]:
             f"A fixed computation beside it took {calibration * 1e3:.2f} ms, and in its worst round "
             f"{worst:.0%} more or less."
         )
-    load = next((one.timing.load for one in race.records if one.timing and one.timing.load), None)
-    if load is not None:
-        doubt = "; its times are doubtful" if max(load.others, load.stolen) > BUSY else ""
-        said.append(
-            f"Meanwhile other processes used {load.others:.0%} of a core, and the host kept "
-            f"{load.stolen:.0%} of one{doubt}."
-        )
-    return said
+    return said + outcomes.beside(race.records)
 
 
 def commands(races: Sequence[Race]) -> str:

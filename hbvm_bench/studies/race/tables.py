@@ -9,7 +9,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import FAMILIES, OURS, Row
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import ERRORS, Race, counts
-from hbvm_bench.summaries import standings
+from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import ratio_text
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.rows import format_metric, group_of, seconds, status_of
@@ -190,8 +190,8 @@ def defaults(race: Race) -> Table | None:
 
 
 def compiling(race: Race) -> Table | None:
-    """Return the compile times in fresh processes; ``None`` where they were not measured."""
-    if not race.probes:
+    """Return the compile times in fresh processes; ``None`` without any, or measured beside other work."""
+    if not race.probes or outcomes.busy(race.records):
         return None
     return Table(
         "Before the first result, in a fresh process",

@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from hbvm_bench.campaign.file import Campaign, Ensemble, MethodEntry
+from hbvm_bench.campaign.file import Campaign, Ensemble, MethodEntry, TimingPlan
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.report import words
 from hbvm_bench.report.campaign import document
@@ -242,6 +242,24 @@ def test_text_in_markdown_stays_in_its_cell(text):
 
 def test_the_rules_name_the_tolerance_that_is_used():
     assert any(f"{GUARD_TOLERANCE:g}" in rule for rule in words.RULES)
+
+
+@pytest.mark.parametrize(
+    ("plan", "said", "not_said"),
+    [
+        (TimingPlan(rounds=1), ["visited once", "at least 20 ms"], ["rounds", "for this thread"]),
+        (TimingPlan(rounds=2), ["Each of 2 rounds", "fresh process"], ["in turn"]),
+        (
+            TimingPlan(rounds=5, interleaved=True, clock="thread", shortest=1e-9),
+            ["in turn, in 5 rounds", "processor's for this thread", "one integration"],
+            ["fresh process", "lasts at least"],
+        ),
+    ],
+)
+def test_the_rules_say_how_this_campaign_takes_times(plan, said, not_said):
+    rule = words.timing(plan)
+    assert all(text in rule for text in said)
+    assert not any(text in rule for text in not_said)
 
 
 def test_without_a_reference_nothing_is_ranked(run):

@@ -72,7 +72,7 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
         assert {one.repeats for one in side.timing.rounds} == {1}
     assert duel.ours.result.counters.steps < duel.theirs.result.counters.steps / 3
     assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
-    assert (duel.words == "reached") == (duel.ratio.median >= duel.goal)
+    assert (duel.words == "reached") == (duel.ratio.median >= duel.verdict.goal.ratio)
     capsys.readouterr()
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     said = capsys.readouterr().err
@@ -93,6 +93,13 @@ def test_a_side_that_is_less_accurate_is_told():
     ahead, behind = (automatic.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
     assert (ahead.words, behind.words) == ("reached", "not as accurate")
     assert behind.ratio.median == 3.0
+
+
+def test_a_problem_without_a_goal_is_shown_with_its_ratio():
+    run = made({"llvm_processor": "x"}, 3.0, problem="pendulum")
+    (duel,) = automatic.duels(run)
+    assert (duel.goal, duel.words) == ("–", "")
+    assert automatic.ratios({"x": [run]}).rows[0][2:] == ("–", "3.00×")
 
 
 def test_a_side_on_another_trajectory_has_no_ratio():

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from hbvm_bench.campaign.file import Case, Ensemble
-from hbvm_bench.store.records import Compile, Law, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Compile, Law, Load, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.summaries import laws, needs, outcomes, points
 
 
@@ -139,15 +139,19 @@ def test_fairness_counts_settings():
 
 
 def test_times_of_a_busy_machine_are_doubtful():
-    def timed(share, calibration):
+    def timed(share, calibration, load=None):
         one = TimingRound(
             samples=[1.0], repeats=1, compile=Compile(seconds=0.0, cached=None), share=share,
             calibration=calibration,
         )  # fmt: skip
-        return record("Taylor()", timing=Timing(rounds=[one]))
+        return record("Taylor()", timing=Timing(rounds=[one], load=load))
 
     assert outcomes.doubts([timed(1.0, [0.01, 0.01, 0.01, 0.01])]) == []
     assert "disturbed" in outcomes.doubts([timed(0.5, [])])[0]
+    (loaded,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.57, stolen=0.0))])
+    assert "used 57% of a core, and the host kept 0% of one; the times are doubtful" in loaded
+    (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.01, stolen=0.0))])
+    assert "doubtful" not in quiet
     assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
     assert "No times" in outcomes.doubts([record("Taylor()")])[0]
     slow = record("Radau(rtol=1, atol=1)", outcome="timeout", status="", metrics={})

@@ -132,13 +132,13 @@ def test_the_callbacks_cost_next_to_nothing():
     bare, watched = [], []
     for _ in range(7):
         simulation = program.simulation(layout, 0.0, problem.y0)
-        started = time.perf_counter()
+        started = time.thread_time()
         simulation.integrate(300.0)
-        bare.append(time.perf_counter() - started)
+        bare.append(time.thread_time() - started)
         stepper = program.start(problem.y0, problem.par)
-        started = time.perf_counter()
+        started = time.thread_time()
         stepper.advance([300.0])
-        watched.append(time.perf_counter() - started)
+        watched.append(time.thread_time() - started)
     # 1.01; by REBOUND's own Python setters it is 1.1 for the watchdog and 2.5 with the counter.
     assert min(watched) < 1.5 * min(bare)
 

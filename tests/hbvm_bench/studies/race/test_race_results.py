@@ -81,6 +81,15 @@ def test_the_report_says_what_is_doubtful_void_refused_and_quick(race):
     assert rows["IAS15()"][-1] == "stalled: stood still"
 
 
+def test_compile_times_are_shown_where_the_machine_had_no_other_work(race):
+    assert tables.compiling(race) is None  # a fifth of a core went elsewhere
+    quiet = [
+        msgspec.structs.replace(one, timing=one.timing and msgspec.structs.replace(one.timing, load=None))
+        for one in race.records
+    ]
+    assert tables.compiling(replace(race, records=quiet)).rows[0][2:] == ("2.5 s", "3.5 s")
+
+
 def test_the_tables_say_why_there_is_no_ratio(race):
     (row,) = tables.headline([race]).rows
     cells = dict(zip(tables.headline([race]).head, row, strict=True))
