@@ -22,7 +22,7 @@ from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Law
 from hbvm_bench.store.store import Store
-from hbvm_bench.summaries import standings
+from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
 from hbvm_bench.summaries.laws import power_of
@@ -196,7 +196,7 @@ def document(result: Endurance) -> Document:
             "(`hbvm_bench.measure.starts`).",
         ],
         [
-            Note(machine.sentence(run.machine)),
+            Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)])),
             *attempt(
                 ("the tables", lambda: tables(result)), PEERS, ("the figure", lambda: over_time(result, look))
             ),
