@@ -132,7 +132,7 @@ automatic nosuch                                           | unknown problem of 
 automatic kepler --rounds 0                                | rounds must be at least 2, not 0
 automatic kepler --rounds a                                | Invalid value for '--rounds': Input should be a
 automatic kepler --rounds -5                               | rounds must be at least 2, not -5
-automatic --general nosuch                                 | unknown problem of general 'nosuch'; known: are
+automatic --general nosuch                                 | unknown problem of general 'nosuch'; known: C1
 automatic --general --limit -1                             | --limit=-1.0 must be above 0 and at most 1e300
 automatic --general --limit 0                              | --limit=0.0 must be above 0 and at most 1e300
 automatic --general --limit nan                            | --limit=nan must be above 0 and at most 1e300

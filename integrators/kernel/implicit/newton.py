@@ -119,8 +119,8 @@ def is_scattered(m):
     The stage equations have other roots than the one that tends to the solution with h, some
     of them beyond a pole; a correction that follows the Jacobian of every stage may find them.
     """
-    first, last, allowed = 0.0, 0.0, 1.0
-    for _ in range(1, m.s):
+    first, last, allowed = 0.0, 0.0, 0.5  # s = 1: what cannot fall off is not believed
+    for _ in range(2, m.s):
         allowed *= 0.5
     for part in range(m.parts):
         gamma = m.gamma + m.block * part
