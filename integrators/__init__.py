@@ -8,20 +8,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from integrators import registry
-from integrators.integrate import integrate
-from integrators.many import Solutions, integrate_many
 from integrators.protocol import MethodBase, Samples, Stats, Status
+from integrators.running.integrate import integrate
+from integrators.running.many import Solutions, integrate_many
+from integrators.running.watch import Progress
 from integrators.solution import Solution, load
-from integrators.watch import Progress
 
 if TYPE_CHECKING:
-    from integrators.advice import advise as advise
+    from integrators.coefficients.order import order_of as order_of
+    from integrators.coefficients.order import stability as stability
     from integrators.events import Event as Event
-    from integrators.gauss import Gauss as Gauss
-    from integrators.hbvm import HBVM as HBVM
-    from integrators.order import order_of as order_of
-    from integrators.order import stability as stability
-    from integrators.poincare import section as section
+    from integrators.methods.advice import advise as advise
+    from integrators.methods.gauss import Gauss as Gauss
+    from integrators.methods.hbvm import HBVM as HBVM
+    from integrators.running.poincare import section as section
 
 __all__ = [
     "MethodBase",
@@ -39,10 +39,10 @@ __all__ = [
 
 _LATER = {  # imported when first used
     "Event": "integrators.events",
-    "advise": "integrators.advice",
-    "order_of": "integrators.order",
-    "section": "integrators.poincare",
-    "stability": "integrators.order",
+    "advise": "integrators.methods.advice",
+    "order_of": "integrators.coefficients.order",
+    "section": "integrators.running.poincare",
+    "stability": "integrators.coefficients.order",
 }
 
 

@@ -27,7 +27,7 @@ class attributes, ``accepts`` and the function that takes the steps are left to 
 7. A numerical failure is a `Status`, never an exception, never a silent NaN,
    never an endless loop; the samples computed before it are returned.
 8. ``checkpoint`` returns all that makes the continuation bit for bit the same, and
-   what it belongs to (`integrators.checkpoints.Identity`); ``restore`` takes it back, and
+   what it belongs to (`integrators.running.checkpoints.Identity`); ``restore`` takes it back, and
    nothing else.
 9. Register the class under the entry point group ``hbvm_bench.integrators``;
    `integrators.testing` then checks it against these sentences.

@@ -14,9 +14,9 @@ from problems.errors import InputError, unknown
 GROUP = "hbvm_bench.integrators"
 
 BUILT_IN = {
-    "integrators.hbvm": ("HBVM",),
-    "integrators.gauss": ("Gauss",),
-    "integrators.line_integral": ("LineIntegral",),
+    "integrators.methods.hbvm": ("HBVM",),
+    "integrators.methods.gauss": ("Gauss",),
+    "integrators.methods.line_integral": ("LineIntegral",),
     "integrators.peers.heyoka.taylor": ("Taylor",),
     "integrators.peers.rebound": ("IAS15", "Leapfrog", "WHFast", "WHFast512"),
     "integrators.peers.diffrax.methods": (

@@ -15,8 +15,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.checkpoints import Identity
-from integrators.one_thread import one_thread
 from integrators.options import Step
 from integrators.protocol import (
     Array,
@@ -31,7 +29,9 @@ from integrators.protocol import (
     check_state,
     check_times,
 )
-from integrators.times import plan
+from integrators.running.checkpoints import Identity
+from integrators.running.one_thread import one_thread
+from integrators.running.times import plan
 from problems.errors import unknown
 from problems.problem import System
 

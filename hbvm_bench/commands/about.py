@@ -60,7 +60,7 @@ def advise(
     as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
 ) -> None:
     """Say which of our methods and which step reach an accuracy, at what cost: a few short runs."""
-    from integrators.advice import advise as advise_
+    from integrators.methods.advice import advise as advise_
 
     advice = advise_(typed_problem(problem), accuracy)
     if as_json:

@@ -17,7 +17,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from hbvm_bench.reference.extended import compiled, minus, plus, times
-from integrators import legendre
+from integrators.coefficients import legendre
 from problems import emit
 from problems.analysis.double_double import DD
 from problems.errors import InputError

@@ -25,7 +25,7 @@ from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
 from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
-from integrators.times import Counts, plan
+from integrators.running.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown
 from problems.problem import System

@@ -5,9 +5,9 @@ from numpy.typing import ArrayLike
 
 from integrators.kernel.context import DENSE, LAND, SIDE
 from integrators.kernel.stepper import HBVMStepper
-from integrators.one_thread import one_thread
 from integrators.protocol import Array, Samples, Status, check_state
-from integrators.times import Counts, plan
+from integrators.running.one_thread import one_thread
+from integrators.running.times import Counts, plan
 
 
 class FixedStepper(HBVMStepper):

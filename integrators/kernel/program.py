@@ -70,7 +70,7 @@ class HBVMProgram(Compiled):
         separable systems: half the unknowns, half the iterations). By default the
         second-order form wherever the system has one, but for blended iteration.
     solver : {"auto", "fixed_point", "newton", "blended"}, optional
-        How the stage equations are solved; see `integrators.hbvm.HBVM`.
+        How the stage equations are solved; see `integrators.methods.hbvm.HBVM`.
     keep : sequence of str, optional
         Invariants to keep by line integrals, by name; ``name[i]`` for one component of a vector. If there
         is none, the energy of a Poisson system. First-order form, fixed point.
@@ -323,7 +323,7 @@ class AdaptiveProgram(HBVMProgram):
     h : float, optional
         Length of the first step.
     solver : {"auto", "fixed_point", "newton", "blended"}, optional
-        How the stage equations are solved; see `integrators.hbvm.HBVM`.
+        How the stage equations are solved; see `integrators.methods.hbvm.HBVM`.
     max_step : float, optional
         Length that no step exceeds.
     breakpoints : sequence of float, optional
@@ -354,7 +354,9 @@ class AdaptiveProgram(HBVMProgram):
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver, keep=keep)
         started = binary.clock()
-        from integrators.legendre import legendre  # 50 digits, which take their time to be imported
+        from integrators.coefficients.legendre import (
+            legendre,  # 50 digits, which take their time to be imported
+        )
 
         self.tol, self.defect, self.first = tol, defect, h
         self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps

@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.checkpoints import Identity
 from integrators.events.event import Event
 from integrators.kernel.context import (
     ALWAYS_IMPLICIT,
@@ -31,9 +30,10 @@ from integrators.kernel.native import engine
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
-from integrators.one_thread import one_thread
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_times
-from integrators.times import Counts
+from integrators.running.checkpoints import Identity
+from integrators.running.one_thread import one_thread
+from integrators.running.times import Counts
 from problems.errors import unknown
 from problems.problem import System
 

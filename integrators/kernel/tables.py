@@ -109,7 +109,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     name = store.key(
         "tables",
         f"{k} {s} {second} {route}",
-        binary.sources("tables", "../legendre", "../../problems/analysis/double_double"),
+        binary.sources("tables", "../coefficients/legendre", "../../problems/analysis/double_double"),
     )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):
@@ -138,7 +138,7 @@ def _shapes(k: int, s: int, route: int) -> list[tuple[int, int]]:
 
 
 def _make(k: int, s: int, second: bool, route: int) -> dict[str, Array]:
-    import integrators.legendre as legendre
+    from integrators.coefficients import legendre
 
     t = legendre.tables(k, s)
     modes = min(k, MODES_VARYING)
@@ -270,7 +270,7 @@ def rounded(constants: Constants) -> Array:
 @lru_cache(maxsize=32)
 def onward(constants: Constants) -> Array:
     """Return the tables for first stages where steps vary: for a step of 1, for all `RATIOS`."""
-    import integrators.legendre as legendre
+    from integrators.coefficients import legendre
 
     a = constants.arrays
     nodes, modes, columns = a["nodes"].reshape(-1), constants.modes, constants.route

@@ -13,8 +13,8 @@ import numpy as np
 from integrators.options import NotNegative, Share
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
+from integrators.running.watchdog import Crawl, crawl
 from integrators.stepping import ProgramBase, StepperBase
-from integrators.watchdog import Crawl, crawl
 from problems.errors import InputError
 from problems.problem import System
 

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.integrate import integrate
 from integrators.protocol import MethodBase
+from integrators.running.integrate import integrate
 from problems import Problem
 
 PLATEAU = 3e-13

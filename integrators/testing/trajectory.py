@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from integrators.integrate import integrate
 from integrators.protocol import SAMPLINGS, MethodBase, Program, Stats, Status, Stepper
+from integrators.running.integrate import integrate
 from integrators.testing.exercises import blow_up
 from integrators.testing.rules import finished, irregular, raises, regular, require, start
 from problems import Problem

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import integrators
 from integrators import HBVM, Gauss, registry, testing
 from integrators.protocol import Status, check_state, check_times
-from integrators.times import plan
+from integrators.running.times import plan
 from problems import Hamiltonian, Problem
 from problems.errors import InputError, UnknownNameError
 
@@ -184,7 +184,7 @@ def test_importing_loads_no_peer_no_jax_no_plotting():
 
 
 def test_the_function_integrate_stays_when_its_module_is_imported():
-    import integrators.integrate
+    import integrators.running.integrate
 
     assert callable(integrators.integrate)
 

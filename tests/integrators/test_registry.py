@@ -29,7 +29,7 @@ def test_each_built_in_method_is_where_the_table_says(offered):
 
 
 def test_a_third_partys_method_stands_beside_them(offered):
-    offered(Ours="integrators.gauss:Gauss")
+    offered(Ours="integrators.methods.gauss:Gauss")
     assert "HBVM" in registry.names()
     assert registry.create("Ours", s=2, h=0.1) == registry.create("Gauss", s=2, h=0.1)
 

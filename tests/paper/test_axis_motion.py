@@ -9,7 +9,7 @@ import problems
 from hbvm_bench.studies.paper.experiments import axis_motion
 from hbvm_bench.studies.paper.sitnikov_part import chaotic_from
 from integrators import integrate
-from integrators.hbvm import HBVM
+from integrators.methods.hbvm import HBVM
 
 
 def test_the_model_agrees_with_the_three_bodies():

@@ -17,7 +17,7 @@ from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
 from hbvm_bench.studies.paper.henon_heiles_part import fates
-from integrators.gauss import Gauss
+from integrators.methods.gauss import Gauss
 from integrators.protocol import Array, Samples, Status
 from problems import Hamiltonian
 from problems.errors import InputError

@@ -5,8 +5,8 @@ import pytest
 
 from hbvm_bench.studies.paper.experiments import period_annulus as experiment
 from hbvm_bench.studies.paper.experiments.period_annulus import DEGREES, PRINTED, STEPS
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 
 

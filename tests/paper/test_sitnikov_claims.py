@@ -10,8 +10,8 @@ from hbvm_bench.studies.paper.experiments import sitnikov
 from hbvm_bench.studies.paper.experiments.axis_motion import Growth
 from hbvm_bench.studies.paper.sitnikov_part import dynamics, kept, oscillates, trajectories
 from integrators import integrate
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 
 
 @pytest.fixture(scope="module")

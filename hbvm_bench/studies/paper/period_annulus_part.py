@@ -24,8 +24,8 @@ from hbvm_bench.studies.paper.experiments.period_annulus import (
 )
 from hbvm_bench.studies.paper.results import Part, Results, Task, each
 from hbvm_bench.summaries.table import Table
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, P2
 

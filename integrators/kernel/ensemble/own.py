@@ -28,7 +28,7 @@ from integrators.kernel.step.vary import (
     take,
     within,
 )
-from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
+from integrators.running.watchdog import CRAWL_SHARE, CRAWL_STEPS
 
 group_at = view(Group)
 context_at = view(Context)
@@ -217,7 +217,7 @@ def vanishes(ctx):
 
 @compiled
 def crawls(group, lane, ctx):
-    """Whether a trajectory does not get anywhere; see `integrators.watchdog`."""
+    """Whether a trajectory does not get anywhere; see `integrators.running.watchdog`."""
     if ctx.steps % CRAWL_STEPS:
         return False
     mark = group.mark[lane]

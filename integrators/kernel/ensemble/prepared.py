@@ -95,7 +95,7 @@ class Lanes:
 
     def parts(self, parts: Numbers, h: float) -> dict[str, NDArray[Any]]:
         """Return what `Group` has of partial steps that follow a step of h."""
-        from integrators.legendre import legendre
+        from integrators.coefficients.legendre import legendre
 
         a, modes = self._constants.arrays, min(self.k, tables.MODES)
         lengths, places = np.unique(parts, return_inverse=True)

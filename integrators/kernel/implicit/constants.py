@@ -87,10 +87,10 @@ def _tables(k: int, s: int) -> tuple[Array, Array, Array, Array]:
     """Return integrals, the low parts of their first columns, the basis and X_s, kept on disk."""
     shapes = [(k, s), (k, min(LOW, s)), (k, s), (s, s)]
     ends = np.cumsum([rows * columns for rows, columns in shapes])
-    name = store.key("implicit", f"{k} {s}", binary.sources("implicit/constants", "../legendre"))
+    name = store.key("implicit", f"{k} {s}", binary.sources("implicit/constants", "../coefficients/legendre"))
     kept = store.get(name)
     if kept is None or len(kept) != 8 * ends[-1]:
-        import integrators.legendre as legendre  # 50 digits, which take their time to be imported
+        from integrators.coefficients import legendre  # 50 digits, which take their time to be imported
 
         t = legendre.tables(k, s)
         parts = [t.integrals.hi, t.integrals.lo[:, : min(LOW, s)], t.basis.hi, t.x.hi]

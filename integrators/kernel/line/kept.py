@@ -39,7 +39,9 @@ class Kept:
     """
 
     def __init__(self, system: System, constants: Constants, invariants: Sequence[str]):
-        from integrators.legendre import legendre  # 50 digits, which take their time to be imported
+        from integrators.coefficients.legendre import (
+            legendre,  # 50 digits, which take their time to be imported
+        )
 
         self.system = system
         self.names = [part for name in invariants for part in components(system, name)]

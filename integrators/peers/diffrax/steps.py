@@ -7,8 +7,8 @@ import numpy as np
 
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status
+from integrators.running.watchdog import CRAWL_STEPS, Crawl, crawl
 from integrators.stepping import FixedStepper, ProgramBase, StepperBase
-from integrators.watchdog import CRAWL_STEPS, Crawl, crawl
 from problems.errors import InputError
 from problems.problem import System
 

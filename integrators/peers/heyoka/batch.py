@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from integrators.peers import load
 from integrators.protocol import Array, Status, Trajectories, check_batch, check_times
-from integrators.times import Counts
-from integrators.watchdog import CRAWL_STEPS, Crawl
+from integrators.running.times import Counts
+from integrators.running.watchdog import CRAWL_STEPS, Crawl
 from problems import emit
 from problems.systems.base import System
 

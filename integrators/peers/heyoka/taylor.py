@@ -19,8 +19,8 @@ from integrators.peers import UNTRACED, load
 from integrators.peers.heyoka.batch import Lanes
 from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
 from integrators.protocol import Array, MethodBase, Status, Trajectories
+from integrators.running.watchdog import CRAWL_STEPS, crawl
 from integrators.stepping import ProgramBase, StepperBase
-from integrators.watchdog import CRAWL_STEPS, crawl
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from integrators.peers import load
 from integrators.protocol import Array
-from integrators.watchdog import CRAWL_SHARE, CRAWL_STEPS
+from integrators.running.watchdog import CRAWL_SHARE, CRAWL_STEPS
 
 FROZEN = 128
 """Steps in a row that leave the time where it is, after which a simulation has stalled."""

@@ -9,8 +9,8 @@ import numpy as np
 from integrators.options import NotNegative, Step
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.protocol import Array, Status
+from integrators.running.watchdog import CRAWL_STEPS
 from integrators.stepping import StepperBase
-from integrators.watchdog import CRAWL_STEPS
 from problems.errors import InputError
 from problems.problem import Problem
 

@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from integrators.legendre import polynomials, tables
+from integrators.coefficients.legendre import polynomials, tables
 from integrators.options import Stages
 from integrators.peers import load
 from problems.checks import checked

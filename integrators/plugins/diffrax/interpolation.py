@@ -6,7 +6,7 @@ import diffrax as dx
 import jax
 import jax.numpy as jnp
 
-from integrators.legendre import integrated, polynomials
+from integrators.coefficients.legendre import integrated, polynomials
 from integrators.plugins.diffrax.arithmetic import apply
 
 

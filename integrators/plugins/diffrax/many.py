@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.plugins import diffrax as plugin  # says what is missing, if JAX or diffrax is
 from integrators.protocol import Array, MethodBase, Status, Trajectories, check_batch, check_times
-from integrators.times import plan
+from integrators.running.times import plan
 from problems import emit
 from problems.errors import InputError
 from problems.systems.base import System

@@ -20,11 +20,11 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM, TOLERANCE
+from integrators.coefficients.legendre import legendre, tables
 from integrators.kernel.native import binary as native
 from integrators.kernel.native import store
-from integrators.legendre import legendre, tables
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM, TOLERANCE
 from integrators.plugins.rebound import layout
 from problems.errors import InputError
 

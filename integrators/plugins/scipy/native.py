@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.integrate import DenseOutput
 
 import integrators
-from integrators.automatic import DEFECT
 from integrators.kernel.fixed import FixedStepper
+from integrators.methods.automatic import DEFECT
 from integrators.plugins.scipy.field import Field
 from integrators.protocol import Samples, Status
-from integrators.times import plan
+from integrators.running.times import plan
 from problems.analysis.structure import degree, exact_k
 from problems.systems.base import System
 

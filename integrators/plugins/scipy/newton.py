@@ -11,7 +11,7 @@ from scipy.integrate import OdeSolver
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse.linalg import splu
 
-from integrators.legendre import x_matrix
+from integrators.coefficients.legendre import x_matrix
 from problems.errors import InputError
 
 # Of differences, as in `integrators.kernel.implicit.jacobian`.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DenseOutput, OdeSolver
 
-from integrators.legendre import legendre_integrals
+from integrators.coefficients.legendre import legendre_integrals
 from integrators.plugins.scipy.newton import Newton
 from integrators.plugins.scipy.stages import Solved, Stages
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
-from integrators.legendre import legendre, tables
+from integrators.coefficients.legendre import legendre, tables
 
 CONVERGED = 1e-16
 STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure

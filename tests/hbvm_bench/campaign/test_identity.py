@@ -31,10 +31,10 @@ NOT_ASKED = {
     *("hbvm_bench.run.worker", "integrators.kernel.native.store"),
     *(
         "integrators",
-        "integrators.integrate",
-        "integrators.many",
+        "integrators.running.integrate",
+        "integrators.running.many",
         "integrators.registry",
-        "integrators.watch",
+        "integrators.running.watch",
     ),
     # which many trajectories may be asked for, and a case is not
     *("integrators.events", *(f"integrators.events.{name}" for name in ("event", "finder", "members"))),
@@ -42,7 +42,7 @@ NOT_ASKED = {
 
 
 @pytest.mark.parametrize(
-    ("method", "module"), [(OURS, "integrators.gauss"), (PEER, "integrators.peers.rebound")]
+    ("method", "module"), [(OURS, "integrators.methods.gauss"), (PEER, "integrators.peers.rebound")]
 )
 def test_nothing_that_a_worker_loads_is_left_out(method, module):
     command = [sys.executable, "-c", LOADED.format(method=method)]
@@ -69,7 +69,7 @@ def test_nothing_that_a_worker_loads_is_left_out(method, module):
 EDITED = {
     "integrators/kernel/step/begin.py": [True, False],
     "integrators/peers/rebound/ias15.py": [False, True],
-    "integrators/integrate.py": [False, False],
+    "integrators/running/integrate.py": [False, False],
     "integrators/solution.py": [True, True],
     "problems/trace/graph.py": [True, True],
     "problems/analysis/double_double.py": [True, True],
@@ -144,10 +144,10 @@ def test_what_a_plugins_module_imports_of_its_own_package_belongs_to_it(tmp_path
     (package / "__init__.py").write_text("")
     (package / "deep" / "__init__.py").write_text("")
     (package / "methods.py").write_text("def compile():\n    from .deep import helper\n    import json\n")
-    (package / "deep" / "helper.py").write_text("import integrators.one_thread\n")
+    (package / "deep" / "helper.py").write_text("import integrators.running.one_thread\n")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.import_module("somebody.methods")
-    theirs = {"somebody.methods", "somebody.deep", "somebody.deep.helper", "integrators.one_thread"}
+    theirs = {"somebody.methods", "somebody.deep", "somebody.deep.helper", "integrators.running.one_thread"}
     assert set(sources(["somebody.methods"])) - {"problems.errors"} == theirs
     monkeypatch.delitem(sys.modules, "somebody.methods")
     monkeypatch.delitem(sys.modules, "somebody")

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from integrators.gauss import Gauss
+from integrators.methods.gauss import Gauss
 from integrators.protocol import Array
 from problems import Hamiltonian, VectorField
 

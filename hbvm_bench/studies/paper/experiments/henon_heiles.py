@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from hbvm_bench.studies.paper.experiments.departure import departure, first, own_steps
 from integrators import integrate
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems import Problem
 from problems.catalogue.henon_heiles import henon_heiles, inside_triangle

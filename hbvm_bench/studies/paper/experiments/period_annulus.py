@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.studies.paper.experiments.departure import departure, own_steps
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
 from problems import emit
 from problems.catalogue.period_annulus import C_STAR, H_STAR, P1, period_annulus

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from integrators import integrate
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
-from integrators.legendre import legendre
+from integrators.coefficients.legendre import legendre
+from integrators.coefficients.tableau import tableau
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
-from integrators.tableau import tableau
 from problems import emit
 from problems.catalogue.henon_heiles import henon_heiles
 from problems.catalogue.period_annulus import period_annulus

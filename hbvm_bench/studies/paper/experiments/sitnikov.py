@@ -10,8 +10,8 @@ import problems
 from hbvm_bench.reference import solutions
 from hbvm_bench.studies.paper.experiments.departure import departure, first
 from integrators import Solution, integrate, registry
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase
 from problems import Problem
 from problems.errors import InputError

@@ -5,9 +5,9 @@ import pytest
 
 import problems
 from integrators import HBVM, LineIntegral
+from integrators.coefficients.legendre import tables
 from integrators.kernel.line.kept import components
 from integrators.kernel.program import HBVMProgram
-from integrators.legendre import tables
 from problems import emit
 
 

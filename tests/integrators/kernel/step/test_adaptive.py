@@ -8,8 +8,8 @@ import pytest
 import integrators
 import problems
 from integrators import HBVM, Gauss, testing
-from integrators.automatic import choose
 from integrators.kernel import tables
+from integrators.methods.automatic import choose
 from integrators.protocol import Status
 from problems import Problem, VectorField
 from problems.errors import InputError

@@ -5,7 +5,7 @@ import pytest
 from numba.core.errors import TypingError
 
 import problems
-from integrators import legendre
+from integrators.coefficients import legendre
 from integrators.kernel import tables
 from integrators.kernel.native import binary, field
 from integrators.kernel.program import HBVMProgram

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from integrators.caveats import blind, unseen
-from integrators.hbvm import HBVM, Solver, landings
+from integrators.methods.hbvm import HBVM, Solver, landings
 from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError

@@ -16,8 +16,8 @@ from time import perf_counter
 
 import numpy as np
 
-from integrators.gauss import Gauss
-from integrators.hbvm import HBVM, TOLERANCE
+from integrators.methods.gauss import Gauss
+from integrators.methods.hbvm import HBVM, TOLERANCE
 from integrators.protocol import Array, MethodBase, Status
 from problems.calls import readable
 from problems.errors import InputError

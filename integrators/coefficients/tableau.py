@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.legendre import tables
+from integrators.coefficients.legendre import tables
 from integrators.protocol import Array
 
 # Measured for all s <= k <= 40: the rows' sums are within 3.4e-16 of c, the weights' sum within 2.3e-16 of 1.

@@ -28,9 +28,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.legendre import legendre, legendre_integrals
+from integrators.coefficients.legendre import legendre, legendre_integrals
+from integrators.coefficients.tableau import Tableau, tableau
 from integrators.protocol import Array, MethodBase
-from integrators.tableau import Tableau, tableau
 from problems.calls import readable
 from problems.errors import InputError
 

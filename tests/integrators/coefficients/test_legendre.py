@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from integrators.legendre import legendre, legendre_integrals, tables, x_matrix, xi
+from integrators.coefficients.legendre import legendre, legendre_integrals, tables, x_matrix, xi
 from problems.errors import InputError
 
 PAIRS = [(1, 1), (3, 1), (2, 2), (5, 3), (8, 8), (16, 8), (18, 2), (32, 32), (64, 32)]

@@ -4,8 +4,8 @@ import kauri
 import numpy as np
 import pytest
 
-from integrators.legendre import legendre, legendre_integrals
-from integrators.tableau import Tableau, tableau
+from integrators.coefficients.legendre import legendre, legendre_integrals
+from integrators.coefficients.tableau import Tableau, tableau
 from problems.errors import InputError
 
 PAIRS = [(1, 1), (2, 1), (7, 1), (2, 2), (3, 2), (18, 2), (3, 3), (6, 3), (4, 4), (9, 4), (16, 8), (20, 20)]

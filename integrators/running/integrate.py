@@ -24,8 +24,8 @@ from integrators.protocol import (
     check_problem,
     check_times,
 )
+from integrators.running.watch import Bar, Pieces, Report, Watch, identity, read
 from integrators.solution import Solution
-from integrators.watch import Bar, Pieces, Report, Watch, identity, read
 from problems import limits
 from problems.calls import readable
 from problems.checks import Must, checked
@@ -73,7 +73,7 @@ def integrate(
         ``stats.extra["event_search"]`` counts the partial steps that they take.
     progress : bool or callable, optional
         True: a bar on the terminal, if there is one. A function: it is called about ten times a second
-        with an `integrators.watch.Progress`.
+        with an `integrators.Progress`.
     checkpoint : path, optional
         A file that is written every so many seconds, when the integration ends, and at Ctrl-C: what the
         continuation depends on, and the samples until then. It is always whole, whenever the process ends.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import integrators
 from integrators import HBVM, Gauss, Status, testing
-from integrators.legendre import legendre
+from integrators.coefficients.legendre import legendre
 from problems import Hamiltonian, Problem, VectorField
 
 

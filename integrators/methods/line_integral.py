@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from integrators.caveats import unseen
-from integrators.hbvm import CITATION as BOOK
-from integrators.hbvm import landings
+from integrators.methods.hbvm import CITATION as BOOK
+from integrators.methods.hbvm import landings
 from integrators.options import Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.checks import refusal

@@ -27,8 +27,8 @@ from integrators.protocol import (
     check_problem,
     check_times,
 )
+from integrators.running.watch import SOON, Bar, Progress, Report
 from integrators.solution import Occurrences
-from integrators.watch import SOON, Bar, Progress, Report
 from problems.calls import readable
 from problems.checks import NOTHING, Named, checked
 from problems.errors import InputError, shown, unknown
@@ -123,7 +123,7 @@ def integrate_many(
         Threads to share the work among. Other methods than HBVM and Gauss use one.
     progress : bool or callable
         Whether to show a bar on a terminal; or what is called now and then, in this thread, with an
-        `integrators.watch.Progress`: the part of the trajectories that are at their end, and their steps.
+        `integrators.Progress`: the part of the trajectories that are at their end, and their steps.
     events : Event or callable, or a sequence of them, optional
         What to look for, as in `integrate`. Trajectories then go one by one, or one in each thread, and a
         terminal event ends its own: what of ``times`` comes later is NaN.

@@ -138,5 +138,5 @@ def test_without_a_method_it_is_the_one_that_chooses_for_itself():
 
 
 def test_the_page_says_what_happens():
-    page = Path(__file__).parents[2] / "docs" / "ensembles.md"
+    page = Path(__file__).parents[3] / "docs" / "ensembles.md"
     assert doctest.testfile(str(page), module_relative=False).failed == 0

@@ -52,7 +52,7 @@ class HBVM(MethodBase):
     With a tolerance the steps vary, each as long as its estimated local error allows.
     This costs an energy-preserving method nothing, whereas a symplectic one, such as
     Gauss, loses its long-time behaviour (`test_adaptive`). Without k and s these are
-    chosen too (`integrators.automatic`), and the length of a step is bounded such that
+    chosen too (`integrators.methods.automatic`), and the length of a step is bounded such that
     the error of the quadrature, by which the energy changes, is at round-off. Stiff
     systems run too: the method is A-stable, but it damps nothing, so that a transient that was
     left at the size of the tolerance stays and keeps the steps shorter than those of a method
@@ -224,7 +224,7 @@ class HBVM(MethodBase):
     def _compiled(self, system: System) -> Any:
         k, s, defect = self.k, self.s, None
         if k is None or s is None:
-            from integrators.automatic import choose
+            from integrators.methods.automatic import choose
 
             assert self.tol is not None
             k, s, defect = choose(system, self.tol)

@@ -6,8 +6,8 @@ import pytest
 
 import integrators
 from integrators import HBVM, Gauss, LineIntegral, order_of, stability
-from integrators.order import trees
-from integrators.tableau import Tableau, tableau
+from integrators.coefficients.order import trees
+from integrators.coefficients.tableau import Tableau, tableau
 from problems import InputError
 
 PAIRS = [(1, 1), (2, 1), (7, 1), (2, 2), (3, 2), (18, 2), (6, 3), (4, 4), (9, 4), (16, 8), (30, 15), (20, 20)]

@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from integrators.events.event import Event
-from integrators.integrate import integrate
 from integrators.options import Count
 from integrators.protocol import MethodBase, check_problem
+from integrators.running.integrate import integrate
+from integrators.running.watch import Report
 from integrators.solution import Solution
-from integrators.watch import Report
 from problems import Problem
 from problems.calls import readable
 from problems.checks import checked

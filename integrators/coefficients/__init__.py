@@ -1,0 +1,1 @@
+"""Numbers of Runge-Kutta methods: quadratures, polynomials, tableaux, order and stability."""
