@@ -1,0 +1,45 @@
+"""Modules that have moved: under their former names for one minor version, with a warning."""
+
+import sys
+import warnings
+from collections.abc import Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _Moved(ModuleType):
+    """Stands in `sys.modules` under a former name; gives what the module at its new place has."""
+
+    def __init__(self, former: str, present: str, removed_in: str):
+        super().__init__(former, f"Moved to {present}; this name goes with version {removed_in}.")
+        self._present, self._removed_in = present, removed_in
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # what the import system and inspect ask of every module
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(self._present), name)
+        warnings.warn(
+            f"{self.__name__} has moved to {self._present}; "
+            f"the former name goes with version {self._removed_in}.",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return value
+
+
+def moved(package: str, modules: Mapping[str, str], *, removed_in: str) -> None:
+    """Let modules be imported under their former names too.
+
+    Parameters
+    ----------
+    package : str
+        The package that all of them are in.
+    modules : mapping
+        Present names by former names, both within the package.
+    removed_in : str
+        The version that knows the former names no more.
+    """
+    for former, present in modules.items():
+        path = f"{package}.{former}"
+        sys.modules[path] = _Moved(path, f"{package}.{present}", removed_in)
