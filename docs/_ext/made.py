@@ -6,16 +6,15 @@ import typer.cli
 import typer.main
 from sphinx.application import Sphinx
 
-from hbvm_bench import cli
 from hbvm_bench.campaign.file import load, shipped
-from hbvm_bench.commands import listing
+from hbvm_bench.commands import app, listing
 from hbvm_bench.measure.metrics import METRICS
 
 
 def commands() -> str:
     """Return what every command says of itself under ``--help``."""
-    cli.attach()
-    command = typer.main.get_command(cli.app)
+    app.attach()
+    command = typer.main.get_command(app.app)
     context = command.make_context("hbvm-bench", [], resilient_parsing=True)
     text = typer.cli.get_docs_for_click(obj=command, ctx=context, name="hbvm-bench", title="Commands")
     return text.replace("```console", "```sh")

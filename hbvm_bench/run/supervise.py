@@ -21,6 +21,7 @@ from typing import Literal
 import psutil
 
 from hbvm_bench.campaign.file import Limits
+from hbvm_bench.run import warm
 from hbvm_bench.run.warm import Fork
 from hbvm_bench.run.worker import kibibytes
 
@@ -110,7 +111,6 @@ class Fresh:
 
 _children: set[Fresh | Fork] = set()
 _lock = threading.Lock()
-_stopping = threading.Event()
 
 
 def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> Ended:
@@ -143,7 +143,7 @@ def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> 
                 peak, walked = max(peak, _together_gib(child.pid)), time.monotonic()
             if begun is None and compiled is not None and compiled.exists():
                 begun = time.monotonic()
-            if _stopping.is_set():
+            if warm.stopping.is_set():
                 cause = "stopped"
             elif peak > limits.memory_gib:
                 cause = "memory"
@@ -163,7 +163,7 @@ def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> 
     reader.join(timeout=5.0)
     return Ended(
         code=-signal.SIGKILL if code is None else code,
-        cause="stopped" if _stopping.is_set() else cause,
+        cause="stopped" if warm.stopping.is_set() else cause,
         seconds=time.monotonic() - start,
         peak_gib=peak,
         output=b"".join(kept).decode(errors="replace"),
@@ -172,7 +172,7 @@ def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> 
 
 def stop_all() -> None:
     """Kill all children; every `watch` under way returns with the cause ``"stopped"``."""
-    _stopping.set()
+    warm.stopping.set()
     with _lock:
         children = list(_children)
     for child in children:
@@ -181,7 +181,7 @@ def stop_all() -> None:
 
 def allow() -> None:
     """Let `watch` wait for children again after `stop_all`."""
-    _stopping.clear()
+    warm.stopping.clear()
 
 
 def _drain(output: int, kept: deque[bytes]) -> None:

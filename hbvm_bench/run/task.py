@@ -148,9 +148,10 @@ def start(scratch: Path, request: Request, loads: tuple[str, str] | None = None)
         with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
             child = nest.start(path, *loads)
             ended = supervise.watch(child, request.limits, compiled)
-            if child.lost and ended.cause == "exit":
-                ended = None
-                compiled.unlink(missing_ok=True)
+            if child.lost:
+                if ended.cause == "exit":
+                    ended = None
+                    compiled.unlink(missing_ok=True)
                 raise ConnectionError  # the nest is of no more use
     if ended is None:
         command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]

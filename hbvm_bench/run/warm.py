@@ -23,6 +23,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -34,6 +35,8 @@ from hbvm_bench.run import worker
 DONE = b"done"
 LONGEST = 2**16  # bytes of a message: a path
 PATIENCE = 60.0  # seconds for an interpreter to start on a busy machine
+LOOK = 0.2  # seconds between two looks whether the run was stopped meanwhile
+GRACE = 5.0  # seconds for a warm process to say how a case ended, or to end itself; a stopped one never does
 GROWTH = 2**18  # KiB that a process may have grown by and still be forked from
 
 
@@ -62,10 +65,14 @@ class Nest:
         return Fork(self.asked, path, lambda asked: self._keep(library, problem, asked))
 
     def close(self) -> None:
-        """End its processes."""
+        """End its processes; one that does not end is killed, and those forked from it with it."""
         for asked in (self.asked, *(asked for _, asked in self.done.values())):
             asked.close()
-        self.process.wait()
+        try:
+            self.process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
 
     def _keep(self, library: str, problem: str, asked: socket.socket) -> None:
         if library in self.done:
@@ -79,7 +86,8 @@ class Fork:
     Attributes
     ----------
     lost : bool
-        Whether it ended because the warm process was killed: that says nothing of the case.
+        Whether the warm process does not say how it ended, because it was killed or stopped; an exit
+        then says nothing of the case.
     """
 
     def __init__(
@@ -91,7 +99,7 @@ class Fork:
         try:
             socket.send_fds(asked, [os.fsencode(path)], [theirs.fileno(), out])
             theirs.close()  # or nobody would be seen to be gone
-            self._socket.settimeout(PATIENCE)
+            _until_answered(self._socket)
             said, handles, _, _ = socket.recv_fds(self._socket, LONGEST, 1, socket.MSG_CMSG_CLOEXEC)
             if not handles:
                 raise ConnectionError("the warm process has ended")
@@ -107,14 +115,19 @@ class Fork:
 
     def wait(self, seconds: float | None = None) -> int | None:
         """Return the exit code, or ``None`` where it still runs after so many seconds."""
-        self._socket.settimeout(seconds)
+        poll = select.poll()
+        poll.register(self._socket, select.POLLIN)
+        poll.register(self._handle, select.POLLIN)
+        if not poll.poll(None if seconds is None else 1000 * seconds):
+            return None
+        self._socket.settimeout(GRACE)  # one of a stopped warm process ends, and nobody says how
         try:
             said = self._socket.recv(LONGEST)
-        except TimeoutError:
-            return None
-        except ConnectionError:
+        except OSError:
             said = b""
         self.lost = not said
+        if self.lost:  # what it has started is left to this process
+            _kill_session(self.pid)
         os.close(self._handle)
         if said == DONE and self._keep is not None:
             self._keep(self._socket)
@@ -128,8 +141,19 @@ class Fork:
             signal.pidfd_send_signal(self._handle, signal.SIGKILL)
 
 
+stopping = threading.Event()
+"""Set while all cases are to end: no thread waits for a warm process then."""
+
 _idle: list[Nest] = []
 _lock = threading.Lock()
+
+
+def _until_answered(asked: socket.socket) -> None:
+    """Wait for a warm process to answer; a stopped one never does."""
+    deadline = time.monotonic() + PATIENCE
+    while not select.select([asked], [], [], LOOK)[0]:
+        if stopping.is_set() or time.monotonic() > deadline:
+            raise TimeoutError("the warm process does not answer")
 
 
 @contextmanager

@@ -106,3 +106,53 @@ def test_a_trajectory_of_dear_steps_hears_ctrl_c(method):
         child.kill()
     # Measured 0.1 s; 18 s and 2.7 s before. A busy machine may take longer.
     assert float(out) < 2.0
+
+
+SOON = """
+import os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def interrupt():
+    time.sleep({delay})
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt, daemon=True).start()
+from hbvm_bench.cli import main
+sys.exit(main(["list", "problems"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("delay", [0.05, 0.1, 0.2, 0.3, 0.45, 0.6])
+def test_a_command_ends_quietly_while_it_is_being_imported(delay):
+    child = subprocess.run(
+        [sys.executable, "-c", SOON.format(delay=delay)], capture_output=True, text=True, check=False
+    )
+    # 0 where the machine was quick and the command is done; before, a traceback of imports
+    assert (child.returncode, child.stderr) in [(130, ""), (0, "")]
+    assert child.returncode == 130 or delay > 0.1
+
+
+LOST = """
+import ctypes, os, signal, sys, time
+from hbvm_bench import cli
+from hbvm_bench.commands import listing
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+called = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))
+
+def tables(what):
+    for _ in range({times}):
+        called()  # as LLVM calls llvmlite: nothing can be raised there
+    time.sleep({then})
+    return []
+
+listing.tables = tables
+sys.exit(cli.main(["list"]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize(("times", "then"), [(1, 5), (3, 5), (1, 0)])
+def test_a_ctrl_c_that_meets_a_callback_is_not_lost(times, then):
+    text = LOST.format(times=times, then=then)
+    child = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False)
+    assert (child.returncode, child.stderr) == (130, "")  # before: 0, after all 5 s, and a traceback

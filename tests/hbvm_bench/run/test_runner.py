@@ -320,6 +320,67 @@ def test_a_case_whose_warm_process_is_killed_meanwhile_runs_again(toys, store):
     assert record.result.compile is not None  # in a process that began with nothing
 
 
+def stopped_meanwhile(store, method, limits, act):
+    """Run a case, stop its warm process meanwhile, do ``act`` and return the record."""
+    warm.close()
+    before = set(psutil.Process().children())
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        future = pool.submit(run_case, case(method), str(store.directory), limits)
+        while not supervise._children:
+            time.sleep(0.01)
+        (nest,) = set(psutil.Process().children()) - before
+        nest.suspend()
+        act()
+        try:
+            return future.result(timeout=30)
+        finally:
+            warm.close()
+            assert not nest.is_running()
+
+
+def test_the_limit_of_a_case_holds_though_its_warm_process_is_stopped(toys, store, monkeypatch):
+    monkeypatch.setattr(warm, "GRACE", 0.5)
+    record = stopped_meanwhile(store, "Endless()", Limits(wall_seconds=2), lambda: None)
+    assert (record.result.outcome, record.result.reason) == ("timeout", "did not end within 2 s")
+
+
+def test_a_case_ends_well_though_its_warm_process_is_stopped(toys, store, monkeypatch):
+    monkeypatch.setattr(warm, "GRACE", 0.5)
+    record = stopped_meanwhile(store, "Waving(h=0.3, wait=1.0)", GENEROUS, lambda: None)
+    assert record.result.outcome == "ok"
+
+
+def test_a_run_with_a_stopped_warm_process_is_stopped(toys, store, monkeypatch):
+    monkeypatch.setattr(warm, "GRACE", 0.5)
+    try:
+        with pytest.raises(execute.InterruptedRunError):
+            stopped_meanwhile(store, "Endless()", GENEROUS, supervise.stop_all)
+    finally:
+        supervise.allow()
+
+
+def test_a_stopped_warm_process_is_replaced_and_no_thread_waits_for_it_after_ctrl_c(toys, store, monkeypatch):
+    monkeypatch.setattr(warm, "GRACE", 0.5)
+    warm.close()
+    assert run(store, "Steady(h=0.3)").result.outcome == "ok"
+    (nest,) = warm._idle
+    process = psutil.Process(nest.process.pid)
+    for one in (process, *process.children()):
+        one.suspend()
+    start = time.monotonic()
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        future = pool.submit(run_case, case("Steady(h=0.4)"), str(store.directory), GENEROUS)
+        time.sleep(0.5)
+        supervise.stop_all()
+        try:
+            with pytest.raises(execute.InterruptedRunError):
+                future.result(timeout=30)
+        finally:
+            supervise.allow()
+    assert time.monotonic() - start < 10  # it would wait a minute for an answer
+    assert run(store, "Steady(h=0.5)").result.outcome == "ok"
+
+
 def test_no_process_outlives_a_runner_that_is_killed(toys):
     code = (
         "from hbvm_bench.run.task import execute, task_of; from hbvm_bench.campaign.file import *;"
