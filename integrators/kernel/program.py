@@ -30,6 +30,7 @@ from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
 from problems import emit
+from problems.analysis.switches import Switches
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -327,7 +328,7 @@ class AdaptiveProgram(HBVMProgram):
     max_step : float, optional
         Length that no step exceeds.
     breakpoints : sequence of float, optional
-        Times that steps end at, ascending.
+        Times that steps end at, besides those at which the formulas switch.
     max_steps : int, optional
         Steps of a trajectory, at most.
     keep : sequence of str, optional
@@ -359,7 +360,8 @@ class AdaptiveProgram(HBVMProgram):
         )
 
         self.tol, self.defect, self.first = tol, defect, h
-        self.max_step, self.breakpoints, self.max_steps = max_step, np.array(breakpoints, float), max_steps
+        self.max_step, self.max_steps = max_step, max_steps
+        self._given, self._switches = np.array(sorted(set(breakpoints)), float), Switches(system)
         c = self.constants
         if c.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(c)
@@ -382,8 +384,17 @@ class AdaptiveProgram(HBVMProgram):
 
     @property
     def free(self) -> bool:
-        """Whether nothing but the tolerance limits the steps."""
-        return self.max_step is None and self.max_steps is None and not self.breakpoints.size
+        """Whether nothing but the tolerance limits the steps, whatever the parameters."""
+        return (
+            self.max_step is None
+            and self.max_steps is None
+            and not self._given.size
+            and not self._switches.any
+        )
+
+    def breakpoints(self, par: Array) -> Array:
+        """Return the times that steps end at, ascending: those given, and those of the formulas."""
+        return np.union1d(self._given, self._switches.times(par))
 
     @property
     def description(self) -> str:
@@ -391,7 +402,7 @@ class AdaptiveProgram(HBVMProgram):
         c, kept = self.constants, f", {self.kept.description}" if self.kept else ""
         return (
             f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
-            f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self.breakpoints.tolist()!r}, "
+            f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self._given.tolist()!r}, "
             f"max_steps={self.max_steps!r}{kept})"
         )
 

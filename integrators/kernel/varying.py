@@ -24,7 +24,8 @@ class VaryingProgram(Program, Protocol):
     tol: float
     max_step: float | None
     max_steps: int | None
-    breakpoints: Array
+
+    def breakpoints(self, par: Array) -> Array: ...
 
 
 class AdaptiveStepper(HBVMStepper):
@@ -37,6 +38,10 @@ class AdaptiveStepper(HBVMStepper):
     """
 
     _program: VaryingProgram
+
+    def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
+        self._breakpoints = program.breakpoints(par)
+        super().__init__(program, y, par, t0)
 
     @property
     def stats(self) -> Stats:
@@ -66,13 +71,13 @@ class AdaptiveStepper(HBVMStepper):
 
     def _stop(self) -> float:
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""
-        ctx, points = self._context, self._program.breakpoints
+        ctx, points = self._context, self._breakpoints
         ahead = ctx.next_length > 0.0
         if not points.size:
             return math.inf if ahead else -math.inf
-        points = points[[not self._is_at(point) for point in points.tolist()]]
         found = points[points > self.t] if ahead else points[points < self.t][::-1]
-        stop = float(found[0]) if found.size else math.inf if ahead else -math.inf
+        beyond = (point for point in found.tolist() if not self._is_at(point))
+        stop = next(beyond, math.inf if ahead else -math.inf)
         ctx.stop = stop
         return stop
 
@@ -109,7 +114,7 @@ class AdaptiveStepper(HBVMStepper):
     def _to(self, times: Array, between: int) -> Samples:
         """Make the samples, piece by piece from one breakpoint to the next."""
         self._watch = crawl(self, self.t, float(times[-1]))
-        if not self._program.breakpoints.size:
+        if not self._breakpoints.size:
             states, outcome, why = self._fill(between, times)
             return self._samples(times[: len(states)], states, outcome, why)
         out = np.empty((times.size, self._dim))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from integrators.caveats import blind, unseen
-from integrators.methods.hbvm import HBVM, Solver, landings
+from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -116,11 +116,9 @@ class Gauss(MethodBase):
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
-            control: dict[str, Any] = self.as_hbvm().control()
-            control["breakpoints"] = landings(system, self.breakpoints)
             return AdaptiveProgram(
                 system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,
-                **control,
+                **self.as_hbvm().control(),
             )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 

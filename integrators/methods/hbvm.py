@@ -1,13 +1,11 @@
 """Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.caveats import blind, unseen
 from integrators.options import Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
-from problems.analysis.structure import breakpoints
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -118,8 +116,9 @@ class HBVM(MethodBase):
         bumps that are shorter than the steps the estimate allows.
     breakpoints : sequence of float, optional
         Times at which the field jumps or has a kink, in any order; with ``tol``. A step ends at each
-        of them that is passed, and nothing from before it is used after it. The knots of ``m.table(t, ...)``
-        and the times c of ``m.where(t < c, ...)`` need not be given.
+        of them that is passed, and nothing from before it is used after it. The times at which formulas
+        switch need not be given where they follow from conditions and tables of anything affine in the time,
+        such as ``m.where(t < par.c, ...)``, ``m.abs(2*t - 3)`` and ``m.table(t/par.T, ...)``.
     max_steps : int, optional
         Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
         with the status ``max_steps``. By default any number.
@@ -232,17 +231,11 @@ class HBVM(MethodBase):
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
-            control: dict[str, Any] = self.control() | {"breakpoints": landings(system, self.breakpoints)}
             return AdaptiveProgram(
                 system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
-                **control,
+                **self.control(),
             )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None
         return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver, keep=keep)
-
-
-def landings(system: System, given: Sequence[float]) -> list[float]:
-    """Return the times that steps end at: those given, and those at which the formulas break."""
-    return sorted({*given, *breakpoints(system)})

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 from integrators.caveats import unseen
 from integrators.methods.hbvm import CITATION as BOOK
-from integrators.methods.hbvm import landings
 from integrators.options import Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.checks import refusal
@@ -174,10 +173,7 @@ class LineIntegral(MethodBase):
 
         made: HBVMProgram | AdaptiveProgram
         if self.tol is not None:
-            points = landings(system, ())
-            made = AdaptiveProgram(
-                system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants, breakpoints=points
-            )
+            made = AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
         else:
             assert self.h is not None
             made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)

@@ -102,23 +102,6 @@ def has_kinks(system: System) -> bool:
     return any(node.op in ("abs", "sign", "where") and node.flags & (STATE | T) for node in nodes)
 
 
-def breakpoints(system: System) -> list[float]:
-    """Return the times at which the field is known to jump or to have a kink, ascending.
-
-    Those are the knots of tables of the time itself, and the times c of comparisons of t with a number c.
-    """
-    found: set[float] = set()
-    for node in reachable(system.function("field").roots) if system.traced else []:
-        first = node.args[0] if node.args else node
-        if node.op == "table" and first.op == "symbol" and first.data[0] == "t":
-            found.update(node.data.knots)
-        elif node.op in ("where", "abs", "sign"):
-            sides = first.args if first.op == "sub" else (first, first.graph.const(0.0))
-            times = [side for side in sides if side.op == "symbol" and side.data[0] == "t"]
-            found.update(side.data for side in sides if times and side.op == "const")
-    return sorted(found)
-
-
 def cyclic(system: System) -> list[int]:
     """Return the indices of the positions that do not occur in H, in order: their momenta are constant.
 

@@ -19,6 +19,7 @@ from problems import Hamiltonian, InputError, Problem, VectorField, emit
 from problems.analysis import latex, structure
 from problems.analysis.double_double import DD
 from problems.analysis.double_double import FUNCTIONS as IN_DD
+from problems.analysis.switches import Switches
 
 KNOTS = [-2.0, -1.1, -0.3, 0.5, 1.0, 2.0]
 POINTS = [0.3, -1.0, 0.7, 0.1, 0.9, -0.4]
@@ -210,7 +211,7 @@ class TestTables:
         times = np.linspace(0.0, 10.0, 21)
         values = np.random.default_rng(5).uniform(-1.0, 1.0, 21)
         system = VectorField(lambda t, y, m: [y[1], -y[0] + m.table(t, times, values)], dim=2)
-        assert structure.breakpoints(system) == times.tolist()
+        assert Switches(system).times(system.pack()).tolist() == times.tolist()
         problem = Problem(system, y0=[1.0, 0.0], t_end=10.0)
         steps = integrate(problem, method, times=[10.0], sample="steps")
         assert set(times[1:].tolist()) <= set(steps.t.tolist())
@@ -224,7 +225,7 @@ class TestTables:
 
     def test_jumps_in_time_are_landed_on(self):
         system = VectorField(lambda t, m: [m.where((t > 1.0) & (t < 2.5), 1.0, 0.0)], dim=1)
-        assert structure.breakpoints(system) == [1.0, 2.5]
+        assert Switches(system).times(system.pack()).tolist() == [1.0, 2.5]
         solution = integrate(Problem(system, y0=[0.0], t_end=4.0), HBVM())
         # Measured 0.
         assert abs(solution.y[-1, 0] - 1.5) < 1e-15

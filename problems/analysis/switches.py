@@ -1,0 +1,165 @@
+"""The times at which a traced vector field switches: they may depend on parameters."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problems.systems.base import System
+from problems.trace.graph import FUNCTIONS, PAR, STATE, Affine, Node, T, reachable
+
+Pieces = list[tuple[Any, Any]]
+"""What a node may be as a function of time: slope and offset of each of its affine pieces.
+
+Numbers, or arrays of one number per term inside a declared sum.
+"""
+
+MOST_PIECES = 16  # of a node: nested choices beyond that are not solved for
+
+
+class Switches:
+    """The times at which conditions, absolute values and tables of a traced field switch.
+
+    Solved for are those of anything affine in time, with parameters at will: ``m.where(t > par.c, ...)``,
+    ``m.abs(2*t - par.c)``, ``m.table(t/par.T, xs, ys)``; also where absolute values and choices
+    of such terms are compared, as in ``m.where(m.abs(t - 3) < par.w, ...)``.
+
+    Parameters
+    ----------
+    system : System
+        Of one that is not traced nothing is known.
+    """
+
+    def __init__(self, system: System):
+        nodes = reachable(system.function("field").roots) if system.traced else []
+        self._nodes = [
+            node
+            for node in nodes
+            if node.op in ("where", "abs", "sign", "table") and node.args[0].flags & (T | STATE) == T
+        ]
+
+    @cached_property
+    def _fixed(self) -> NDArray[np.float64] | None:
+        """The times, where no parameter moves them."""
+        if any(node.args[0].flags & PAR for node in self._nodes):
+            return None
+        return self._solved(np.empty(0))
+
+    @property
+    def any(self) -> bool:
+        """Whether there may be such times."""
+        return bool(self._nodes)
+
+    def times(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the finite times at which the field switches with these parameters, ascending."""
+        return self._solved(par) if self._fixed is None else self._fixed
+
+    def _solved(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
+        pieces = _Evaluation(par).pieces
+        found = [np.empty(0)]
+        for node in self._nodes:
+            levels = np.array(node.data.knots if node.op == "table" else [0.0])
+            for slope, offset in pieces(node.args[0]) or ():
+                slope, offset = np.broadcast_arrays(np.atleast_1d(slope), offset)
+                with np.errstate(all="ignore"):
+                    found.append(((levels[:, None] - offset) / slope).ravel())
+        times = np.concatenate(found)
+        return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
+
+
+class _Evaluation:
+    """The affine pieces of nodes, with given parameters."""
+
+    def __init__(self, par: NDArray[np.float64]):
+        self._par = par
+        self._known: dict[int, Pieces | None] = {}
+
+    def pieces(self, node: Node) -> Pieces | None:
+        """Return a node's affine pieces; ``None`` where it is not made of a few."""
+        for inner in reachable([node]):
+            if inner.id not in self._known:
+                self._known[inner.id] = self._found(inner)
+        return self._known[node.id]
+
+    def _found(self, node: Node) -> Pieces | None:
+        with np.errstate(all="ignore"):
+            if not node.args:
+                return [self._leaf(node)]
+            args = [self._known[arg.id] for arg in node.args]
+            if node.op == "where":
+                return self._chosen(node, args)
+            combined = []
+            for chosen in product(*(arg or () for arg in args)):
+                made = _applied(node, chosen)
+                if made is None:
+                    return None
+                combined += made
+            return combined if 0 < len(combined) <= MOST_PIECES else None
+
+    def _leaf(self, node: Node) -> tuple[Any, Any]:
+        if node.op == "const":
+            return 0.0, node.data
+        if node.op == "index":
+            assert node.loop is not None
+            return 0.0, node.data.values(node.loop).astype(np.float64)
+        space, place = node.data
+        if space == "t":
+            return 1.0, 0.0
+        if isinstance(place, Affine):
+            assert node.loop is not None
+            return 0.0, self._par[place.values(node.loop)]
+        return 0.0, float(self._par[place])
+
+    def _chosen(self, node: Node, args: Sequence[Pieces | None]) -> Pieces | None:
+        condition, a, b = args
+        if a is None or b is None:
+            return None
+        if node.args[0].flags & T == 0 and condition is not None and np.ndim(condition[0][1]) == 0:
+            return a if condition[0][1] > 0.0 else b
+        return a + b if len(a) + len(b) <= MOST_PIECES else None
+
+
+def _applied(node: Node, args: Sequence[tuple[Any, Any]]) -> Pieces | None:
+    """Return the pieces of an operation on one piece of each argument; ``None`` where it is not affine."""
+    (a, b), (c, d) = args[0], args[-1]
+    moving = [bool(np.any(slope != 0.0)) for slope, _ in args]
+    match node.op:
+        case "add":
+            return [(a + c, b + d)]
+        case "sub":
+            return [(a - c, b - d)]
+        case "neg":
+            return [(-a, -b)]
+        case "sum":
+            return [tuple(np.sum(np.broadcast_to(x, len(node.data))) for x in (a, b))]
+        case "mul" if not all(moving):
+            return [(a * d + c * b, b * d)]
+        case "div" if not moving[1]:
+            return [(a / d, b / d)]
+        case "abs" if moving[0]:
+            return [(a, b), (-a, -b)]
+        case "sign" if moving[0]:
+            return [(0.0, 1.0), (0.0, -1.0)]
+    return None if any(moving) else [(0.0, _number(node, [value for _, value in args]))]
+
+
+def _number(node: Node, args: Sequence[Any]) -> Any:
+    """Return the value of an operation on numbers, or on arrays of them; NaN where there is none."""
+    match node.op:
+        case "pow":
+            return np.power(args[0], node.data)
+        case "atan2":
+            return np.arctan2(*args)
+        case "table":
+            return node.data.at(args[0])
+
+    def value(x: float) -> float:
+        try:
+            return FUNCTIONS[node.op](x)
+        except (ValueError, OverflowError):
+            return np.nan
+
+    return np.vectorize(value, otypes=[float])(args[0])
