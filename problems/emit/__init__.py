@@ -1,4 +1,8 @@
-"""One traced system to source for numpy, numba, JAX and heyoka: the same operations in the same order."""
+"""One traced system to source for numpy, numba, JAX and heyoka: the same operations, in the writer's order.
+
+JAX is the exception: what it receives of a declared sum that stays a loop is one reduction over an array,
+whose order of additions is the library's own.
+"""
 
 import hashlib
 import math

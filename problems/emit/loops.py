@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from problems.emit.printer import variable
 from problems.trace.graph import Affine, Loop
 
 _SEGMENTS = 4  # at most as many ranges for one list; longer patchworks read a table
@@ -78,11 +79,13 @@ class Table:
 
     def index(self, affine: Affine) -> str:
         """Return the text of an index."""
-        return index_text(affine, [f"i{column}" for column in range(self.width)])
+        return index_text(affine, [variable("column", column) for column in range(self.width)])
 
     def opening(self) -> list[str]:
         """Return the lines that open the loop."""
-        reads = [f"    i{column} = {self.name}[k, {column}]" for column in range(self.width)]
+        reads = [
+            f"    {variable('column', column)} = {self.name}[k, {column}]" for column in range(self.width)
+        ]
         return [f"for k in range({self.n}):", *reads]
 
 

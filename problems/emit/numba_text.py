@@ -6,7 +6,7 @@ import numpy as np
 
 from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Plan, Scatter
-from problems.emit.printer import Printer
+from problems.emit.printer import Printer, variable
 from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
 
 _FUNCTIONS = {name: name for name in FUNCTIONS} | {"abs": "fabs", "sign": "copysign(1.0, {})"}
@@ -78,21 +78,23 @@ class _NumbaPrinter(Printer):
         if isinstance(header, Range) and isinstance(target, Scatter) and header.n > 1:
             carried = _carried(header, target)
             for i in carried:
-                self.line(f"a{i} = out[{header.along(target.entries[i].index).offset}]")
+                self.line(f"{variable('summed', i)} = out[{header.along(target.entries[i].index).offset}]")
         opening = header.opening()
         for line in opening:
             self.line(line)
         self.indent = outside + "    " * bool(opening)
         for node in body:
             self._inside(node, header)
-        before = {first: f"a{first}" for first in carried}
-        self._add_to(target, header, before, {second: f"a{first}" for first, second in carried.items()})
+        before = {first: variable("summed", first) for first in carried}
+        self._add_to(
+            target, header, before, {second: variable("summed", first) for first, second in carried.items()}
+        )
         self.indent = outside
         if isinstance(header, Range) and isinstance(target, Scatter):
             for first, second in carried.items():
                 along = header.along(target.entries[second].index)
                 last = along.offset + along.coefficients[0] * (header.n - 1)
-                self.line(f"out[{last}] = a{first}")
+                self.line(f"out[{last}] = {variable('summed', first)}")
 
     def _nested(self, header: Nest, body: Sequence[Node], target: Scatter | Node) -> None:
         """Print two nested loops; what depends on i alone stays out of the inner one, sums too."""
@@ -108,17 +110,17 @@ class _NumbaPrinter(Printer):
                     self.assign(node, self.text(node))
         entries = target.entries if isinstance(target, Scatter) else ()
         for i in held:
-            self.line(f"a{i} = out[{header.index(entries[i].index)}]")
+            self.line(f"{variable('summed', i)} = out[{header.index(entries[i].index)}]")
         self.line(f"for j in {header.inner}:")
         self.indent = outside + "        "
         for node in body:
             if node.id not in outer:
                 self._inside(node, header)
-        variables = {i: f"a{i}" for i in held}
+        variables = {i: variable("summed", i) for i in held}
         self._add_to(target, header, variables, variables)
         self.indent = outside + "    "
         for i in held:
-            self.line(f"out[{header.index(entries[i].index)}] = a{i}")
+            self.line(f"out[{header.index(entries[i].index)}] = {variable('summed', i)}")
         self.indent = outside
 
     def _add_to(

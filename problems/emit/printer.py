@@ -8,7 +8,26 @@ from problems.trace.graph import Affine, Loop, Node
 _SUM, _PRODUCT, _LEAF = 1, 2, 3
 _OPERATORS = {"add": (" + ", _SUM), "sub": (" - ", _SUM), "mul": ("*", _PRODUCT), "div": ("/", _PRODUCT)}
 _LONGEST = 72
-_PREFIX = {"y": "y", "par": "c", "out": "a"}  # of the variables that hold inputs and outputs
+_PREFIX = {
+    "y": "y",
+    "par": "c",
+    "out": "o",
+    "value": "v",
+    "summed": "a",  # outputs that a loop adds to, while they are in a variable
+    "column": "i",  # of a loop's list of indices
+    "piece": "piece",  # of a table, and the distance from where it begins
+    "rest": "rest",
+}
+"""What the variables of each kind are called, before a number.
+
+No two prefixes are the same and none ends in a digit, so that variables of two kinds are never one;
+the names without a number (``t``, ``i``, ``j``, ``k``, ``above``, ``middle``, ``rows``) are none of them.
+"""
+
+
+def variable(kind: str, number: int) -> str:
+    """Return the name of a variable in generated code; kinds are those of ``_PREFIX``."""
+    return f"{_PREFIX[kind]}{number}"
 
 
 class Printer:
@@ -65,11 +84,15 @@ class Printer:
         """Add a line."""
         self.lines.append(self.indent + text)
 
+    def _next(self) -> int:
+        """Return a number that no other value has, and no table."""
+        self._count += 1
+        return self._count - 1
+
     def assign(self, node: Node, text: str, name: str = "") -> None:
         """Add the line ``name = text`` and remember the name."""
         if not name:
-            name = f"v{self._count}"
-            self._count += 1
+            name = variable("value", self._next())
         self.names[node.id] = name
         self.line(f"{name} = {text}")
 
@@ -83,7 +106,7 @@ class Printer:
             if space == "t":
                 self.names[node.id] = "t"
             elif isinstance(place, int):
-                self.assign(node, f"{space}[{place}]", f"{_PREFIX[space]}{place}")
+                self.assign(node, f"{space}[{place}]", variable(space, place))
             else:
                 assert index is not None
                 self.assign(node, f"{space}[{index(place)}]")
@@ -93,6 +116,7 @@ class Printer:
             text, level = self._operation(node)
             if self.plan.uses[node.id] == 1 and len(text) < _LONGEST:
                 self._pending[node.id] = (text, level)
+                self.names.pop(node.id, None)  # of an earlier loop over the same body
             else:
                 self.assign(node, text)
 
@@ -104,7 +128,8 @@ class Printer:
             for values in (table.knots, map(list, table.rows))
         )
         x = self.text(node.args[0])
-        place, rest = f"i{node.id}", f"d{node.id}"
+        number = self._next()
+        place, rest = variable("piece", number), variable("rest", number)
         self.line(f"{rest} = {x}")
         self.find(place, knots, rest, len(table.rows))
         self.line(f"{rest} = {rest} - {knots}[{place}]")

@@ -3,9 +3,12 @@
 import shlex
 import subprocess
 import sys
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from hbvm_bench import cli
 
@@ -274,3 +277,11 @@ def is_said(row, text):
     assert text.startswith("hbvm-bench: ")
     assert row.says in text
     sentence(text, "")
+
+
+def test_the_oldest_typer_that_is_admitted_has_what_the_command_line_imports():
+    told = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    (typer,) = [wanted for wanted in map(Requirement, told["dependencies"]) if wanted.name == "typer"]
+    # typer.exceptions came with 0.27.2: 0.27.1 is without it.
+    assert typer.specifier.contains("0.27.2")
+    assert not typer.specifier.contains("0.27.1")

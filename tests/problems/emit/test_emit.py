@@ -1,4 +1,4 @@
-"""The same operations in the same order on every engine."""
+"""The same operations on every engine, and in the same order on all but JAX."""
 
 import re
 from typing import Any
