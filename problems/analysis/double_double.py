@@ -7,8 +7,8 @@ along Y. Hida, X. S. Li, D. H. Bailey, "Library for double-double and
 quad-double arithmetic" (QD). No fused multiply-add is assumed.
 
 Relative errors, asserted in the tests: 1e-31 for + - * / sqrt and small powers,
-1e-30 for sin, cos, tan, exp and log, near their zeros too. Beyond 1e300 products
-overflow; below 1e-290 the second half of a number is lost.
+1e-30 for sin, cos, tan, exp and log, near their zeros too. Products
+overflow where doubles do; below 1e-290 the second half of a number is lost.
 """
 
 from fractions import Fraction
@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _SPLITTER = 134217729.0  # 2**27 + 1
+_NEAR_THE_LARGEST = 2.0**995
 # 90 digits, from which the parts below are cut exactly.
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803482")
 _LN2 = Fraction(
@@ -42,8 +43,10 @@ def _quick_two_sum(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _split(a: Array) -> tuple[Array, Array]:
-    t = _SPLITTER * a
-    high = t - (t - a)
+    down = np.where(np.abs(a) > _NEAR_THE_LARGEST, 2.0**-28, 1.0)  # which the splitter would take beyond it
+    small = a * down
+    t = _SPLITTER * small
+    high = (t - (t - small)) / down
     return high, a - high
 
 

@@ -2,7 +2,8 @@
 
 The traced graph is interpreted over arrays of states: constants, parameters and
 states are the doubles that the integrators see, every operation carries 32
-digits, and the result is rounded once. What is left is the integrator's error.
+digits, and the result is rounded once. What is left is the integrator's error. Values
+that pairs of doubles cannot hold are computed by `problems.analysis.wide`.
 """
 
 import operator
@@ -11,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.analysis import double_double
+from problems.analysis import double_double, wide
 from problems.analysis.double_double import DD
 from problems.calculus.function import Function
 from problems.errors import InputError, shown
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000
+_SMALLEST, _LARGEST = 1e-270, 1e290  # sizes between which pairs of doubles have their 32 digits
 _OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
     "add": operator.add,
     "sub": operator.sub,
@@ -176,16 +178,28 @@ def errors(
 ) -> dict[str, Array]:
     """Return how far the invariants are from those at ``start``, see `problems.problem.Problem.errors`."""
     states = _states(system, y)
+    times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states))
     found: dict[str, Array] = {}
     for name in system.invariant_names:
         what = f"invariant:{name}"
+        function = system.function(what)
         first = _along(system, par, what, np.atleast_2d(start[1]), start[0])
-        gaps = [
-            (now - before).rounded()
-            for now, before in zip(_along(system, par, what, states, t), first, strict=True)
-        ]
-        size = np.linalg.norm([value.rounded()[0] for value in first])
-        found[name] = np.linalg.norm(np.stack(gaps), axis=0) / (size if size != 0 else 1.0)
+        values = _along(system, par, what, states, t)
+        gaps = np.stack([(now - before).rounded() for now, before in zip(values, first, strict=True)])
+        size = np.array([value.rounded()[0] for value in first])
+        largest = np.abs(size).max()
+        unit = largest if 0.0 < largest < np.inf else 1.0  # so that no square under- or overflows
+        with np.errstate(all="ignore"):
+            errors = np.linalg.norm(gaps / unit, axis=0) / (np.linalg.norm(size / unit) or 1.0)
+        before = [] if _SMALLEST <= largest <= _LARGEST else wide.evaluate(function, *start, par)
+        # A sum that rounding leaves at 0 is 0; what has become too small for doubles is not.
+        lost = any(value != 0 and not _SMALLEST <= abs(value) <= _LARGEST for value in before)
+        again = np.isfinite(states).all(axis=1) & (lost | ~np.isfinite(errors))
+        if again.any():
+            before = before or wide.evaluate(function, *start, par)
+            for i in np.flatnonzero(again):
+                errors[i] = wide.relative(wide.evaluate(function, float(times[i]), states[i], par), before)
+        found[name] = errors
     return found
 
 
