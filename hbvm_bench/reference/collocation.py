@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hbvm_bench.reference.extended import compiled, minus, plus, times
 from integrators.coefficients import legendre
 from problems import emit
-from problems.analysis.double_double import DD
+from problems.double_double import DD
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.base import System

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from integrators.kernel.native import binary, store
 from integrators.kernel.native.memory import aligned
-from problems.analysis.double_double import DD
+from problems.double_double import DD
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def constants(k: int, s: int, second: bool, lanes: int) -> Constants:
     name = store.key(
         "tables",
         f"{k} {s} {second} {route}",
-        binary.sources("tables", "../coefficients/legendre", "../../problems/analysis/double_double"),
+        binary.sources("tables", "../coefficients/legendre", "../../problems/double_double"),
     )
     kept = store.get(name)
     if kept is None or len(kept) != 8 * sum(rows * columns for rows, columns in shapes):

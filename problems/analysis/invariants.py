@@ -12,9 +12,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.analysis import double_double, wide
-from problems.analysis.double_double import DD
+from problems import double_double
+from problems.analysis import wide
 from problems.calculus.function import Function
+from problems.double_double import DD
 from problems.errors import InputError, shown
 from problems.systems.base import System
 from problems.systems.lagrangian import Lagrangian

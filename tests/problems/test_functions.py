@@ -17,9 +17,9 @@ import problems
 from integrators import DOP853, HBVM, Gauss, Taylor, integrate
 from problems import Hamiltonian, InputError, Problem, VectorField, emit
 from problems.analysis import latex, structure
-from problems.analysis.double_double import DD
-from problems.analysis.double_double import FUNCTIONS as IN_DD
 from problems.analysis.switches import Switches
+from problems.double_double import DD
+from problems.double_double import FUNCTIONS as IN_DD
 
 KNOTS = [-2.0, -1.1, -0.3, 0.5, 1.0, 2.0]
 POINTS = [0.3, -1.0, 0.7, 0.1, 0.9, -0.4]

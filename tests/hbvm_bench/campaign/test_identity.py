@@ -59,7 +59,7 @@ def test_nothing_that_a_worker_loads_is_left_out(method, module):
         "hbvm_bench.run.worker",
         module,
         "problems.catalogue.kepler",
-        "problems.analysis.double_double",
+        "problems.double_double",
     }
     assert made_by <= loaded
     left_out = loaded - kept - said - NOT_ASKED
@@ -74,7 +74,7 @@ EDITED = {
     "integrators/running/integrate.py": [False, False],
     "integrators/solution.py": [True, True],
     "problems/trace/graph.py": [True, True],
-    "problems/analysis/double_double.py": [True, True],
+    "problems/double_double.py": [True, True],
     "problems/catalogue/kepler.py": [True, True],
     "problems/catalogue/pendulum.py": [False, False],
     "problems/picture.py": [False, False],

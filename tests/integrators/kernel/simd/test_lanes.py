@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from integrators.kernel.native import binary, field
 from integrators.kernel.simd.lanes import fma, two_sum
-from problems.analysis import double_double
+from problems import double_double
 
 any_double = st.floats(width=64)
 moderate = st.floats(-1e100, 1e100, width=64)

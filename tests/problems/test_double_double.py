@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from problems.analysis import double_double as dd
-from problems.analysis.double_double import DD
+from problems import double_double as dd
+from problems.double_double import DD
 
 N = 400
 
