@@ -325,23 +325,3 @@ def erf(a: DD) -> DD:
         total = total + term
     root = sqrt(_constant(_PI))
     return where(far, sign(a) + 0.0 * a, x * exp(-square) * total * 2.0 / root)
-
-
-FUNCTIONS = {
-    "sinh": sinh,
-    "cosh": cosh,
-    "tanh": tanh,
-    "asin": asin,
-    "acos": acos,
-    "atan": atan,
-    "atan2": atan2,
-    "erf": erf,
-    "sqrt": sqrt,
-    "sin": sin,
-    "cos": cos,
-    "tan": tan,
-    "exp": exp,
-    "log": log,
-    "abs": absolute,
-    "sign": sign,
-}

@@ -19,6 +19,7 @@ from problems.double_double import DD
 from problems.errors import InputError, shown
 from problems.systems.base import System
 from problems.systems.lagrangian import Lagrangian
+from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import Loop, Node, T, reachable
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 # Numbers held at once by a declared sum's terms, so that many states and many terms fit in memory.
 _BLOCK = 2_000_000
 _SMALLEST, _LARGEST = 1e-270, 1e290  # sizes between which pairs of doubles have their 32 digits
-_OPERATIONS: dict[str, Callable[..., DD]] = double_double.FUNCTIONS | {
+_OPERATIONS: dict[str, Callable[..., DD]] = {name: f.double_double for name, f in FUNCTIONS.items()} | {
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,

@@ -4,6 +4,7 @@ import re
 
 from problems.errors import InputError
 from problems.systems.base import System
+from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import Affine, Loop, Node, reachable
 
 LONGEST = 20_000  # characters: a formula beyond that is no longer read
@@ -89,26 +90,16 @@ class _Printer:
                 return f"{self._power(node.args[0], node.data)}", _PRODUCT
             case "sum":
                 return f"{_range(node.data)} {self._at(node.args[0], _PRODUCT)}", _PRODUCT
-            case "sqrt":
-                return f"\\sqrt{{{self._at(node.args[0], _SUM)}}}", _LEAF
-            case "exp":
-                return f"e^{{{self._at(node.args[0], _SUM)}}}", _PRODUCT
-            case "abs":
-                return f"\\left|{self._at(node.args[0], _SUM)}\\right|", _LEAF
-            case "sign":
-                return f"\\operatorname{{sign}}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
             case "where":
                 condition, a, b = (self._at(arg, _SUM) for arg in node.args)
                 pieces = f"{a} & {condition} > 0 \\\\ {b} & \\text{{else}}"
                 return f"\\begin{{cases}} {pieces} \\end{{cases}}", _LEAF
-            case "atan2" | "erf" | "table":
-                inside = ", ".join(self._at(arg, _SUM) for arg in node.args)
-                return f"\\operatorname{{{node.op}}}\\left({inside}\\right)", _LEAF
+            case "table":
+                return f"\\operatorname{{table}}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
             case _:
-                name = {"log": "ln", "asin": "arcsin", "acos": "arccos", "atan": "arctan"}.get(
-                    node.op, node.op
-                )
-                return f"\\{name}\\left({self._at(node.args[0], _SUM)}\\right)", _LEAF
+                form = FUNCTIONS[node.op].latex
+                inside = tuple(self._at(arg, _SUM) for arg in node.args)
+                return form % inside, _PRODUCT if "^" in form else _LEAF
 
     def _power(self, base: Node, exponent: int) -> str:
         text, binding = self.known[base.id]

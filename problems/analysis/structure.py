@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from problems.errors import InputError
 from problems.systems.base import System
+from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import STATE, Node, T, reachable
 
 
@@ -99,7 +100,12 @@ def depends_on_time(system: System) -> bool:
 def has_kinks(system: System) -> bool:
     """Whether the vector field has an absolute value, its derivative or a choice, of the state or of time."""
     nodes = reachable(system.function("field").roots)
-    return any(node.op in ("abs", "sign", "where") and node.flags & (STATE | T) for node in nodes)
+    return any(has_kink(node) and node.flags & (STATE | T) for node in nodes)
+
+
+def has_kink(node: Node) -> bool:
+    """Whether a node chooses, or is a function of which a derivative jumps."""
+    return node.op == "where" or (node.op in FUNCTIONS and not FUNCTIONS[node.op].smooth)
 
 
 def cyclic(system: System) -> list[int]:

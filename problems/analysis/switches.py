@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from problems.analysis.structure import has_kink
 from problems.systems.base import System
-from problems.trace.graph import FUNCTIONS, PAR, STATE, Affine, Node, T, reachable
+from problems.trace.functions import FUNCTIONS
+from problems.trace.graph import PAR, STATE, Affine, Node, T, reachable
 
 Pieces = list[tuple[Any, Any]]
 """What a node may be as a function of time: slope and offset of each of its affine pieces.
@@ -38,7 +40,7 @@ class Switches:
         self._nodes = [
             node
             for node in nodes
-            if node.op in ("where", "abs", "sign", "table") and node.args[0].flags & (T | STATE) == T
+            if (has_kink(node) or node.op == "table") and node.args[0].flags & (T | STATE) == T
         ]
 
     @cached_property
@@ -151,15 +153,13 @@ def _number(node: Node, args: Sequence[Any]) -> Any:
     match node.op:
         case "pow":
             return np.power(args[0], node.data)
-        case "atan2":
-            return np.arctan2(*args)
         case "table":
             return node.data.at(args[0])
 
-    def value(x: float) -> float:
+    def value(*numbers: float) -> float:
         try:
-            return FUNCTIONS[node.op](x)
+            return FUNCTIONS[node.op].value(*numbers)
         except (ValueError, OverflowError):
             return np.nan
 
-    return np.vectorize(value, otypes=[float])(args[0])
+    return np.vectorize(value, otypes=[float])(*args)

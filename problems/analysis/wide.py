@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.calculus.function import Function
-from problems.trace.graph import FUNCTIONS, Loop, Node, reachable
+from problems.trace.functions import FUNCTIONS
+from problems.trace.graph import Loop, Node, reachable
 
 _DIGITS = 36
 _WIDE = mpmath.MPContext()  # of its own: the precision of mpmath.mp belongs to the user
@@ -24,7 +25,6 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(_WIDE, name) for name in FUNCTIONS if name not in ("abs", "sign")},
     "abs": abs,
     "sign": lambda x: _WIDE.mpf(-1 if x < 0 else 1),
-    "atan2": _WIDE.atan2,
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,

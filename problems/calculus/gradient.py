@@ -14,16 +14,14 @@ expression uses the variable, the terms of declared sums first. This order is
 the same whether a sum is emitted as a loop or term by term.
 """
 
-import math
 from dataclasses import dataclass
 from fractions import Fraction
 
 from problems.calculus.function import Function, LoopTerm, Term
+from problems.trace.functions import FUNCTIONS, Slope
 from problems.trace.graph import STATE, Graph, Loop, Node, is_power_of_two, reachable
 
 _ONE = Fraction(1)
-_BELL = Fraction(2 / math.sqrt(math.pi))  # the slope of erf at 0
-_OF_ARGUMENT = ("pow", "sin", "cos", "log", "abs", "sinh", "cosh", "asin", "acos", "atan", "erf", "table")
 _SMALL = 2**20  # 2/3 is written 2*x/3; a quotient of long decimals is rounded once instead
 
 
@@ -130,10 +128,10 @@ class _Sweep:
                 a, b = node.args
                 self._needed.update([b.id] if a.flags & STATE else [])
                 self._needed.update([a.id] if b.flags & STATE else [])
-            elif node.op in _OF_ARGUMENT:
+            elif node.op in ("pow", "table"):
                 self._needed.add(node.args[0].id)
-            elif node.op in ("sqrt", "exp", "tan", "tanh"):
-                self._needed.add(node.id)
+            elif (function := FUNCTIONS.get(node.op)) is not None and function.derivative is not None:
+                self._needed.update([node.id] if function.of_value else [arg.id for arg in node.args])
             elif node.op == "div":
                 self._needed.add(node.args[1].id)
         for node in self.nodes:
@@ -207,10 +205,6 @@ class _Sweep:
             case "pow":
                 (x,), n = node.args, node.data
                 self._give(x, adjoint.times(graph.int_power(x, n - 1), key, factor=Fraction(n)))
-            case "sqrt":
-                self._give(node.args[0], self._over(adjoint, node, key, Fraction(1, 2)))
-            case "atan2":
-                self._pull_angle(node, adjoint)
             case "where":
                 condition, a, b = node.args
                 value, zero = adjoint.node(graph), graph.const(0.0)
@@ -219,8 +213,13 @@ class _Sweep:
             case "sum":
                 adjoint = adjoint.divided(graph)
                 self._give(node.args[0], adjoint.scaled(_ONE, key))
+            case "table":
+                (x,) = node.args
+                self._give(x, adjoint.times(graph.table(x, node.data.slope()), key))
             case _:
-                self._give(node.args[0], self._pull_function(node, adjoint))
+                slopes = FUNCTIONS[node.op].slopes(node)
+                for arg, slope in reversed([*zip(node.args, slopes, strict=True)]):
+                    self._give(arg, self._along(slope, adjoint, key))
 
     def _pull_quotient(self, node: Node, adjoint: _Adjoint) -> None:
         a, b = node.args
@@ -236,46 +235,12 @@ class _Sweep:
         if a.flags & STATE:
             self._give(a, self._over(adjoint, b, key))
 
-    def _pull_angle(self, node: Node, adjoint: _Adjoint) -> None:
-        (y, x), key = node.args, node.id
-        square = y * y + x * x
-        self._give(x, adjoint.times(y, key, factor=-_ONE).over(square, key))
-        self._give(y, adjoint.times(x, key).over(square, key))
-
-    def _pull_function(self, node: Node, adjoint: _Adjoint) -> _Adjoint:
-        graph, key = self.graph, node.id
-        x = node.args[0]
-        match node.op:
-            case "sin":
-                return adjoint.times(graph.call("cos", x), key)
-            case "cos":
-                return adjoint.times(graph.call("sin", x), key, factor=-_ONE)
-            case "tan":
-                return adjoint.times(graph.node(1.0) + node * node, key)
-            case "exp":
-                return adjoint.times(node, key)
-            case "log":
-                return self._over(adjoint, x, key)
-            case "abs":
-                return adjoint.times(graph.call("sign", x), key)
-            case "sign":
-                return adjoint.scaled(Fraction(0), key)
-            case "sinh":
-                return adjoint.times(graph.call("cosh", x), key)
-            case "cosh":
-                return adjoint.times(graph.call("sinh", x), key)
-            case "tanh":
-                return adjoint.times(graph.node(1.0) - node * node, key)
-            case "asin" | "acos":
-                root = graph.call("sqrt", (1.0 - x) * (1.0 + x))
-                return adjoint.over(root, key, factor=_ONE if node.op == "asin" else -_ONE)
-            case "atan":
-                return adjoint.over(1.0 + x * x, key)
-            case "erf":
-                return adjoint.times(graph.call("exp", -(x * x)), key, factor=_BELL)
-            case "table":
-                return adjoint.times(graph.table(x, node.data.slope()), key)
-        raise AssertionError(f"no derivative of {node.op}")  # pragma: no cover
+    def _along(self, slope: Slope, adjoint: _Adjoint, key: int) -> _Adjoint:
+        """Return the adjoint times a derivative."""
+        adjoint = adjoint.scaled(slope.factor, key)
+        if slope.times is not None:
+            adjoint = adjoint.times(slope.times, key)
+        return adjoint if slope.over is None else self._over(adjoint, slope.over, key)
 
 
 def gradient(root: Node, dim: int) -> Function:

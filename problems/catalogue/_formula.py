@@ -1,10 +1,10 @@
 """Formulas as text, such as ``"p^2/2 - cos(q)"``: read by a whitelist, never run by Python.
 
-The text is read with Python's `ast` module. Numbers, names, ``+ - * /``, powers
-(``^`` or ``**``) with a number as exponent, parentheses and the functions sqrt, sin,
-cos, tan, exp, log and abs of one argument are all there is; everything else is
-refused with the column where it stands. What is left is calculated by the operators of
-whatever the names stand for: on symbols it is traced, as a formula written in Python is.
+The text is read with Python's `ast` module. Numbers, names, ``+ - * /``, powers (``^`` or
+``**``) with a number as exponent, parentheses and the elementary functions of one argument are
+all there is; everything else is refused with the column where it stands. What is left is
+calculated by the operators of whatever the names stand for: on symbols it is traced, as a formula
+written in Python is.
 """
 
 import ast
@@ -16,12 +16,11 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from problems.errors import InputError, unknown
-from problems.trace import graph
+from problems.trace.functions import FUNCTIONS, OF_ONE_ARGUMENT
 
 LONGEST = 4000  # characters
 DEEPEST = 60  # nesting of parentheses, functions and signs
 LARGEST_POWER = 100
-FUNCTIONS = tuple(name for name in graph.FUNCTIONS if name != "sign")
 COORDINATE = re.compile(r"([qp])([1-9][0-9]*)?")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -112,7 +111,7 @@ class Formula:
         named : callable
             Returns what a name stands for.
         functions : Any
-            Has `FUNCTIONS` as attributes, of what names stand for.
+            Has the elementary functions as attributes, of what names stand for.
 
         Raises
         ------
@@ -144,7 +143,7 @@ class Formula:
             case ast.Name(id=name):
                 if not NAME.fullmatch(name):
                     self._refuse(node, f"{name!r} is not a name of letters and digits")
-                if name in FUNCTIONS:
+                if name in OF_ONE_ARGUMENT:
                     self._refuse(node, f"{name} needs an argument, as in {name}(q)")
                 total = named(name)
             case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -155,9 +154,9 @@ class Formula:
                 base, exponent = inner(left), self._exponent(right, inner(right))
                 power = math.pow if isinstance(base, float) else operator.pow
                 total = self._calculated(node, power, base, exponent)
-            case ast.Call(func=ast.Name(id=name), args=[only], keywords=[]) if name in FUNCTIONS:
+            case ast.Call(func=ast.Name(id=name), args=[only], keywords=[]) if name in OF_ONE_ARGUMENT:
                 argument = inner(only)
-                known = graph.FUNCTIONS[name] if isinstance(argument, float) else getattr(functions, name)
+                known = FUNCTIONS[name].value if isinstance(argument, float) else getattr(functions, name)
                 total = self._calculated(node, known, argument)
             case _:
                 self._refuse(node, _why_not(node))
@@ -194,10 +193,10 @@ class Formula:
 
 def _why_not(node: ast.expr) -> str:
     match node:
-        case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
+        case ast.Call(func=ast.Name(id=name)) if name in OF_ONE_ARGUMENT:
             return f"{name} takes one argument"
         case ast.Call(func=ast.Name(id=name)):
-            return str(unknown("function", name, FUNCTIONS)).rstrip(".")
+            return str(unknown("function", name, OF_ONE_ARGUMENT)).rstrip(".")
         case ast.Call():
             return "only functions by name can be called"
         case ast.Attribute():

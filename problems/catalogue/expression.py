@@ -9,13 +9,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
-from problems.catalogue._formula import COORDINATE, FUNCTIONS, NAME, Formula
+from problems.catalogue._formula import COORDINATE, NAME, Formula
 from problems.checks import Must
 from problems.entry import Expected, entry
 from problems.errors import InputError, shown, unknown
 from problems.picture import Phase
 from problems.problem import Problem
 from problems.systems.hamiltonian import Hamiltonian
+from problems.trace.functions import OF_ONE_ARGUMENT
 
 MOST_FREEDOM = 100  # degrees of freedom; larger systems have sums, which text has not
 
@@ -99,7 +100,7 @@ def expression(
     ----------
     H : str
         The energy, in ``q`` and ``p`` or ``q1, p1, q2, ...``, the time ``t``, ``pi`` and parameters;
-        with + - * /, powers ``^`` and sqrt, sin, cos, tan, exp, log, abs.
+        with + - * /, powers ``^`` and the elementary functions of one argument.
     q0, p0 : sequence of float
         The start, as many numbers as there are degrees of freedom.
     parameters : str
@@ -147,7 +148,7 @@ def assignments(text: str) -> dict[str, float]:
             raise InputError(f'cannot read {part!r}; write parameters as "k=2, m=0.5".')
         if name in values:
             raise InputError(f"the parameter {name!r} is given twice.")
-        if name in ("t", "pi", *FUNCTIONS) or COORDINATE.fullmatch(name):
+        if name in ("t", "pi", *OF_ONE_ARGUMENT) or COORDINATE.fullmatch(name):
             raise InputError(f"{name!r} has a meaning of its own and cannot be a parameter.")
         values[name] = value
     return values
@@ -196,6 +197,6 @@ def _traceable(formula: Formula, values: Mapping[str, float], dof: int) -> Calla
 
 
 def _undeclared(formula: Formula, name: str, values: Mapping[str, float]) -> InputError:
-    near = str(unknown("name", name, [*values, "q", "p", "t", "pi", *FUNCTIONS]))
+    near = str(unknown("name", name, [*values, "q", "p", "t", "pi", *OF_ONE_ARGUMENT]))
     hint = near.partition("; ")[2] if "did you mean" in near else f'give it a value, as in "{name}=1".'
     return InputError(f"the formula {formula.text!r} contains {name!r}, which has no value; {hint}")

@@ -28,17 +28,14 @@ from problems.errors import InputError, MissingLibraryError, shown, unknown
 from problems.systems.base import System
 from problems.systems.code_digest import code_digest
 from problems.systems.untraced import Foreign
-from problems.trace.graph import FUNCTIONS, reachable
+from problems.trace.functions import FUNCTIONS, SLOW
+from problems.trace.graph import reachable
 
 _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka": heyoka_text}
 BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
-SLOW = 10  # operations that take as long to compile as one of:
-_SLOW = {*FUNCTIONS, "atan2", "table"} - {"sqrt", "abs", "sign"}
-_MATHEMATICS = (
-    "acos", "asin", "atan", "atan2", "copysign", "cos", "cosh", "erf", "exp", "fabs", "log", "sin", "sinh",
-    "sqrt", "tan", "tanh",
-)  # fmt: skip
+_COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
+_MATHEMATICS = sorted({function.numba.partition("(")[0] for function in FUNCTIONS.values()})
 _NUMBA_HEAD = f"""from math import {", ".join(_MATHEMATICS)}
 
 import numba
@@ -187,7 +184,7 @@ def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
 def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
     key = ("numpy", made.sha256)
     if key not in _compiled:
-        inner = _executed(made, {"np": np, "erf": _erf})
+        inner = _executed(made, {"np": np, **_SPECIAL})
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
             y = np.asarray(y, dtype=np.float64)
@@ -204,10 +201,16 @@ def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
     return _compiled[key]
 
 
-def _erf(x: Any) -> Any:
-    from scipy.special import erf  # which takes its time to be imported
+def _special(name: str) -> Callable[[Any], Any]:
+    def function(x: Any) -> Any:
+        from scipy import special  # which takes its time to be imported
 
-    return erf(x)
+        return getattr(special, name)(x)
+
+    return function
+
+
+_SPECIAL = {f.numpy: _special(f.numpy) for f in FUNCTIONS.values() if "." not in f.numpy}
 
 
 def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Any:
@@ -248,7 +251,7 @@ def compilable(system: System, what: str | Jacobian) -> int:
         For too many operations, or too many that wait for one another.
     """
     nodes = reachable(_function(system, what).roots)
-    cost = sum(SLOW if node.op in _SLOW else 1 for node in nodes)
+    cost = sum(_COST.get(node.op, 1) for node in nodes)
     name = f"the {_name(what)} of {system.name}"
     limits.check(f"{name}, with each sine or exponential as {SLOW},", "OPERATIONS", cost, limits.WRITTEN_OUT)
     depth: dict[int, int] = {}
@@ -277,7 +280,8 @@ def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> C
     made = source(system, what, "jax", limit=limit)
     key = ("jax", made.sha256)
     if key not in _compiled:
-        _compiled[key] = _executed(made, {"np": np, "jnp": jnp, "erf": library.scipy.special.erf})
+        special = {name: getattr(library.scipy.special, name) for name in _SPECIAL}
+        _compiled[key] = _executed(made, {"np": np, "jnp": jnp, **special})
     return _compiled[key]
 
 

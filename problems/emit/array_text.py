@@ -6,17 +6,15 @@ import numpy as np
 
 from problems.emit.plan import Plan, Scatter
 from problems.emit.printer import Printer
-from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
+from problems.trace.functions import FUNCTIONS
+from problems.trace.graph import Affine, Loop, Node
 
 
 class _ArrayPrinter(Printer):
     """Loops become gather, evaluate, scatter on arrays with one row per term."""
 
-    def __init__(self, plan: Plan, library: str) -> None:
-        named = {name: f"{library}.{name}" for name in FUNCTIONS}
-        named |= {"sign": library + ".copysign(1.0, {})", "erf": "erf({})"}
-        named |= {"atan2": library + ".atan2({}, {})", "where": library + ".where({} > 0.0, {}, {})"}
-        super().__init__(plan, named)
+    def __init__(self, plan: Plan, library: str, functions: dict[str, str]) -> None:
+        super().__init__(plan, functions | {"where": library + ".where({} > 0.0, {}, {})"})
         self._library = library
 
     def find(self, place: str, knots: str, x: str, n: int) -> None:
@@ -109,7 +107,7 @@ class _NumpyPrinter(_ArrayPrinter):
 
 class _JaxPrinter(_ArrayPrinter):
     def __init__(self, plan: Plan) -> None:
-        super().__init__(plan, "jnp")
+        super().__init__(plan, "jnp", {name: f.jax for name, f in FUNCTIONS.items()})
         self.outputs: dict[int, str] = {}
 
     def array(self, name: str) -> str:
@@ -137,7 +135,7 @@ class _JaxPrinter(_ArrayPrinter):
 
 def numpy_text(plan: Plan, name: str) -> str:
     """Return ``def name(t, y, par, out)`` on numpy arrays; y is (dim,) or (dim, n)."""
-    printer = _NumpyPrinter(plan, "np")
+    printer = _NumpyPrinter(plan, "np", {name: f.numpy for name, f in FUNCTIONS.items()})
     printer.write()
     return printer.finished(f"{name}(t, y, par, out)")
 

@@ -5,13 +5,11 @@ from collections.abc import Callable
 from problems.emit.plan import Plan
 from problems.emit.printer import Printer
 from problems.errors import InputError
-from problems.trace.graph import FUNCTIONS, Affine, Node
+from problems.trace.functions import FUNCTIONS
+from problems.trace.graph import Affine, Node
 
-_FUNCTIONS = {name: f"hy.{name}" for name in FUNCTIONS} | {
-    "abs": "(hy.relu({0}) + hy.relu(-({0})))",
-    "sign": "(hy.relup({0}) - hy.relup(-({0})))",
-    "atan2": "hy.atan2({}, {})",
-    "where": "hy.select(hy.gt({}, 0.0), {}, {})",
+_FUNCTIONS = {name: f.heyoka for name, f in FUNCTIONS.items()} | {
+    "where": "hy.select(hy.gt({}, 0.0), {}, {})"
 }
 
 

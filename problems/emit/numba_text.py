@@ -7,10 +7,10 @@ import numpy as np
 from problems.emit.loops import Nest, Range, Table, nest, ranges
 from problems.emit.plan import Plan, Scatter
 from problems.emit.printer import Printer, variable
-from problems.trace.graph import FUNCTIONS, Affine, Loop, Node
+from problems.trace.functions import FUNCTIONS
+from problems.trace.graph import Affine, Loop, Node
 
-_FUNCTIONS = {name: name for name in FUNCTIONS} | {"abs": "fabs", "sign": "copysign(1.0, {})"}
-_FUNCTIONS |= {"atan2": "atan2({}, {})", "where": "({1} if {0} > 0.0 else {2})"}
+_FUNCTIONS = {name: f.numba for name, f in FUNCTIONS.items()} | {"where": "({1} if {0} > 0.0 else {2})"}
 
 
 class _NumbaPrinter(Printer):

@@ -10,7 +10,8 @@ import numpy as np
 from problems import limits
 from problems.errors import InputError, shown, unknown
 from problems.trace import sums
-from problems.trace.graph import FUNCTIONS, PAR, Condition, Graph, Node, P, Q, T, Table
+from problems.trace.functions import OF_ONE_ARGUMENT
+from problems.trace.graph import PAR, Condition, Graph, Node, P, Q, T, Table
 from problems.trace.source_line import line_of_function, line_of_traceback, refuse
 
 # Where each parameter lies in the flat vector `par`: offset, and length (None: a scalar).
@@ -151,7 +152,7 @@ class Mathematics:
 
     def atan2(self, y: Any, x: Any) -> Node:
         """Return the angle of the point (x, y), from -pi to pi."""
-        return self._graph.atan2(self._graph.node(y), self._graph.node(x))
+        return self._graph.call("atan2", self._graph.node(y), self._graph.node(x))
 
     def where(self, condition: Any, a: Any, b: Any) -> Node:
         """Return ``a`` where a comparison such as ``q[0] > 1`` holds, else ``b``; ``& | ~`` join them."""
@@ -185,8 +186,8 @@ class Mathematics:
     def __getattr__(self, name: str) -> Callable[[Any], Node]:
         if name.startswith("__"):
             raise AttributeError(name)
-        if name not in _PUBLIC:
-            known = [f"m.{function}" for function in (*_PUBLIC, *_OTHERS)]
+        if name not in OF_ONE_ARGUMENT:
+            known = [f"m.{function}" for function in (*OF_ONE_ARGUMENT, *_OTHERS)]
             refuse(str(unknown("function", f"m.{name}", known)).rstrip("."), "write it with these functions")
 
         def function(x: Any) -> Node:
@@ -196,7 +197,6 @@ class Mathematics:
         return function
 
 
-_PUBLIC = tuple(name for name in FUNCTIONS if name != "sign")
 _OTHERS = ("atan2", "where", "table", "sum", "pi")
 
 
@@ -280,7 +280,7 @@ def call(
         raise
     except NameError as error:
         name = error.name or "?"
-        if name in (*_PUBLIC, *_OTHERS, "math", "np", "numpy"):
+        if name in (*OF_ONE_ARGUMENT, *_OTHERS, "math", "np", "numpy"):
             remedy = "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.sum, m.pi"
         elif name in layout:
             remedy = f"declare the argument par and write par.{name}"

@@ -27,33 +27,21 @@ from numpy.typing import NDArray
 
 from problems import limits
 from problems.errors import InputError, shown
+from problems.trace.functions import FUNCTIONS
 from problems.trace.source_line import refuse, users_line
 
 T, Q, P, PAR = 1, 2, 4, 8  # what a node depends on: time, positions, momenta, parameters
 STATE = Q | P
-FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "exp": math.exp,
-    "log": math.log,
-    "abs": math.fabs,
-    "sign": lambda x: math.copysign(1.0, x),
-    "sinh": math.sinh,
-    "cosh": math.cosh,
-    "tanh": math.tanh,
-    "asin": math.asin,
-    "acos": math.acos,
-    "atan": math.atan,
-    "erf": math.erf,
-}
-"""What a node may be of one argument, and its value at a constant."""
 
 
 def is_power_of_two(value: float) -> bool:
     """Whether multiplying by ``value`` is exact (barring overflow and underflow)."""
     return value != 0.0 and math.isfinite(value) and abs(math.frexp(value)[0]) == 0.5
+
+
+def _ufunc(spelled: str) -> str:
+    """Return what NumPy itself calls a function that is emitted under this name."""
+    return getattr(getattr(np, spelled.removeprefix("np."), None), "__name__", "")
 
 
 def _described(value: Any) -> str:
@@ -191,8 +179,8 @@ class Node:
         Position in the graph; arguments always come before their users.
     op : str
         ``"const"``, ``"symbol"``, ``"index"``, ``"add"``, ``"sub"``, ``"mul"``, ``"div"``,
-        ``"neg"``, ``"pow"``, ``"sum"``, ``"atan2"``, ``"where"`` (the second argument where the
-        first is above 0, else the third), ``"table"`` or one of `FUNCTIONS`.
+        ``"neg"``, ``"pow"``, ``"sum"``, ``"where"`` (the second argument where the first is
+        above 0, else the third), ``"table"`` or one of `problems.trace.functions.FUNCTIONS`.
     args : tuple of Node
         The arguments, in the user's order.
     data : Any
@@ -324,7 +312,7 @@ class Node:
         if binary is not None and method == "__call__" and len(inputs) == 2:
             return binary(self.graph.node(inputs[0]), self.graph.node(inputs[1]))
         name = ufunc.__name__
-        better = {"absolute": "abs", "arcsin": "asin", "arccos": "acos", "arctan": "atan"}.get(name, name)
+        better = next((known for known, f in FUNCTIONS.items() if name in (known, _ufunc(f.numpy))), name)
         remedy = f"use m.{better}" if better in FUNCTIONS else "write it with + - * / and the functions of m"
         return refuse(f"this applies numpy's {name} to a symbol", f"declare the argument m and {remedy}")
 
@@ -560,20 +548,19 @@ class Graph:
         square = self.mul(half, half)
         return self.mul(square, base) if n % 2 else square
 
-    def call(self, name: str, a: Node) -> Node:
-        """Return the function ``name`` of ``a``."""
-        if a.op == "const":
+    def call(self, name: str, *args: Node) -> Node:
+        """Return the elementary function ``name`` of its arguments."""
+        if all(arg.op == "const" for arg in args):
+            numbers = [arg.data for arg in args]
             try:
-                return self.node(FUNCTIONS[name](a.data))
+                return self.node(FUNCTIONS[name].value(*numbers))
             except (ValueError, OverflowError):
-                refuse(f"{name}({a.data!r}) is not defined", "keep to the function's domain")
-        return self._intern(name, (a,))
-
-    def atan2(self, y: Node, x: Node) -> Node:
-        """Return the angle of the point (x, y)."""
-        if y.op == x.op == "const":
-            return self.node(math.atan2(y.data, x.data))
-        return self._intern("atan2", (y, x))
+                low, high = FUNCTIONS[name].domain
+                refuse(
+                    f"{name}({', '.join(map(repr, numbers))}) is not defined",
+                    f"keep to the function's domain, from {low:.6g} to {high:.6g}",
+                )
+        return self._intern(name, args)
 
     def where(self, condition: Node, a: Node, b: Node) -> Node:
         """Return ``a`` where ``condition`` is above 0, else ``b``."""
@@ -590,7 +577,7 @@ class Graph:
     def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
         """Return the operation of ``node`` on other arguments."""
         match node.op:
-            case "add" | "sub" | "mul" | "div" | "neg" | "atan2" | "where":
+            case "add" | "sub" | "mul" | "div" | "neg" | "where":
                 return getattr(self, node.op)(*args)
             case "pow":
                 return self.int_power(args[0], node.data)
@@ -601,11 +588,11 @@ class Graph:
             case "const" | "symbol" | "index":
                 return node
             case _:
-                return self.call(node.op, args[0])
+                return self.call(node.op, *args)
 
 
 _SPACES = ("t", "y", "par", "out")
-_ARITHMETIC = ("add", "sub", "mul", "div", "neg", "atan2", "where")
+_ARITHMETIC = ("add", "sub", "mul", "div", "neg", "where")
 
 
 def _affine(plain: Sequence[Any]) -> Affine:

@@ -1,0 +1,255 @@
+"""The elementary functions of a formula: all that is known of each, in one record.
+
+What a traced function calls as ``m.name``, what is differentiated, evaluated with more
+digits, emitted and printed reads this table. A further function is one more record.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from problems import double_double
+from problems.double_double import DD
+
+ONE = Fraction(1)
+SLOW = 10  # operations that take as long to compile as a sine
+_TWO_OVER_SQRT_PI = Fraction(2 / math.sqrt(math.pi))
+_INFINITY = math.inf
+
+
+@dataclass(frozen=True)
+class Slope:
+    """A derivative ``factor * times / over``; ``None`` is 1.
+
+    The factor is exact, and the division is left to the differentiation, which joins it with others.
+    """
+
+    times: Any = None
+    over: Any = None
+    factor: Fraction = ONE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elementary:
+    """An elementary function.
+
+    Attributes
+    ----------
+    name : str
+        What a formula calls it.
+    value : callable
+        The value at doubles; `ValueError` or `OverflowError` where it has none.
+    derivative : callable or None
+        From nodes of a graph: the `Slope`, or one for each of several arguments; ``None`` if it is 0.
+    double_double : callable
+        The value at numbers of twice the digits.
+    arity : int
+        Number of arguments.
+    domain : tuple of float
+        Least and largest argument at which the value is a finite double.
+    of_value : bool
+        Whether ``derivative`` is given the node of the function itself, and not its arguments:
+        exp' = exp.
+    numpy, numba, jax, heyoka : str
+        Name in the library, or text with ``{}`` for the arguments; by default the same name. Those of
+        numba are from `math`; those of NumPy and JAX without a dot from `scipy.special`.
+    latex : str
+        Text with ``%s`` for the arguments.
+    cost : int
+        Additions that take as long to compile.
+    smooth : bool
+        Whether the derivatives are continuous inside the domain.
+    public : bool
+        Whether formulas may call it; if not, it occurs in derivatives only.
+    """
+
+    name: str
+    value: Callable[..., float]
+    derivative: Callable[..., Slope | tuple[Slope, ...]] | None
+    double_double: Callable[..., DD]
+    arity: int = 1
+    domain: tuple[float, float] = (-_INFINITY, _INFINITY)
+    of_value: bool = False
+    numpy: str = ""
+    numba: str = ""
+    jax: str = ""
+    heyoka: str = ""
+    latex: str = ""
+    cost: int = SLOW
+    smooth: bool = True
+    public: bool = True
+
+    def __post_init__(self) -> None:
+        names = {"numpy": f"np.{self.name}", "numba": self.name, "jax": f"jnp.{self.name}"}
+        names |= {"heyoka": f"hy.{self.name}", "latex": rf"\{self.name}\left(%s\right)"}
+        for field, text in names.items():
+            if getattr(self, field) == "":
+                object.__setattr__(self, field, text)
+
+    def slopes(self, node: Any) -> tuple[Slope, ...]:
+        """Return the derivatives with respect to each argument of a node of this function."""
+        if self.derivative is None:
+            return (Slope(factor=Fraction(0)),) * self.arity
+        found = self.derivative(node) if self.of_value else self.derivative(*node.args)
+        return found if isinstance(found, tuple) else (found,)
+
+
+def _of(name: str, x: Any) -> Any:
+    return x.graph.call(name, x)
+
+
+def _by_one_minus_square(x: Any, factor: Fraction) -> Slope:
+    return Slope(over=_of("sqrt", (1.0 - x) * (1.0 + x)), factor=factor)
+
+
+def _of_angle(y: Any, x: Any) -> tuple[Slope, Slope]:
+    square = y * y + x * x
+    return Slope(x, square), Slope(y, square, -ONE)
+
+
+_RECORDS = (
+    Elementary(
+        name="sqrt",
+        value=math.sqrt,
+        domain=(0.0, _INFINITY),
+        derivative=lambda f: Slope(over=f, factor=Fraction(1, 2)),
+        of_value=True,
+        double_double=double_double.sqrt,
+        latex=r"\sqrt{%s}",
+        cost=1,
+    ),
+    Elementary(
+        name="sin",
+        value=math.sin,
+        derivative=lambda x: Slope(_of("cos", x)),
+        double_double=double_double.sin,
+    ),
+    Elementary(
+        name="cos",
+        value=math.cos,
+        derivative=lambda x: Slope(_of("sin", x), factor=-ONE),
+        double_double=double_double.cos,
+    ),
+    Elementary(
+        name="tan",
+        value=math.tan,
+        derivative=lambda f: Slope(f.graph.node(1.0) + f * f),
+        of_value=True,
+        double_double=double_double.tan,
+    ),
+    Elementary(
+        name="exp",
+        value=math.exp,
+        domain=(-_INFINITY, 709.782712893384),
+        derivative=lambda f: Slope(f),
+        of_value=True,
+        double_double=double_double.exp,
+        latex="e^{%s}",
+    ),
+    Elementary(
+        name="log",
+        value=math.log,
+        domain=(5e-324, _INFINITY),
+        derivative=lambda x: Slope(over=x),
+        double_double=double_double.log,
+        latex=r"\ln\left(%s\right)",
+    ),
+    Elementary(
+        name="abs",
+        value=math.fabs,
+        derivative=lambda x: Slope(_of("sign", x)),
+        double_double=double_double.absolute,
+        numba="fabs",
+        heyoka="(hy.relu({0}) + hy.relu(-({0})))",
+        latex=r"\left|%s\right|",
+        cost=1,
+        smooth=False,
+    ),
+    Elementary(
+        name="sign",
+        value=lambda x: math.copysign(1.0, x),
+        derivative=None,
+        double_double=double_double.sign,
+        numpy="np.copysign(1.0, {})",
+        numba="copysign(1.0, {})",
+        jax="jnp.copysign(1.0, {})",
+        heyoka="(hy.relup({0}) - hy.relup(-({0})))",
+        latex=r"\operatorname{sign}\left(%s\right)",
+        cost=1,
+        smooth=False,
+        public=False,
+    ),
+    Elementary(
+        name="sinh",
+        value=math.sinh,
+        domain=(-710.4758600739439, 710.4758600739439),
+        derivative=lambda x: Slope(_of("cosh", x)),
+        double_double=double_double.sinh,
+    ),
+    Elementary(
+        name="cosh",
+        value=math.cosh,
+        domain=(-710.4758600739439, 710.4758600739439),
+        derivative=lambda x: Slope(_of("sinh", x)),
+        double_double=double_double.cosh,
+    ),
+    Elementary(
+        name="tanh",
+        value=math.tanh,
+        derivative=lambda f: Slope(f.graph.node(1.0) - f * f),
+        of_value=True,
+        double_double=double_double.tanh,
+    ),
+    Elementary(
+        name="asin",
+        value=math.asin,
+        domain=(-1.0, 1.0),
+        derivative=lambda x: _by_one_minus_square(x, ONE),
+        double_double=double_double.asin,
+        latex=r"\arcsin\left(%s\right)",
+    ),
+    Elementary(
+        name="acos",
+        value=math.acos,
+        domain=(-1.0, 1.0),
+        derivative=lambda x: _by_one_minus_square(x, -ONE),
+        double_double=double_double.acos,
+        latex=r"\arccos\left(%s\right)",
+    ),
+    Elementary(
+        name="atan",
+        value=math.atan,
+        derivative=lambda x: Slope(over=1.0 + x * x),
+        double_double=double_double.atan,
+        latex=r"\arctan\left(%s\right)",
+    ),
+    Elementary(
+        name="erf",
+        value=math.erf,
+        derivative=lambda x: Slope(_of("exp", -(x * x)), factor=_TWO_OVER_SQRT_PI),
+        double_double=double_double.erf,
+        numpy="erf",
+        jax="erf",
+        latex=r"\operatorname{erf}\left(%s\right)",
+    ),
+    Elementary(
+        name="atan2",
+        arity=2,
+        value=math.atan2,
+        derivative=_of_angle,
+        double_double=double_double.atan2,
+        numpy="np.atan2({}, {})",
+        numba="atan2({}, {})",
+        jax="jnp.atan2({}, {})",
+        heyoka="hy.atan2({}, {})",
+        latex=r"\operatorname{atan2}\left(%s, %s\right)",
+    ),
+)
+
+FUNCTIONS: dict[str, Elementary] = {record.name: record for record in _RECORDS}
+"""All of them, by name."""
+
+OF_ONE_ARGUMENT = tuple(f.name for f in _RECORDS if f.public and f.arity == 1)
+"""Those that a formula may call with one argument."""
