@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from problems import Hamiltonian, Problem, VectorField
 from problems.analysis import wide
-from problems.analysis.double_double import DD
 from problems.analysis.invariants import evaluate
+from problems.double_double import DD
 
 
 def oscillator(amplitude: float) -> Problem:
