@@ -8,7 +8,7 @@ from problems.errors import InputError
 from problems.trace.functions import FUNCTIONS
 from problems.trace.graph import Affine, Node
 
-_FUNCTIONS = {name: f.heyoka for name, f in FUNCTIONS.items()} | {
+_FUNCTIONS = {name: f.heyoka for name, f in FUNCTIONS.items() if f.heyoka is not None} | {
     "where": "hy.select(hy.gt({}, 0.0), {}, {})"
 }
 
@@ -18,6 +18,10 @@ class _HeyokaPrinter(Printer):
         if node.op == "symbol":  # an expression by itself: no variable is needed to hold it
             space, place = node.data
             self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
+        elif node.op in FUNCTIONS and node.op not in _FUNCTIONS:
+            raise InputError(
+                f"heyoka cannot compute m.{node.op} to all digits; use another library's method."
+            )
         else:
             super().let(node, index)
 

@@ -52,9 +52,11 @@ class Elementary:
     of_value : bool
         Whether ``derivative`` is given the node of the function itself, and not its arguments:
         exp' = exp.
-    numpy, numba, jax, heyoka : str
+    numpy, numba, jax : str
         Name in the library, or text with ``{}`` for the arguments; by default the same name. Those of
         numba are from `math`; those of NumPy and JAX without a dot from `scipy.special`.
+    heyoka : str or None
+        The same; ``None`` for what heyoka cannot compute to all digits: it is refused.
     latex : str
         Text with ``%s`` for the arguments.
     cost : int
@@ -75,7 +77,7 @@ class Elementary:
     numpy: str = ""
     numba: str = ""
     jax: str = ""
-    heyoka: str = ""
+    heyoka: str | None = ""
     latex: str = ""
     cost: int = SLOW
     smooth: bool = True

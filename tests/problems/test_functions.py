@@ -114,8 +114,8 @@ class TestEveryEngine:
 
     def test_heyoka(self, name):
         hy = pytest.importorskip("heyoka")
-        if name == "table":
-            with pytest.raises(InputError, match=r"m\.table is pieces of polynomials"):
+        if name == "table" or (name in FUNCTIONS and FUNCTIONS[name].heyoka is None):
+            with pytest.raises(InputError, match=rf"m\.{name}"):
                 emit.heyoka(system_of(name))
             return
         pairs = emit.heyoka(system_of(name))
@@ -153,16 +153,20 @@ class TestEveryEngine:
         assert latex.latex(system)
 
 
-@pytest.fixture(scope="module")
-def table():
-    """All elementary functions as one field, x' = [f(x_0), g(x_1), ...], with states in their domains."""
-    ones = [f for f in FUNCTIONS.values() if f.public and f.arity == 1]
+def field_of(ones):
+    """Return functions as one field, x' = [f(x_0), g(x_1), ...], with states in their domains."""
     system = VectorField(
         lambda y, m: [getattr(m, f.name)(x) for f, x in zip(ones, y, strict=True)], dim=len(ones)
     )
     ends = np.clip([f.domain for f in ones], -3.0, 3.0) * 0.98
     low, high = ends.T
     return ones, system, np.random.default_rng(2).uniform(low[:, None] + 1e-3, high[:, None], (len(ones), 50))
+
+
+@pytest.fixture(scope="module")
+def table():
+    """All elementary functions of one argument, as one field."""
+    return field_of([f for f in FUNCTIONS.values() if f.public and f.arity == 1])
 
 
 class TestTheTable:
@@ -185,7 +189,7 @@ class TestTheTable:
 
     def test_heyoka_has_them(self, table):
         hy = pytest.importorskip("heyoka")
-        ones, system, y = table
+        ones, system, y = field_of([f for f in table[0] if f.heyoka is not None])
         variables, values = zip(*emit.heyoka(system), strict=True)
         found = hy.cfunc(list(values), vars=list(variables))(y)
         wanted = emit.numpy(system, "field")(0.0, y, np.empty(0))
@@ -213,17 +217,23 @@ class TestTheTable:
                         f.value(math.nextafter(end, outward))
 
 
+# Arguments, and a bound on the relative error in double-double: measured 1.5e-31 (erf; the others 3e-32).
 UNARY = {
-    "sinh": (-20.0, 20.0), "cosh": (-20.0, 20.0), "tanh": (-60.0, 60.0), "asin": (-1.0, 1.0),
-    "acos": (-1.0, 1.0), "atan": (-1e6, 1e6), "erf": (-12.0, 12.0),
-}  # fmt: skip
+    "sinh": (-20.0, 20.0, 1e-30),
+    "cosh": (-20.0, 20.0, 1e-30),
+    "tanh": (-60.0, 60.0, 1e-30),
+    "asin": (-1.0, 1.0, 1e-30),
+    "acos": (-1.0, 1.0, 1e-30),
+    "atan": (-1e6, 1e6, 1e-30),
+    "erf": (-12.0, 12.0, 1e-30),
+}
 
 
 class TestDoubleDouble:
     @pytest.mark.parametrize("name", UNARY)
     def test_against_mpmath(self, name):
         @settings(max_examples=80, deadline=None, derandomize=True)
-        @given(st.floats(*UNARY[name]), st.floats(-1e-17, 1e-17))
+        @given(st.floats(*UNARY[name][:2]), st.floats(-1e-17, 1e-17))
         def check(x, tail):
             if abs(x) == 1.0 or 0.0 < abs(x) < 1e-200:
                 return
@@ -232,8 +242,9 @@ class TestDoubleDouble:
                 exact = getattr(mpmath, name)(mpmath.mpf(x) + mpmath.mpf(low))
                 found = FUNCTIONS[name].double_double(DD(np.array([x]), np.array([low])))
                 error = mpmath.mpf(float(found.hi[0])) + mpmath.mpf(float(found.lo[0])) - exact
-                # Measured 1.5e-31 (erf; the others 3e-32).
-                assert abs(error) <= 1e-30 * max(abs(exact), mpmath.mpf(1e-3) if name == "acos" else 0)
+                assert abs(error) <= UNARY[name][2] * max(
+                    abs(exact), mpmath.mpf(1e-3) if name == "acos" else 0
+                )
 
         check()
 
