@@ -325,3 +325,16 @@ def erf(a: DD) -> DD:
         total = total + term
     root = sqrt(_constant(_PI))
     return where(far, sign(a) + 0.0 * a, x * exp(-square) * total * 2.0 / root)
+
+
+def erfc(a: DD) -> DD:
+    """Return 1 - erf; beyond 2 the continued fraction e^(-x^2)/sqrt(pi)/(x + (1/2)/(x + (2/2)/(x + ...)))."""
+    near = a.hi < 2.0
+    far = a.hi > 28.0  # where it is below the smallest double
+    x = where(near | far, DD(np.full_like(a.hi, 2.0)), a)
+    fraction = x
+    for k in range(200, 0, -1):  # after which 5e-33 is missing at 2, and less beyond
+        fraction = x + (k / 2) / fraction
+    tail = exp(-(x * x)) / (fraction * sqrt(_constant(_PI)))
+    zero = DD(np.zeros_like(a.hi))
+    return where(near, 1.0 - erf(where(near, a, zero)), where(far, zero, tail))

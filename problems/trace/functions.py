@@ -237,6 +237,16 @@ _RECORDS = (
         latex=r"\operatorname{erf}\left(%s\right)",
     ),
     Elementary(
+        name="erfc",
+        value=math.erfc,
+        derivative=lambda x: Slope(_of("exp", -(x * x)), factor=-_TWO_OVER_SQRT_PI),
+        double_double=double_double.erfc,
+        numpy="erfc",
+        jax="erfc",
+        heyoka=None,  # it has erf, and 1 - erf(x) is rounding where erfc(x) is small
+        latex=r"\operatorname{erfc}\left(%s\right)",
+    ),
+    Elementary(
         name="atan2",
         arity=2,
         value=math.atan2,

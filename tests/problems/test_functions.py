@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
-from scipy.special import erf
+from scipy.special import erf, erfc
 
 import problems
 from integrators import DOP853, HBVM, Gauss, Taylor, integrate
@@ -36,6 +36,7 @@ FORMULAS = {
     "atan": (lambda x, y, m: m.atan(5 * x - y), lambda x, y: np.arctan(5 * x - y)),
     "atan2": (lambda x, y, m: m.atan2(y + 2, x), lambda x, y: np.arctan2(y + 2, x)),
     "erf": (lambda x, y, m: m.erf(2 * x) + y * y, lambda x, y: erf(2 * x) + y * y),
+    "erfc": (lambda x, y, m: m.erfc(2 * x) * y, lambda x, y: erfc(2 * x) * y),
     "table": (lambda x, y, m: m.table(x + y, KNOTS, POINTS), lambda x, y: SPLINE(x + y)),
     "where": (
         lambda x, y, m: m.where((x > y) & ~(x > 0.5), x**3, m.exp(y)),
@@ -226,6 +227,7 @@ UNARY = {
     "acos": (-1.0, 1.0, 1e-30),
     "atan": (-1e6, 1e6, 1e-30),
     "erf": (-12.0, 12.0, 1e-30),
+    "erfc": (-12.0, 25.0, 3e-29),  # measured 1.2e-29, just below 2
 }
 
 
