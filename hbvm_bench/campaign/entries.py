@@ -138,7 +138,7 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     method: str = ""
     against: str = ""
     metric: str = "warm_seconds"
-    at: float | None = None
+    at: Annotated[float, Meta(ge=0, le=1e300)] | None = None
     ratio: Positive | None = None
     within: Accuracy = {}
     no_worse: Accuracy = {}

@@ -16,7 +16,7 @@ from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import reading
 from hbvm_bench.report import terminal
-from hbvm_bench.run import executors, loop, references, supervise, timing_pass
+from hbvm_bench.run import checked, executors, loop, references, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
@@ -71,7 +71,9 @@ def run(
     if report_to is not None:
         ensure_writable(report_to, keep=False)
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
-    store = carry_out(campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing)
+    store = carry_out(
+        campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing, whole=True
+    )
     show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import publish
@@ -136,8 +138,12 @@ def carry_out(
     executor: str = executors.LOCAL,
     jobs: int | None = None,
     timing: bool = True,
+    whole: bool = False,
 ) -> Store:
     """Run what is missing of a campaign in a directory, and return its store; ``command`` runs it again.
+
+    All that a campaign says is checked where it is ``whole``: what is left out of one, such as a method, may
+    still be named in a goal.
 
     Raises
     ------
@@ -149,6 +155,8 @@ def carry_out(
     store = Store(directory)
     store.learn()
     cases = loop.plan(campaign)
+    if whole:
+        checked.check(campaign, cases)
     with executors.opened(executor, jobs) as pool:  # what is refused is refused before anything is written
         store.prepare()
         if references.make_missing(campaign, store, _say):  # to which the grid and the ids belong

@@ -6,7 +6,7 @@ import pytest
 
 from hbvm_bench import cli
 from hbvm_bench.campaign import file as campaign
-from hbvm_bench.run import loop
+from hbvm_bench.run import checked, loop
 from problems.errors import InputError
 
 from .fault import Fault, is_met, sentence
@@ -15,6 +15,7 @@ PROBLEMS = 'problems = ["kepler()"]'
 METHODS = 'methods = [{use = "HBVM(k=4,s=2,h=0.1)"}]'
 WORDS = {
     "RIGHT": f'name = "x"\\n{PROBLEMS}\\n{METHODS}',  # what follows is wrong
+    "BOTH": f'name = "x"\\n{PROBLEMS}\\nmethods = [{{use = ["HBVM()", "Taylor(tol=1e-15)"]}}]',
     "METHODS": f'name = "x"\\n{PROBLEMS}',  # the methods follow
     "PROBLEMS": f'name = "x"\\n{METHODS}',
     "ENSEMBLE": 'problem = "kepler()"\\nmethods = [{use = "Gauss(s=2,h=0.1)"}]',
@@ -74,6 +75,8 @@ PROBLEMS\nproblems = [{use = "kepler(e={e})", sweep = {e = [inf]}}] => cannot re
 PROBLEMS\nproblems = [{use = "kepler()", end = []}]           => Expected `array` of length >= 1, at
 PROBLEMS\nproblems = [{use = "kepler()", end = 3}]            => Expected `array | null`, got `int`, at
 PROBLEMS\nproblems = [{use = "kepler()", end = [1], reference = true}] => end= of kepler() is its
+PROBLEMS\nproblems = [{use = "kepler()", end = [1, 2]}]      => end=[1.0, 2.0] of kepler(e=0.6) must be 4 fini
+PROBLEMS\nproblems = [{use = "kepler()", end = [1, 2, 3, nan]}] => end=[1.0, 2.0, 3.0, nan] of kepler(e=0.6) m
 PROBLEMS\nproblems = [{use = "kepler(e={e})", end = [1], sweep = {e = [0.1]}}] => end= of kepler(e={e}) is of
 PROBLEMS\nproblems = [{use = "kepler(e={})"}]                => kepler(e={}): '' in a placeholder is neither
 PROBLEMS\nproblems = [{use = "kepler(e={e)", sweep = {e = [0.1]}}] => cannot read 'kepler(e={e)': this is not
@@ -164,6 +167,37 @@ RIGHT\n[checks]\nreversal = -0.1                             => Expected `float`
 RIGHT\n[checks]\nreversal = "a"                              => Expected `float`, got `str`, at
 RIGHT\n[checks]\nreversal = nan                              => Expected `float` >= 0.0, at `checks.reversal`
 RIGHT\n[checks]\nstart = 3                                   => unknown key 'start'; did you mean 'starts'?
+RIGHT\n[limits]\nmemory_gib = 1e-6                            => memory_gib=1e-06 of limits is too little for
+RIGHT\n[limits]\nwall_seconds = 1e-6                          => wall_seconds=1e-06 of limits is too little fo
+RIGHT\n[limits]\ncompile_seconds = 0.01                       => compile_seconds=0.01 of limits is too little
+RIGHT\n[grid]\nalso = [1e99]                                  => also=1e+99 of the grid of kepler lies beyond
+RIGHT\n[grid]\nalso = [-1]                                    => Expected `float` > 0.0, at `grid.also[0]`
+RIGHT\n[grid]\nstep = 1e99                                    => step=1e+99 of the grid of kepler lies beyond
+RIGHT\n[grid]\nmultiple_of = 1e99                             => multiple_of=1e+99 of the grid of kepler lies
+PROBLEMS\nproblems = [{use = "kepler()", grid = {also = [1e9]}}] => also=1000000000.0 of the grid of kepler li
+RIGHT\n[timing]\nclock = "thread"                             => clock='thread' of timing belongs to interleav
+RIGHT\n[timing]\norder = "alternating"                        => order='alternating' of timing belongs to
+RIGHT\n[timing]\ninterleaved = true\nsamples = 5              => samples=5 of timing belongs to interleaved
+METHODS\nmethods = [{use = []}]                               => a method with use = [] has no settings; give
+METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [2]}] => there is no setting 2; there are 2, counted
+METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [-1]}] => there is no setting -1; there are 2, count
+name = "x"\nproblems = ["kepler()", "morse()"]\nmethods = [{use = "HBVM()", only = ["kepler"]}] => no method
+PROBLEMS\nproblems = [{use = "kepler()", within = {positon_end = 1}}] => unknown metric 'positon_end'; did you
+PROBLEMS\nproblems = [{use = "kepler()", within = {z_error = 1}}] => the metric 'z_error' is of sitnikov alone
+PROBLEMS\nproblems = [{use = "kepler()", within = {distance_max = 1}}] => the metric 'distance_max' cannot be
+BOTH\n[[goals]]\nat = 1\nwithin = {positon_end = 1}           => unknown metric 'positon_end'; did you mean
+BOTH\n[[goals]]\nat = 1\nmetric = "warm_second"               => unknown metric 'warm_second'; did you mean
+BOTH\n[[goals]]\nat = -1                                      => Expected `float` >= 0.0, at `goals[0].at`
+BOTH\n[[goals]]\nat = nan                                     => Expected `float` >= 0.0, at `goals[0].at`
+BOTH\n[[goals]]\nat = 1\nno_worse = {energy_max = 1}          => no_worse= of a goal belongs to against= and
+BOTH\n[[goals]]\nat = 1\nmethod = "HBMV"                      => unknown method of ours 'HBMV'; did you mean
+BOTH\n[[goals]]\nat = 1\nmethod = "Taylor"                    => unknown method of ours 'Taylor'; known: HBVM,
+BOTH\n[[goals]]\nratio = 2\nagainst = "Tailor"                => unknown peer that the goal's problems have 'T
+BOTH\n[[goals]]\nratio = 2\nagainst = "HBVM"                  => unknown peer that the goal's problems have 'H
+BOTH\n[[goals]]\nratio = 2\nagainst = "Taylor(tol=1e-9)"      => did you mean 'Taylor(tol=1e-15)'
+BOTH\n[[goals]]\nratio = 2\nagainst = "Taylor"\nno_worse = {enrgy_max = 1} => unknown metric 'enrgy_max'; did
+BOTH\n[timing]\nrounds = 0\n[[goals]]\nratio = 2\nagainst = "Taylor" => a goal asks for warm_seconds, and timi
+RIGHT\n[[goals]]\nratio = 2\nagainst = "Taylor"               => a goal's problems have no peer; give a method
 RIGHT\nensembles = 3                                         => Expected `array`, got `int`, at `ensembles`
 RIGHT\nensembles = [3]                                       => Expected `object`, got `int`, at
 RIGHT\n[[ensembles]]                                         => Object missing required field `problem`, at
@@ -181,6 +215,10 @@ RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = nan     => Expected `float`
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = inf     => Expected `float` <= 1e+300, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = "a"     => Expected `float`, got `str`, at
 RIGHT\n[[ensembles]]\nENSEMBLE\ncuont = 10                   => unknown key 'cuont'; did you mean 'count'?
+RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nspread = 2       => spread=2.0 of an ensemble is a share of the
+RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nname = "../x"    => problem name '../x' must be a file name of
+RIGHT\n[[ensembles]]\nENSEMBLE\ncount = 10\nvary = {m = 0.1} => unknown parameter of kepler 'm'
+RIGHT\n[[ensembles]]\nproblem = "kepler()"\ncount = 9\nmethods = [{use = "HBVM()", only = ["x"]}] => only=['x'
 RIGHT\n[[ensembles]]\nproblem = 3\nmethods = []\ncount = 10  => Expected `str`, got `int`, at
 RIGHT\n[[ensembles]]\nproblem = "kepler()"\nmethods = []\ncount = 10 => Expected `array` of length >= 1, at
 """
@@ -193,10 +231,15 @@ def written(text: str) -> str:
     return text.replace("\\n", "\n")
 
 
+def checks(asked) -> None:
+    """Check a campaign as the command does before it runs."""
+    checked.check(asked, loop.plan(asked))
+
+
 def fault(line: str) -> Fault:
     """Return a row of the table."""
     text, says = (part.strip() for part in line.split(" => "))
-    return Fault(text, lambda: loop.plan(campaign.parse(written(text))), re.escape(says))
+    return Fault(text, lambda: checks(campaign.parse(written(text))), re.escape(says))
 
 
 @pytest.mark.parametrize("row", [fault(line) for line in TABLE.strip("\n").splitlines()], ids=str)

@@ -1,0 +1,167 @@
+"""What of a campaign is looked at before anything runs: every name, and every number that says nothing.
+
+A method that nobody has, a limit under which no process can begin, a sample beyond the end: each would be
+found out hours later, or never. What types can say is said where the file is read.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+
+from hbvm_bench.campaign.file import (
+    Campaign,
+    Ensemble,
+    EnsembleEntry,
+    Goal,
+    Limits,
+    MethodEntry,
+    TimingPlan,
+    chosen,
+    name_of,
+)
+from hbvm_bench.campaign.grid import Grid
+from hbvm_bench.campaign.identity import Resolved, is_ours, make_problem
+from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.campaign.sweep import fill
+from hbvm_bench.measure.metrics import TIMING_KEYS, find
+from hbvm_bench.reference import solutions
+from problems.errors import InputError, unknown
+
+LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
+"""Under less no case can begin: an interpreter with NumPy alone takes 0.05 GiB."""
+
+
+def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
+    """Check what neither the types of a campaign nor the making of its cases do.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For the first name that nobody has, and the first number that says nothing.
+    """
+    _limits(campaign.limits)
+    _timing(campaign.timing)
+    for method in (*campaign.methods, *(one for many in campaign.ensembles for one in many.methods)):
+        _settings(method)
+    for many in campaign.ensembles:
+        _ensemble(many)
+    here = _by_name(campaign, cases)
+    for name, those in here.items():
+        if not those:
+            raise InputError(f"no method takes the problem {name!r}; name it in an only=, or leave it out.")
+    for entry in campaign.entries():
+        name = name_of(entry)
+        _metrics(entry.within, here[name])
+        if entry.end is not None:
+            solutions.of_end(here[name][0].problem, entry.end)
+        if not campaign.quick:  # which shortens the spans and keeps the grids
+            _grid(campaign.grid if entry.grid is None else entry.grid, name, here[name])
+    for goal in campaign.goals:
+        _goal(goal, campaign, [one for name in goal.only or here for one in here[name]])
+
+
+def _limits(limits: Limits) -> None:
+    for name, least in LEAST.items():
+        if (given := getattr(limits, name)) < least:
+            raise InputError(f"{name}={given!r} of limits is too little for any case; give at least {least}.")
+
+
+def _timing(plan: TimingPlan) -> None:
+    for name in ("samples",) if plan.interleaved else ("order", "clock"):
+        if (given := getattr(plan, name)) != getattr(TimingPlan(), name):
+            other = str(not plan.interleaved).lower()
+            raise InputError(
+                f"{name}={given!r} of timing belongs to interleaved = {other}; leave it out, or set that."
+            )
+
+
+def _settings(method: MethodEntry) -> None:
+    if not method.texts:
+        raise InputError("a method with use = [] has no settings; give at least one.")
+    count = len(method.texts) * math.prod(map(len, method.sweep.values()))
+    for place in method.quick:
+        if not 0 <= place < count:
+            raise InputError(
+                f"quick={method.quick} of {method.texts[0]}: there is no setting {place}; there are {count}, "
+                "counted from 0."
+            )
+
+
+def _ensemble(many: EnsembleEntry) -> None:
+    if many.spread > 1.0:
+        raise InputError(f"spread={many.spread!r} of an ensemble is a share of the start; give at most 1.")
+    for method in many.methods:
+        if method.only:
+            raise InputError(
+                f"only={method.only} of {method.texts[0]} stands in the ensemble of {many.problem}, whose "
+                "methods are its own; leave it out."
+            )
+    problem = make_problem(many.problem)
+    known = problem.system.unpack(problem.par)
+    for name in many.vary:
+        if name not in known:
+            raise unknown(f"parameter of {problem.system.name}", name, known)
+
+
+def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:
+    """Return the cases by what a campaign calls their problems and ensembles."""
+    found: dict[str, list[Resolved]] = {}
+    texts: dict[tuple[str, Ensemble | None], str] = {
+        (repr(make_problem(fill(entry.use, values))), None): name_of(entry)
+        for entry in campaign.entries()
+        for values in chosen(entry)
+    }
+    texts |= {
+        (repr(make_problem(many.problem)), many.ensemble): name_of(many.entry) for many in campaign.ensembles
+    }
+    for name in texts.values():
+        found.setdefault(name, [])
+    for one in cases:
+        found[texts[one.case.problem, one.case.ensemble]].append(one)
+    return found
+
+
+def _grid(grid: Grid, name: str, cases: Iterable[Resolved]) -> None:
+    longest = max(abs(one.problem.t_end - one.problem.t0) for one in cases)
+    lengths = {"step": [grid.step], "multiple_of": [grid.multiple_of], "also": grid.also}
+    for key, given in lengths.items():
+        for length in given:
+            if length is not None and length > longest:
+                raise InputError(
+                    f"{key}={length!r} of the grid of {name} lies beyond its span of {longest!r}; "
+                    "make it smaller, or leave it out."
+                )
+
+
+def _metrics(keys: Iterable[str], cases: Sequence[Resolved]) -> None:
+    for metric in map(find, keys):
+        if metric.better is None:
+            raise InputError(
+                f"the metric {metric.key!r} cannot be asked for: no side of it is the better one."
+            )
+        if metric.problem and all(one.problem.name != metric.problem for one in cases):
+            raise InputError(f"the metric {metric.key!r} is of {metric.problem} alone; ask for another one.")
+
+
+def _goal(goal: Goal, campaign: Campaign, cases: Sequence[Resolved]) -> None:
+    _metrics((goal.metric, *goal.within, *goal.no_worse), cases)
+    if goal.metric in TIMING_KEYS and not campaign.timing.rounds:
+        raise InputError(f"a goal asks for {goal.metric}, and timing has rounds = 0; take some.")
+    if goal.at is not None and goal.no_worse:
+        raise InputError("no_worse= of a goal belongs to against= and ratio=; with at= give within=.")
+    _method("method of ours", goal.method, campaign.quick, [one for one in cases if is_ours(one.method)])
+    if goal.ratio is not None:
+        theirs = [one for one in cases if not is_ours(one.method)]
+        _method("peer that the goal's problems have", goal.against, campaign.quick, theirs)
+
+
+def _method(kind: str, name: str, quick: bool, cases: Sequence[Resolved]) -> None:
+    """Refuse a name of which the goal's problems have no case; a quick run may lack the setting."""
+    families = {parse_spec(one.case.method).name for one in cases}
+    known = families | {one.case.method for one in cases}
+    if not known:
+        raise InputError(
+            f"a goal's problems have no {kind.partition(' that')[0]}; give a method, or leave it out."
+        )
+    asked = parse_spec(name).name if quick and name else name
+    if asked and asked not in known:
+        raise unknown(kind, name, sorted(known))
