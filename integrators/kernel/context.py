@@ -44,6 +44,10 @@ VALUES, END, ARRIVE = range(3)
 
 KINKS_KEPT = 64
 
+# What is known of the field where a step ends: NOTHING; the values that its polynomial says, EXTRAPOLATED,
+# which are compared with those of the next; that they are right, SEEN. At a START it may jump.
+START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
+
 STAGE = ("calls", "padded", "lanes")  # shape of stage memory
 
 
@@ -261,6 +265,20 @@ class Context(Memory):
     kinks = Integer()  # places where steps were rejected for that
     kink_end = Real()  # where the first such step at the last place would have ended
     doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
+    # The field where steps meet, which no node sees; see `step.kinks`. Blocks of four rows: at the start of
+    # the step ahead, then at its end, as its polynomial says; the same of the step behind.
+    borders = Array(2, "padded")
+    borders_behind = Array(2, "padded")
+    lasts = Array("rows")  # the larger of the last two coefficients of a row,
+    lasts_behind = Array("rows")  # and in the step behind
+    border = Integer()  # what is known of the step behind: START, NOTHING, EXTRAPOLATED, SEEN
+    border_ahead = Integer()  # the same of the step ahead
+    breaks = Integer()  # 1: `stop` is a time at which the field may jump
+    undone = Integer()  # 1: the field jumps before the end of the step behind
+    behind_state = Array(2, "padded")  # the state before the step behind, to go back to
+    behind_error = Array(2, "padded")
+    behind_time = Real()
+    behind_low = Real()
     kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
 
     def __init__(self, shape: Shape, tables: Mapping[str, Numbers], more: Mapping[str, int] | None = None):

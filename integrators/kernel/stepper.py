@@ -109,10 +109,11 @@ class HBVMStepper(ABC):
         "time_low", "next_length", "length_after", "length_behind",
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
         "length_limit", "kinks", "kink_end", "doubt_end",
+        "border", "border_ahead", "behind_time", "behind_low",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",
-        "kink_places",
+        "kink_places", "borders", "borders_behind", "lasts", "lasts_behind", "behind_state", "behind_error",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from integrators.kernel.context import BUDGET, DENSE, DONE, KINKS_KEPT, LAND, SIDE, UNDERFLOW
+from integrators.kernel.context import BUDGET, DENSE, DONE, KINKS_KEPT, LAND, NOTHING, SIDE, START, UNDERFLOW
 from integrators.kernel.native import engine
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST
@@ -42,6 +42,8 @@ class AdaptiveStepper(HBVMStepper):
     def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
         self._breakpoints = program.breakpoints(par)
         super().__init__(program, y, par, t0)
+        if any(map(self._is_at, self._breakpoints.tolist())):
+            self._context.border = START
 
     @property
     def stats(self) -> Stats:
@@ -78,7 +80,7 @@ class AdaptiveStepper(HBVMStepper):
         found = points[points > self.t] if ahead else points[points < self.t][::-1]
         beyond = (point for point in found.tolist() if not self._is_at(point))
         stop = next(beyond, math.inf if ahead else -math.inf)
-        ctx.stop = stop
+        ctx.stop, ctx.breaks = stop, int(math.isfinite(stop))
         return stop
 
     def _is_at(self, t: float) -> bool:
@@ -96,6 +98,7 @@ class AdaptiveStepper(HBVMStepper):
         length = ctx.next_length
         ctx.next_length = math.copysign(max(abs(length), RESTART * abs(t)), length)
         ctx.solved = ctx.age = 0
+        ctx.border = START
 
     def _take_implicit(self) -> None:
         """Put the implicit solver to work; what the fixed-point iteration allowed does not bind it."""
@@ -109,6 +112,7 @@ class AdaptiveStepper(HBVMStepper):
         if not np.sign(end - self.t) * ctx.next_length < 0.0:
             return
         ctx.next_length *= -1.0
+        ctx.border = NOTHING
         self._forget()
 
     def _to(self, times: Array, between: int) -> Samples:

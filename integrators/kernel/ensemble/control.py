@@ -14,6 +14,7 @@ from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import NOTHING, SMALLEST
 
 COEFFICIENTS = 8  # that a step is judged by; see `Context.estimators`
+BORDERS = range(10, 12)  # rows there that extrapolate to the start and to the end of the step
 
 
 class Control:
@@ -55,6 +56,7 @@ class Control:
         error, defect = (w.variable(w.kind, w.zero.value) for _ in range(2))
         none = w.zero.compare("!=", 0.0)
         doubtful, visible = (w.variable(w.bits, none) for _ in range(2))
+        unseen_for = (self.h + self.row("length_behind").absolute()) * self.number("outermost")
 
         def raise_to(variable: Any, value: Value) -> None:
             b.store(Value(b, b.load(variable)).larger(value).value, variable)
@@ -69,7 +71,7 @@ class Control:
 
             def measure(block: Any, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = w.at(block, width, first)
-                extent = slope = missing = unseen = w.zero
+                extent = slope = missing = unseen = gap = w.zero
                 for i in range(width):
                     d = w.at(start, 1, i)
                     f = self.coefficients(d)
@@ -80,6 +82,8 @@ class Control:
                     extent, slope = extent.larger(changing + self.h * own), slope.larger(own)
                     missing = missing.larger(f[5].larger(self.number("error_decay") * f[4]))
                     unseen = unseen.larger(f[7].larger(self.number("defect_decay") * f[6]))
+                    gap = gap.larger(self.gap(d, f[6].larger(f[7])))
+                w.put(gap, w.array(Group.slots["gaps"]), start)
                 rows = w.size, w.moved, w.strict, w.floored
                 for value, room in zip((extent, slope, missing, unseen), rows, strict=True):
                     w.put(value, room, start)
@@ -100,22 +104,39 @@ class Control:
                 for value, worst in ((missing, error), (unseen, defect)):
                     raise_to(worst, ((value * inverse) * (value * part)).where(moves, 0.0))
                 note(visible, (self.h * missing).compare(">", size * UNSEEN))
+                jump = w.get(w.array(Group.slots["gaps"]), start) * unseen_for
+                note(doubtful, jump.compare(">", size * self.number("negligible")))
 
             w.each(blocks, compare)
         self.error, self.defect = (Value(b, b.load(worst)) for worst in (error, defect))
         self.certain, self.visible = b.not_(b.load(doubtful)), b.load(visible)
 
-    def coefficients(self, d: Any) -> list[Value]:
-        """Return the sizes of the Legendre coefficients of row d of the field by which steps are judged."""
+    def coefficients(self, d: Any, which: range = range(COEFFICIENTS)) -> list[Value]:
+        """Return the sizes of the Legendre coefficients of row d of the field by which steps are judged.
+
+        Or its values at `BORDERS`.
+        """
         w, k = self.w, self.w.form.k
         table, found = w.table(Group.slots["estimators"]), []
-        for j in range(COEFFICIENTS):
+        for j in which:
             total = w.zero
             for i in range(k):
                 value = w.get(w.values, w.at(i, w.form.rows, d))
                 total = w.number(table, -(-k // 8) * 8 * j + i).fma(value, total)
-            found.append(total.absolute())
+            found.append(total.absolute() if j < COEFFICIENTS else total)
         return found
+
+    def gap(self, d: Any, last: Value) -> Value:
+        """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
+        from integrators.kernel.step.kinks import OUTSIDE
+
+        w, slots = self.w, Group.slots
+        start, end = self.coefficients(d, BORDERS)
+        w.put(end, w.array(slots["ends_ahead"]), d)
+        w.put(last, w.array(slots["lasts_ahead"]), d)
+        apart = (start - w.get(w.array(slots["ends"]), d)).absolute()
+        most = (last + w.get(w.array(slots["lasts"]), d)) * OUTSIDE
+        return apart.where(apart.compare(">", most), 0.0)
 
     def aim(self) -> None:
         """Set the `factor` of the next step's length to this one's; see `longer` and `accepts`."""
@@ -201,13 +222,17 @@ class Control:
         }  # fmt: skip
         for name, value in news.items():
             w.put(value.where(good, self.row(name)), w.array(slots[name]))
-        for ahead, now in (("next_state", w.state), ("next_error", w.error)):
+        rows = w.form.rows
+        dim = rows * (2 if w.form.second else 1)
+        ends, lasts = w.array(slots["ends"]), w.array(slots["lasts"])
+        moves = ("next_state", w.state, dim), ("next_error", w.error, dim)
+        for ahead, now, count in (*moves, ("ends_ahead", ends, rows), ("lasts_ahead", lasts, rows)):
             source = w.array(slots[ahead])
 
             def move(d: Any, source: Any = source, now: Any = now) -> None:
                 w.put(w.get(source, d).where(good, w.get(now, d)), now, d)
 
-            w.each(w.form.rows * (2 if w.form.second else 1), move)
+            w.each(count, move)
 
 
 def least(x: Value, y: Value) -> Value:

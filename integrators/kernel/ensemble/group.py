@@ -73,6 +73,13 @@ class Group(Memory):
     defect_decay = Real()
     least_slope = Real()
     doubt = Real()
+    negligible = Real()  # part of a block's size that the error at a jump may be; infinite: nobody looks
+    outermost = Real()  # the first node
+    ends = Array("rows", "lanes")  # the field at the end of the step behind; see `Context.borders`
+    lasts = Array("rows", "lanes")  # its last coefficients there
+    ends_ahead = Array("rows", "lanes")
+    lasts_ahead = Array("rows", "lanes")
+    gaps = Array("rows", "lanes")  # between blocks of the field as two steps have it where they meet
     busy = Real()  # sweeps to aim at, at most
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
     length_behind = Array("lanes")

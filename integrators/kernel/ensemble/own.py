@@ -9,13 +9,14 @@ not pass the time of the next sample, but ends there.
 
 from math import log
 
-from integrators.kernel.context import DIVERGED, DONE, FIXED_POINT, Context
+from integrators.kernel.context import DIVERGED, DONE, EXTRAPOLATED, FIXED_POINT, Context
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_steps
 from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.kinks import arrived, at_end
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import SMALLEST
 from integrators.kernel.step.vary import (
@@ -108,7 +109,7 @@ def write(group, lane, ctx):
         made += 1
     group.made[lane] = made
     if made == group.count:
-        unload(group, lane, 1)
+        unload(group, lane, 1 if arrived(ctx) else 0)
 
 
 @compiled
@@ -161,6 +162,10 @@ def catch_up(group, lane, ctx):
     ctx.slow = 0
     for d in range(group.dim):
         ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
+    for d in range(group.rows):
+        ctx.borders_behind[at_end(d)] = group.ends[group.lanes * d + lane]
+        ctx.lasts_behind[d] = group.lasts[group.lanes * d + lane]
+    ctx.border = EXTRAPOLATED
 
 
 @compiled
@@ -201,6 +206,9 @@ def step(group, lane, ctx):
     for d in range(group.dim):
         group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
+    for d in range(group.rows):
+        group.ends[group.lanes * d + lane] = ctx.borders_behind[at_end(d)]
+        group.lasts[group.lanes * d + lane] = ctx.lasts_behind[d]
     write(group, lane, ctx)
     if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)):
         unload(group, lane, 0)
@@ -235,6 +243,8 @@ def share(group, ctx):
     group.error_aim, group.defect_aim = ctx.error_aim, ctx.defect_aim
     group.error_decay, group.defect_decay = ctx.error_decay, ctx.defect_decay
     group.least_slope, group.doubt, group.busy = ctx.least_slope, ctx.doubt, BUSY
+    group.negligible = ctx.negligible if ctx.doubt < INFINITY else INFINITY
+    group.outermost = ctx.nodes[0]
     group.worth = INFINITY
     if ctx.strategy != FIXED_POINT:
         group.worth = log_worth(ctx)

@@ -15,6 +15,8 @@ UNSEEN = 1e-13  # part of a block that rounding accounts for in a step that the 
 SQUARABLE = 1e150  # the square of a larger number, or of one below its inverse, has no double
 SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
+# Times as much is negligible in such a step: next to a zero of a component none might be short enough.
+BESIDE_NOTHING = 1e3
 
 
 @compiled
@@ -118,7 +120,8 @@ def estimate(ctx):
                 high = 0.0
             most, most_unseen = INFINITY, INFINITY
             if doubtful and high > 0.0:
-                if ctx.kinks > 0 and h * max(high, max(missing, unseen)) <= negligible * size:
+                slight = BESIDE_NOTHING * negligible if narrow else negligible
+                if ctx.kinks > 0 and h * max(high, max(missing, unseen)) <= slight * size:
                     most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * size and not narrow:
                     ctx.kinked = 1

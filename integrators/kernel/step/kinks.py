@@ -1,9 +1,11 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
-from integrators.kernel.context import KINKS_KEPT
+from integrators.kernel.context import EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START, UNSOLVED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, total
-from integrators.kernel.step.estimate import NARROWEST, block_size, coefficient
+from integrators.kernel.simd.memory import call_field, put, sums
+from integrators.kernel.step.begin import INFINITY
+from integrators.kernel.step.control import CLOSE, RETREAT, SHRINK
+from integrators.kernel.step.estimate import NARROWEST, block_size, coefficient, estimate
 
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
 
@@ -12,15 +14,31 @@ OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther fro
 def kink(ctx, ends):
     """Whether the step that was estimated has a kink that matters; count its place if so.
 
-    Nodes do not see what is between the first or the last of them and the end of the
-    step. So if ``ends``, the field there is looked at too where there has been a kink, or
-    a step may just have been rejected for one.
+    Nodes do not see what is between the first or the last of them and the end of the step. What
+    polynomials of two steps say of the field where they meet is compared, if ``ends``. If
+    they do not agree, or there has been a kink, or a step may just have been rejected for one, the field
+    is evaluated at both ends. `Context.undone` says whether the jump is in the step behind.
     """
     t, h = ctx.t0, ctx.h
+    ctx.border_ahead = NOTHING
     if ctx.kinked == 0:
-        suspect = ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
-        if ctx.line or not (ends and suspect and differs_at_an_end(ctx)):
+        if ctx.line or not (ends and ctx.doubt < INFINITY):
             return False
+        extrapolate(ctx)
+        suspect = ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
+        if not (suspect or jumps(ctx)):
+            if ctx.border == EXTRAPOLATED:
+                ctx.border = SEEN
+            return False
+        if not differs_at_an_end(ctx):
+            return ctx.undone == 1
+    count(ctx, t, h)
+    return True
+
+
+@compiled
+def count(ctx, t, h):
+    """Count the place of a kink in the step from t of length h."""
     found, end = ctx.kinks, ctx.kink_end
     if found == 0 or (t - end) * h >= 0.0:
         found += 1
@@ -30,13 +48,54 @@ def kink(ctx, ends):
         place = ctx.kink_places + 2 * (found - 1)
         place[0] = t
         place[1] = h
-    return True
+
+
+@compiled
+def extrapolate(ctx):
+    """Set the field at both ends of the solved step as its polynomial says."""
+    rows, found = ctx.rows, ctx.estimates
+    for d in range(0, rows, 4):
+        starts = coefficient(ctx, d, 10), coefficient(ctx, d + 1, 10), coefficient(ctx, d + 2, 10)
+        ends = coefficient(ctx, d, 11), coefficient(ctx, d + 1, 11), coefficient(ctx, d + 2, 11)
+        both = sums(*starts, coefficient(ctx, d + 3, 10), *ends, coefficient(ctx, d + 3, 11))
+        put(ctx.borders, 2 * d, both)
+    for d in range(rows):
+        ctx.lasts[d] = max(found[8 * d + 6], found[8 * d + 7])
+    ctx.border_ahead = EXTRAPOLATED
+
+
+@compiled
+def jumps(ctx):
+    """Whether the step behind and the solved step do not agree about the field where they meet."""
+    if ctx.border <= NOTHING:
+        return False
+    lasts, before = ctx.lasts, ctx.lasts_behind
+    # Unseen for no longer than the parts of both steps beyond their last and first node.
+    least = ctx.negligible / (ctx.nodes[0] * (abs(ctx.h) + abs(ctx.length_behind)))
+    for d in range(ctx.rows):
+        far = abs(ctx.borders[at_start(d)] - ctx.borders_behind[at_end(d)])
+        if far > OUTSIDE * (lasts[d] + before[d]) and far > least * block_size(ctx, ctx.block[d]):
+            return True
+    return False
+
+
+@compiled
+def at_start(d):
+    """Return where `Context.borders` has the start's value of row d."""
+    return 8 * (d // 4) + d % 4
+
+
+@compiled
+def at_end(d):
+    """Return where `Context.borders` has the end's value of row d."""
+    return at_start(d) + 4
 
 
 @compiled
 def differs_at_an_end(ctx):
     """Whether the field at an end of the solved step is far from what its nodes say there."""
     h, t = abs(ctx.h), ctx.t0
+    ctx.undone = 0
     if h <= NARROWEST * abs(t):
         return False
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
@@ -52,15 +111,114 @@ def differs_at_an_end(ctx):
             stages[lanes * d + lane] = ctx.next_state[after]
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.evaluations += 2
-    found = ctx.estimates
+    begins = ctx.border == START
+    breaks = ctx.breaks == 1 and abs((ctx.stop - t) - ctx.h) <= CLOSE * max(abs(ctx.stop), h)
     # Unseen for no longer than the part of the step before the first node.
     least = ctx.negligible / (h * ctx.nodes[0])
+    undone = 0
     for d in range(rows):
-        before = abs(values[lanes * d] - total(coefficient(ctx, d, 10)))
-        after = abs(values[lanes * d + 1] - total(coefficient(ctx, d, 11)))
+        before = 0.0 if begins else abs(values[lanes * d] - ctx.borders[at_start(d)])
+        after = 0.0 if breaks else abs(values[lanes * d + 1] - ctx.borders[at_end(d)])
         far = max(before, after)
-        last = max(found[8 * d + 6], found[8 * d + 7])
-        size = block_size(ctx, ctx.block[d])
-        if far > OUTSIDE * last and far > least * size:
+        if far > OUTSIDE * ctx.lasts[d] and far > least * block_size(ctx, ctx.block[d]):
             return True
+        if ctx.border == EXTRAPOLATED and misses(ctx, d, values[lanes * d]):
+            undone = 1
+    ctx.undone = undone
+    ctx.border_ahead = SEEN
     return False
+
+
+@compiled
+def misses(ctx, d, value):
+    """Whether the polynomial of the step behind is far from the field's value at its end, in row d."""
+    far = abs(value - ctx.borders_behind[at_end(d)])
+    least = ctx.negligible / (abs(ctx.length_behind) * ctx.nodes[0])
+    return far > OUTSIDE * ctx.lasts_behind[d] and far > least * block_size(ctx, ctx.block[d])
+
+
+@compiled
+def keep_end_of_part(ctx, side):
+    """Let the step ahead be compared with the partial step in ``side``, at whose end it begins."""
+    ctx.border = NOTHING
+    if ctx.line or ctx.implicit or not ctx.doubt < INFINITY:
+        return
+    estimate(side)
+    extrapolate(side)
+    for i in range(2 * ctx.padded):
+        ctx.borders_behind[i] = side.borders[i]
+    for d in range(ctx.rows):
+        ctx.lasts_behind[d] = side.lasts[d]
+    ctx.border = SEEN
+
+
+@compiled
+def keep_end(ctx):
+    """Keep what is known of the end of the step ahead, and where to go back to, before it is taken."""
+    ctx.borders, ctx.borders_behind = ctx.borders_behind, ctx.borders
+    ctx.lasts, ctx.lasts_behind = ctx.lasts_behind, ctx.lasts
+    ctx.border, ctx.border_ahead = ctx.border_ahead, NOTHING
+    ctx.behind_time, ctx.behind_low = ctx.t0, ctx.time_low
+
+
+@compiled
+def undo(ctx):
+    """Go back to before the step behind, for a shorter one; count the place of a kink in that."""
+    h = ctx.length_behind
+    ctx.state, ctx.behind_state = ctx.behind_state, ctx.state
+    ctx.error, ctx.behind_error = ctx.behind_error, ctx.error
+    ctx.t0, ctx.time_low, ctx.n = ctx.behind_time, ctx.behind_low, 0
+    ctx.next_length = RETREAT * h
+    ctx.length_behind = 0.0
+    ctx.border = NOTHING
+    ctx.undone = 0
+    ctx.steps -= 1
+    forget(ctx)
+    count(ctx, ctx.t0, h)
+
+
+@compiled
+def forget(ctx):
+    """Forget the step ahead."""
+    ctx.solved = UNSOLVED
+    ctx.length = 0.0
+    ctx.age = 0
+    ctx.rejections += 1
+
+
+@compiled
+def holds(ctx):
+    """Whether the field does not jump in the solved step beyond its nodes; else forget the step."""
+    if ctx.border_ahead != EXTRAPOLATED:
+        return True
+    if not differs_at_an_end(ctx):
+        return True
+    count(ctx, ctx.t0, ctx.h)
+    ctx.next_length = SHRINK * ctx.h
+    forget(ctx)
+    return False
+
+
+@compiled
+def arrived(ctx):
+    """Whether the field does not jump before the end of the step behind; else undo that."""
+    if ctx.border != EXTRAPOLATED:
+        return True
+    if ctx.breaks == 1 and abs(ctx.stop - ctx.t0) <= CLOSE * abs(ctx.stop):
+        return True
+    rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
+    stages, times, values = ctx.stages, ctx.times, ctx.sums
+    for lane in range(lanes):
+        times[lane] = ctx.t0
+    for d in range(rows):
+        place = 8 * (d // 4) + 4 + d % 4 if second else d
+        for lane in range(lanes):
+            stages[lanes * d + lane] = ctx.state[place]
+    call_field(ctx.field, times, stages, ctx.par, values)
+    ctx.evaluations += 1
+    ctx.border = SEEN
+    for d in range(rows):
+        if misses(ctx, d, values[lanes * d]):
+            undo(ctx)
+            return False
+    return True

@@ -1,6 +1,6 @@
 """Whole trajectories: own steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, NOTHING, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
@@ -8,6 +8,7 @@ from integrators.kernel.step.advance import looked, step
 from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length
 from integrators.kernel.step.finish import arrive
+from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
@@ -31,13 +32,18 @@ def repeat(ctx, target, budget):
 def approach(ctx, t, budget):
     """Take steps of varying length to the last one before t; return the outcome, and what is left to do."""
     while True:
-        rest = remaining(ctx, t)
-        if rest == 0.0:
-            return DONE, budget
+        if remaining(ctx, t) == 0.0:
+            if arrived(ctx):
+                return DONE, budget
+            continue
         outcome = ready(ctx)
         if outcome != DONE:
             return outcome, budget
-        if abs(rest) < abs(ctx.h) - CLOSE * abs(t):
+        rest, h = abs(remaining(ctx, t)), abs(ctx.h)
+        inside = rest < h - CLOSE * abs(t)
+        if (ctx.look or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
+            continue
+        if inside:
             return DONE, budget
         if budget == 0:
             return BUDGET, budget
@@ -102,13 +108,21 @@ def walk(ctx, times, out, budget):
     made = 0
     while True:
         ctx.made = made
-        rest = remaining(ctx, end)
-        if rest == 0.0:
-            return DONE
-        outcome = ready(ctx)
+        taken = ctx.steps
+        outcome = DONE
+        over = remaining(ctx, end) == 0.0 or made == budget > 0
+        if over and arrived(ctx):
+            return DONE if remaining(ctx, end) == 0.0 else BUDGET
+        if not over:
+            outcome = ready(ctx)
+        if ctx.steps < taken:
+            made -= 1
+            ctx.made = made
         if outcome != DONE:
             return outcome
-        if abs(rest) < abs(ctx.h) - CLOSE * abs(end):
+        if over or (ctx.look and not holds(ctx)):
+            continue
+        if abs(remaining(ctx, end)) < abs(ctx.h) - CLOSE * abs(end):
             return DONE
         if budget == 0:
             return BUDGET
@@ -119,9 +133,6 @@ def walk(ctx, times, out, budget):
         times[made] = ctx.t0
         write(ctx, ctx.state, out + dim * made)
         made += 1
-        if made == budget:
-            ctx.made = made
-            return BUDGET
 
 
 @compiled
@@ -135,6 +146,7 @@ def reset(ctx, start):
     ctx.length = ctx.older_length = 0.0
     ctx.n = ctx.age = ctx.free = ctx.made = 0
     ctx.solved = UNSOLVED
+    ctx.border = ctx.border_ahead = NOTHING
     ctx.outcome = DONE
     arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:

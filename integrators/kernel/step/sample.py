@@ -7,6 +7,7 @@ from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
 from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.handover import settle_part
+from integrators.kernel.step.kinks import keep_end_of_part
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.sweep import project
 
@@ -147,6 +148,9 @@ def land(ctx, side, t):
     copy(side.next_error, ctx.error, vectors_of_state(ctx))
     copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
     ctx.length, ctx.older_length = side.h, 0.0
+    if ctx.varying:
+        keep_end_of_part(ctx, side)
+        ctx.length_behind = side.h
     set_time(ctx, t)
     ctx.solved = UNSOLVED
     arrive(ctx)

@@ -11,6 +11,7 @@ from integrators.kernel.context import (
     DONE,
     FIXED_POINT,
     NOT_KEPT,
+    NOTHING,
     RUNNING,
     SCATTERED,
     UNDERFLOW,
@@ -36,7 +37,7 @@ from integrators.kernel.step.estimate import estimate, estimate_implicit, log_de
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
-from integrators.kernel.step.kinks import kink
+from integrators.kernel.step.kinks import keep_end, kink, undo
 from integrators.kernel.step.rule import ROUNDING
 from integrators.kernel.step.sweep import sweep_measured
 
@@ -232,6 +233,9 @@ def ready(ctx):
         if accepts(ctx, outcome, ctx.iterations - before, implicit):
             ctx.solved = BY_VALUES
             return DONE
+        if ctx.undone:
+            undo(ctx)
+            begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
 
 
@@ -251,6 +255,7 @@ def accepts(ctx, outcome, iterations, implicit):
     t, h = ctx.t0, ctx.h
     allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
     error, defect = INFINITY, INFINITY
+    ctx.undone = 0
     if outcome == DONE:
         error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
         if implicit == 0:
@@ -260,6 +265,8 @@ def accepts(ctx, outcome, iterations, implicit):
                 ctx.doubt_end = t + h
             if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
                 error = INFINITY
+        else:
+            ctx.border_ahead = NOTHING
     factor = longer(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
     if error <= allowed and defect <= allowed_defect:
         if ctx.doubts >= SURE and ctx.kinks:
@@ -295,7 +302,10 @@ def accepts(ctx, outcome, iterations, implicit):
 def take(ctx):
     """Take the step ahead, which is solved."""
     t, low = two_sum(ctx.t0, ctx.h)
+    keep_end(ctx)
     commit(ctx)
+    ctx.next_state, ctx.behind_state = ctx.behind_state, ctx.next_state
+    ctx.next_error, ctx.behind_error = ctx.behind_error, ctx.next_error
     ctx.n = 0
     t, low = two_sum(t, low + ctx.time_low)
     ctx.t0 = t
