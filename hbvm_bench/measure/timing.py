@@ -203,7 +203,7 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
 
     def begin(number: int) -> None:
         gc.collect()
-        calibration.append(calibrate())
+        calibration.append(calibrate(clock))
 
     before = busy()
     samples = [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine]
@@ -246,17 +246,17 @@ def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | 
     return Load(others=round(max(all_ - own, 0.0) / wall, 3), stolen=round(stolen / wall, 3))
 
 
-def calibrate() -> float:
-    """Return the seconds of a fixed computation that has nothing to do with any integrator.
+def calibrate(clock: Callable[[], float] = time.perf_counter) -> float:
+    """Return the seconds, by the clock of the samples, of a fixed computation without any integrator.
 
     It divides out how fast the machine is at the moment: square roots, divisions and
     multiply-adds in four independent chains, compiled, about 10 ms.
     """
     loop = _calibration_loop()
     loop(1000)
-    start = time.perf_counter()
+    start = clock()
     loop(CALIBRATION_LOOPS)
-    return time.perf_counter() - start
+    return clock() - start
 
 
 @cache

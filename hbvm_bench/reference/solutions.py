@@ -6,7 +6,9 @@ it, from the same traced vector field as everything else, by two methods that sh
 
 import ast
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from functools import cached_property, lru_cache
@@ -108,7 +110,7 @@ def find(problem: Problem) -> Reference | None:
 
 def find_file(problem: Problem) -> ReferenceFile | None:
     """Return the reference of a problem with all its digits, or ``None``; see `find`."""
-    if _made_here and (found := _made_here.get(_key(problem))) is not None:
+    if (known := _known.get()) and (found := known.get(_key(problem))) is not None:
         return found
     wanted, end = (start(problem), hexadecimal(problem.par)), float(problem.t_end).hex()
     stored = _of_name(problem.name or "")
@@ -135,16 +137,32 @@ def know(text: str) -> None:
         raise ValueError("a reference must have one state for each of its times")
     said = found.provenance
     key = (*found.start, *found.parameters, said["field"], float(said["t_end"]).hex())
-    _made_here[key] = found
+    _known.set({**_known.get(), key: found})
+
+
+def forget() -> None:
+    """Know the references of the package alone."""
+    _known.set({})
+
+
+@contextmanager
+def apart() -> Iterator[None]:
+    """Know the references of the package alone at first, and afterwards what was known before."""
+    token = _known.set({})
+    try:
+        yield
+    finally:
+        _known.reset(token)
 
 
 def made_here(problem: Problem) -> str:
     """Return the text of a problem's reference that does not come with the package; ``""`` without one."""
-    found = _made_here.get(_key(problem))
+    found = _known.get().get(_key(problem))
     return "" if found is None else encode(found)
 
 
-_made_here: dict[tuple[str, ...], ReferenceFile] = {}
+# of the run that this thread works for: two runs may have two references of a problem
+_known: ContextVar[dict[tuple[str, ...], ReferenceFile]] = ContextVar("references", default={})  # noqa: B039
 
 
 def _key(problem: Problem) -> tuple[str, ...]:

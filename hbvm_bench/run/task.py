@@ -17,6 +17,7 @@ from hbvm_bench.campaign.file import Limits
 from hbvm_bench.campaign.identity import Resolved, of_method, resolve, versions_of
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine, reading
+from hbvm_bench.reference import solutions
 from hbvm_bench.run import supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
@@ -78,7 +79,11 @@ def execute(task: bytes) -> tuple[bytes, bytes]:
     problems.errors.InputError
         If the sources changed meanwhile.
     """
-    asked = msgspec.json.decode(task, type=Request)
+    with solutions.apart():  # this may be a process that works for several runs
+        return _executed(msgspec.json.decode(task, type=Request))
+
+
+def _executed(asked: Request) -> tuple[bytes, bytes]:
     own.learn(asked.beside)
     ((key, case),) = asked.cases.items()
     try:

@@ -34,6 +34,7 @@ from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Case
 from hbvm_bench.campaign.identity import make_method, make_problem, of_method
 from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic, ensure_writable, write_json
 from hbvm_bench.store.records import SCHEMA, Outcome, Record, Result, decoded
 from problems import limits
@@ -176,7 +177,8 @@ class Store:
             write_json(self.directory / PROBLEMS / f"{name}.json", known)
 
     def learn(self) -> None:
-        """Know the problems and references that are stored here; no code is run."""
+        """Know the problems and references that are stored here, and no other run's; no code is run."""
+        solutions.forget()
         for path in (self.directory / PROBLEMS).glob("[!.]*.json"):
             with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
                 own.learn(decoded(path.read_bytes(), own.Beside))

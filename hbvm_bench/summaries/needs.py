@@ -18,7 +18,7 @@ from statistics import median
 from typing import NamedTuple
 
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, singles, work_of
+from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_of, number, work_of
 from hbvm_bench.summaries.table import Table
 
 SHOWN = 3  # families
@@ -51,7 +51,7 @@ def table(records: Sequence[Record]) -> Table | None:
         typical = {family: median(filter(math.isfinite, found)) for family, found in behind.items()}
         first = sorted(behind, key=lambda family: (-near[family], typical[family]))[:SHOWN]
         said = [
-            f"{family} ({near[family]} of {problems}"
+            f"{family} ({near[family]} of {_ran(behind[family])}"
             + (f", {typical[family]:.3g} times the best)" if typical[family] > 1.005 else ")")
             for family in first
         ]
@@ -59,7 +59,10 @@ def table(records: Sequence[Record]) -> Table | None:
     if not rows:
         return None
     head = ("need", "first choices", "problems")
-    note = "In brackets: on how many problems it is near the best, and its median factor behind it."
+    note = (
+        "In brackets: on how many of the problems that it ran on it is near the best, and its median factor "
+        "behind it."
+    )
     return Table("Which integrator for which need", head, rows, note, words=(0, 1))
 
 
@@ -88,25 +91,41 @@ def needs(records: Sequence[Record]) -> list[Need]:
 
 
 def factors(records: Sequence[Record], need: Need) -> Mapping[str, list[float]]:
-    """Return each family's cost over the best one's, problem by problem; infinite where it does not serve."""
-    behind: dict[str, list[float]] = {}
-    served = 0
+    """Return each family's cost over the best one's, problem by problem that any family serves.
+
+    Infinite where it does not serve, and NaN where it did not run, or has no such cost (a Taylor method
+    counts no evaluations); families that serve nowhere are left out.
+    """
+    found = _of_all(records, need)
+    return {family: ratios for family, ratios in found.items() if any(map(math.isfinite, ratios))}
+
+
+def _of_all(records: Sequence[Record], need: Need) -> dict[str, list[float]]:
+    served: list[dict[str, float]] = []
+    families: dict[str, None] = {}
     for here in by_problem(records).values():
         costs: dict[str, float] = {}
-        for record in here:
-            cost = number(record, need.cost)
-            if cost is not None and need.serves(record):
-                family = family_of(record)
-                costs[family] = min(costs.get(family, math.inf), max(cost, need.floor))
-        if not costs:
-            continue
-        least = min(costs.values())
-        for family in {**behind, **costs}:
-            cost = costs.get(family, math.inf)
-            factor = cost / least if least > 0.0 else 1.0 if family in costs else math.inf
-            behind.setdefault(family, [math.inf] * served).append(factor)
-        served += 1
-    return behind
+        families |= dict.fromkeys(map(family_of, here))
+        for family, members in by_family(here).items():
+            able = [one for one in members if need.serves(one)]
+            known = [cost for one in able if (cost := number(one, need.cost)) is not None]
+            if known:
+                costs[family] = max(min(known), need.floor)
+            elif not able and any(one.result.outcome != "refused" for one in members):
+                costs[family] = math.inf
+        least = min(costs.values(), default=math.inf)
+        if math.isfinite(least):
+            served.append({family: _factor(cost, least) for family, cost in costs.items()})
+    return {family: [costs.get(family, math.nan) for costs in served] for family in families}
+
+
+def _factor(cost: float, least: float) -> float:
+    return cost / least if least > 0.0 else 1.0 if cost == 0.0 else math.inf
+
+
+def _ran(factors: Sequence[float]) -> int:
+    """Return on how many problems a family ran."""
+    return sum(not math.isnan(factor) for factor in factors)
 
 
 def _within(**errors: float) -> Callable[[Record], bool]:
@@ -123,18 +142,23 @@ class Profile:
     """The profiles of all families for one accuracy."""
 
     words: str  # the accuracy that was asked for
-    # of each family its work over the least, by problem that any family solves; infinite where it does not
+    # of each family its work over the least, by problem that any family solves; infinite where it does not,
+    # and NaN where it did not run or has no such work
     ratios: dict[str, list[float]]
 
     @property
     def problems(self) -> int:
-        """On how many problems any family reaches the accuracy; the shares are of these."""
+        """On how many problems any family reaches the accuracy."""
         return len(next(iter(self.ratios.values()), ()))
 
+    def ran(self, family: str) -> int:
+        """Return on how many of these problems a family ran; its share is of them."""
+        return _ran(self.ratios[family])
+
     def share(self, family: str, tau: float) -> float:
-        """Return the share of the problems on which a family is within a factor ``tau`` of the best."""
-        ratios = self.ratios[family]
-        return sum(ratio <= tau for ratio in ratios) / len(ratios) if ratios else 0.0
+        """Return the share of its problems on which a family is within a factor ``tau`` of the best."""
+        within = sum(ratio <= tau for ratio in self.ratios[family])
+        return within / self.ran(family) if within else 0.0
 
     def curve(self, family: str) -> tuple[list[float], list[float]]:
         """Return the steps of a family's profile: factors, ascending from 1, and shares from there on."""
@@ -147,8 +171,8 @@ class Profile:
 
     def wins(self, family: str) -> int:
         """Return on how many problems a family has the least work, the first of several that have it."""
-        first = [min(self.ratios, key=lambda name: self.ratios[name][i]) for i in range(self.problems)]
-        return first.count(family)
+        best = [min(self.ratios, key=lambda name: self.ratios[name][i] != 1.0) for i in range(self.problems)]
+        return best.count(family)
 
 
 def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -> Profile:
@@ -156,9 +180,5 @@ def profile(records: Sequence[Record], within: Mapping[str, float], work: str) -
 
     A family without the metric of work (a Taylor method has no count of evaluations) has no ratio.
     """
-    need = Need("", lambda record: bool(number(record, work)) and accurate(record, within), work)
-    found = factors(records, need)
-    solved = len(next(iter(found.values()), ()))
-    families = by_family(singles(records))
     words = ", ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in within.items())
-    return Profile(words, {family: list(found.get(family, [math.inf] * solved)) for family in families})
+    return Profile(words, _of_all(records, Need("", partial(accurate, within=within), work)))

@@ -60,7 +60,10 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(
         f"{one.words}, {one.problems} problems: "
-        + ", ".join(f"{name} best on {one.wins(name)}, solves {one.solved(name)}" for name in one.ratios)
+        + ", ".join(
+            f"{name} best on {one.wins(name)}, solves {one.solved(name)} of {one.ran(name)}"
+            for name in one.ratios
+        )
         + "."
         for one in found
     )
@@ -70,6 +73,7 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         "Performance profiles",
         f"The share of the problems on which the best setting of a family needs at most so many times "
         f"the {label} of the best of all. Where a line ends on the right is the share it solves at all. "
+        "Of each family those problems count on which it ran. "
         "Dolan and Moré, Mathematical Programming 91 (2002).",
         said,
         Plot(panels),

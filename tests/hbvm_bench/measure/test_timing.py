@@ -1,6 +1,7 @@
 """The clock runs for the library's own work only: the sampling it recommends, and nothing of setting up."""
 
 import gc
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -170,3 +171,17 @@ def test_shuffled_rounds_are_in_another_order_each_and_the_same_every_time():
     assert (first[0], first[9]) == (0, 1)
     assert sorted(first[1:9]) == sorted(first[10:]) == list("abcdefgh")
     assert first[1:9] != first[10:]
+
+
+def test_the_calibration_of_thread_times_is_by_the_same_clock(monkeypatch):
+    asked = []
+    monkeypatch.setattr(timing, "calibrate", lambda clock: asked.append(clock) or 0.01)
+    plan = TimingPlan(rounds=2, interleaved=True, clock="thread", shortest=1e-6)
+    timing.time_together([timing.Run.of(problems.load("pendulum", t_end=1.0), Landing())], plan)
+    assert asked == 2 * [time.thread_time]
+
+
+def test_a_calibration_by_the_clock_of_the_thread_leaves_out_what_others_do():
+    timing.calibrate()  # compiled
+    ticks = iter((3.0, 5.0))
+    assert timing.calibrate(lambda: next(ticks)) == 2.0

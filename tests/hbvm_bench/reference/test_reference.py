@@ -4,6 +4,7 @@ import pytest
 
 import problems
 from hbvm_bench.reference import solutions
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 Z_END = "-0.21429082377414021577602211142057"
@@ -77,3 +78,31 @@ def test_of_several_references_the_one_that_has_the_end_time_is_found():
     assert solutions.find(short).t[-1] == 1500.0
     assert solutions.find(long).t[-1] == 6000.0
     assert solutions.find(problems.load("sitnikov", t_end=1.0)).t[-1] == 1500.0
+
+
+def test_a_run_does_not_know_the_reference_of_another_run(tmp_path):
+    problem = problems.load("pendulum", q=0.3, t_end=7.0)
+    given = {}
+    for name, end in (("one", [0.1, 0.2]), ("other", [0.3, 0.4])):
+        solutions.forget()
+        given[name] = solutions.of_end(problem, end)
+        solutions.know(solutions.encode(given[name]))
+        store = Store(tmp_path / name)
+        store.prepare()
+        store.keep(repr(problem))
+    none = Store(tmp_path / "none")
+    none.prepare()
+    for store, expected in ((Store(tmp_path / "one"), given["one"]), (none, None)):
+        store.learn()
+        assert solutions.find_file(problem) == expected  # before: the last one that anybody had learned
+
+
+def test_a_task_of_another_run_leaves_what_is_known_here():
+    problem = problems.load("pendulum", q=0.3, t_end=7.0)
+    solutions.know(solutions.encode(solutions.of_end(problem, [0.1, 0.2])))
+    try:
+        with solutions.apart():
+            assert solutions.find_file(problem) is None
+        assert solutions.find_file(problem) is not None
+    finally:
+        solutions.forget()

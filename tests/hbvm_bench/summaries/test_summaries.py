@@ -86,6 +86,25 @@ def test_who_does_not_reach_the_accuracy_has_an_infinite_ratio():
     assert found.words == "position to 1e-08, energy to 1e-13"
 
 
+def test_a_problem_on_which_a_family_did_not_run_is_not_one_that_it_failed_to_solve():
+    refused = record("IAS15()", outcome="refused", status="", metrics={})
+    alone = record("IAS15()", problem="toda()", seconds=1.0, position=1e-9)
+    found = needs.profile([*RUN, refused, alone], {"position_end": 1e-8}, "warm_seconds")
+    assert found.problems == 3
+    assert (found.solved("IAS15"), found.ran("IAS15"), found.share("IAS15", 1.0)) == (1, 1, 1.0)
+    assert (found.solved("Gauss"), found.ran("Gauss")) == (2, 3)  # it ran on toda()
+    rows = dict(row[:2] for row in needs.table([*RUN, refused, alone]).rows)
+    assert "IAS15 (1 of 1)" in rows["a position right to 1e-8, in little time"]
+
+
+def test_a_family_without_the_count_that_is_compared_has_not_failed():
+    right = {"position_end": Value(value=1e-9)}
+    counted = record("DOP853()", metrics=right | {"evaluations": Value(value=7.0)})
+    none = record("Taylor()", metrics=right)
+    found = needs.profile([counted, none], {"position_end": 1e-4}, "evaluations")
+    assert (found.ran("Taylor"), found.ran("DOP853")) == (0, 1)
+
+
 def test_needs_name_the_families_near_the_best_most_often():
     rows = {title: rest for title, *rest in needs.table(RUN).rows}
     said = "Gauss (2 of 2, 1.5 times the best); Taylor (1 of 2, 4.5 times the best)"
