@@ -1,5 +1,6 @@
 """Values as JSON and arrays, which a file can keep without pickle, and back again bit for bit."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,10 +11,12 @@ from integrators import registry
 from integrators.protocol import MethodBase
 from problems.errors import InputError, shown
 from problems.problem import Problem
+from problems.systems.base import System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
 from problems.systems.poisson import Poisson
 from problems.systems.vector_field import VectorField
+from problems.trace.stored import items, refuse
 
 _SYSTEMS = {kind.__name__: kind for kind in (Hamiltonian, Lagrangian, Poisson, VectorField)}
 
@@ -58,6 +61,8 @@ def unpacked(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Any:
         return plain
     [(kind, content)] = plain.items()
     if kind == "array":
+        if content not in arrays:
+            refuse(f"there is no array {shown(content)}")
         return arrays[content]
     items = unpacked(content, arrays)
     return tuple(items) if kind == "tuple" else dict(items)
@@ -75,12 +80,56 @@ def unpacked_problem(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> Problem 
     """Return the problem that `packed_problem` was given; ``None`` where its field is not traced."""
     if plain["system"] is None:
         return None
+    if plain["kind"] not in _SYSTEMS:
+        refuse(f"it has no system of the kind {shown(plain['kind'])}")
     kind = _SYSTEMS[plain["kind"]]
     system = kind.__new__(kind)
     system.__setstate__(plain["system"])
+    state = unpacked(plain["state"], arrays)
+    if not isinstance(state, dict):
+        refuse("a problem has no parts")
     problem = Problem.__new__(Problem)
-    problem.__setstate__({**unpacked(plain["state"], arrays), "system": system})
+    problem.__setstate__({**_checked(state, system), "system": system})
     return problem
+
+
+_TEXTS = ("title", "notes", "_made_with")
+
+
+def _checked(state: dict[Any, Any], system: System) -> dict[str, Any]:
+    """Return the parts of a problem, each of the type and shape that compiled code takes for granted."""
+    if set(state) != {"y0", "par", "times", "t0", "t_end", "name", "arguments", "references", *_TEXTS}:
+        refuse("a problem has other parts")
+    n_times = None if state["times"] is None else np.size(state["times"])
+    for key, size in {"y0": system.dim, "par": system.n_par, "times": n_times}.items():
+        if size is not None:
+            state[key] = doubles(state[key], (size,), key)
+            if not np.isfinite(state[key]).all():
+                refuse(f"{key} is not finite")
+    for key in ("t0", "t_end"):
+        if type(state[key]) not in (int, float) or not math.isfinite(state[key]):
+            refuse(f"{key} is {shown(state[key])}")
+        state[key] = float(state[key])
+    references, arguments = state["references"], state["arguments"]
+    texts = [*(state[key] for key in _TEXTS), *items(references, "the list of references")]
+    texts += [] if state["name"] is None else [state["name"]]
+    texts += list(arguments) if isinstance(arguments, dict) else [None]
+    if not all(isinstance(text, str) for text in texts):
+        refuse("the words of a problem are no texts")
+    return state
+
+
+def doubles(value: Any, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    """Return stored numbers as an array of doubles in C order, or refuse what has another type or shape.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else.
+    """
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu" or value.shape != shape:
+        refuse(f"{name} is no array of {shape} numbers")
+    return np.array(value, dtype=np.float64, order="C")
 
 
 def packed_method(method: MethodBase, arrays: dict[str, NDArray[Any]]) -> Any:
@@ -102,5 +151,8 @@ def packed_method(method: MethodBase, arrays: dict[str, NDArray[Any]]) -> Any:
 
 def unpacked_method(plain: Any, arrays: Mapping[str, NDArray[Any]]) -> MethodBase:
     """Return the method that `packed_method` was given."""
-    name, options = plain
-    return registry.create(name, **unpacked(options, arrays))
+    name, options = items(plain, "the method", 2)
+    options = unpacked(options, arrays)
+    if not isinstance(name, str) or not isinstance(options, dict):
+        refuse("the method has no name and options")
+    return registry.create(name, **options)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from integrators.caveats import unseen
 from integrators.plain import (
+    doubles,
     packed,
     packed_method,
     packed_problem,
@@ -25,7 +26,7 @@ from integrators.plain import (
 )
 from integrators.protocol import Array, MethodBase, Program, Stats, Status, as_numbers
 from problems.calls import readable
-from problems.errors import InputError, MissingLibraryError, shown
+from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
 
 FORMAT = 1  # of files
@@ -219,7 +220,7 @@ class Solution:
         return self.problem.guards(self.y, self.t)
 
     def __repr__(self) -> str:
-        return (
+        return printable(
             f"Solution({self.problem!r}, {self.method!r}, {self.status} at t = {self.t_stop!r}, "
             f"{self.t.size} states)"
         )
@@ -230,7 +231,7 @@ class Solution:
             counts = ", ".join(f"{name} {len(found)}" for name, found in self.events.items())
             lines.append(f"events found: {counts}")
         lines += [f"warning: {sentence}" for sentence in self.warnings]
-        return "\n".join(lines)
+        return printable("\n".join(lines))  # a file that was loaded may hold any text
 
     def _with(self) -> str:
         """Return how it was integrated, with what the method chose itself, and how it ended."""
@@ -369,17 +370,20 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
                 f"the field of the solution in {path} is code, which the file does not hold; "
                 "load it with problem=, the one that was integrated."
             )
-        kinds = {name: [f"event_{key}:{name}" for key in ("t", "y", "direction")] for name in words["events"]}
+        dim, n = found.system.dim, np.size(arrays["t"])
         return Solution(
-            t=arrays["t"],
-            y=arrays["y"],
+            t=doubles(arrays["t"], (n,), "t"),
+            y=doubles(arrays["y"], (n, dim), "y"),
             status=Status(words["status"]),
-            stats=Stats(**unpacked(words["stats"], arrays)),
+            stats=_stats(unpacked(words["stats"], arrays)),
             problem=found,
             method=unpacked_method(words["method"], arrays),
-            events={name: Occurrences(*(arrays[key] for key in keys)) for name, keys in kinds.items()},
+            events={name: _occurrences(name, arrays, dim) for name in words["events"]},
             error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
-            **{key: words[key] for key in _AS_THEY_ARE},
+            reason=_of(str, words["reason"]),
+            t_stop=_of(float, words["t_stop"]),
+            compile_seconds=_of(float, words["compile_seconds"]),
+            from_cache=None if words["from_cache"] is None else _of(bool, words["from_cache"]),
         )
     except (InputError, FileNotFoundError) as error:
         if isinstance(error, InputError):
@@ -390,6 +394,36 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
             f"{path} is not a solution, or is damaged ({type(error).__name__}: {shown(str(error))}); "
             "give a file that Solution.save wrote."
         ) from None
+
+
+def _of(kind: type[Any], value: Any) -> Any:
+    """Return a stored value of a type; whole numbers are numbers too."""
+    if type(value) is not kind and not (kind is float and type(value) is int):
+        raise TypeError(f"{shown(value)} is no {kind.__name__}")
+    return kind(value)
+
+
+def _stats(stored: Any) -> Stats:
+    stats = Stats(**stored)
+    counts = (stats.rejections, stats.evaluations, stats.iterations)
+    for count in (_of(int, stats.steps), *(n for n in counts if n is not None)):
+        _of(int, count)
+    if stats.solver is not None:
+        _of(str, stats.solver)
+    _of(dict, stats.extra)
+    for t, h in stats.extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
+        _of(float, t)
+        _of(float, h)
+    _of(int, stats.extra.get("implicit", {"steps": 0})["steps"])
+    return stats
+
+
+def _occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occurrences:
+    t, y, direction = (arrays[f"event_{key}:{_of(str, name)}"] for key in ("t", "y", "direction"))
+    if direction.dtype.kind != "i" or direction.shape != t.shape:
+        raise TypeError(f"the directions of {shown(name)} are not as many as its times")
+    n = np.size(t)
+    return Occurrences(doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64))
 
 
 def write_whole(path: Path, write: Any) -> None:

@@ -6,6 +6,9 @@ import reprlib
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+# They command a terminal, or turn the direction in which a line is read.
+_COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
 
 class InputError(ValueError):
     """Something the user gave cannot be used; the command line exits with code 2.
@@ -44,6 +47,11 @@ class MissingLibraryError(InputError, ImportError):
     >>> issubclass(problems.MissingLibraryError, problems.InputError)
     True
     """
+
+
+def printable(text: str) -> str:
+    """Return text without the characters that command a terminal; line ends and tabs stay."""
+    return _COMMANDS.sub("", text)
 
 
 def shown(value: object, longest: int = 80) -> str:

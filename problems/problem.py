@@ -13,7 +13,7 @@ from problems import emit
 from problems.analysis import invariants
 from problems.calls import checked_arguments
 from problems.checks import NOTHING, Named
-from problems.errors import InputError, shown
+from problems.errors import InputError, printable, shown
 from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
@@ -150,9 +150,9 @@ class Problem:
 
     def __repr__(self) -> str:
         if self.name is None:
-            return f"Problem({self._made_with})"
+            return printable(f"Problem({self._made_with})")
         inside = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
-        return f"{self.name}({inside})"
+        return printable(f"{self.name}({inside})")
 
     def _identity(self) -> tuple[Any, ...]:
         return (

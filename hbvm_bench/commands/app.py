@@ -16,9 +16,8 @@ from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.report import terminal
 from hbvm_bench.store.files import ensure_writable, write_all
-from hbvm_bench.store.records import printable
 from hbvm_bench.store.store import Store
-from problems.errors import InputError
+from problems.errors import InputError, printable
 
 app = typer.Typer(
     name="hbvm-bench",

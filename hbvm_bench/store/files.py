@@ -42,10 +42,21 @@ def json_of(value: Any) -> bytes:
 
 
 def csv_of(rows: Iterable[Iterable[object]]) -> bytes:
-    """Return rows as comma-separated text."""
+    """Return rows as comma-separated text, which no spreadsheet takes for formulas."""
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerows(rows)
+    csv.writer(stream, lineterminator="\n").writerows(map(_as_text, row) for row in rows)
     return stream.getvalue().encode()
+
+
+def _as_text(cell: object) -> object:
+    """Return a cell that spreadsheets show as it is: an apostrophe goes before what would be a formula."""
+    if not isinstance(cell, str) or not cell.startswith(("=", "+", "-", "@", "\t", "\r")):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return f"'{cell}"
+    return cell
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -5,7 +5,6 @@ Not-a-number and infinity never enter a record: a value that does not exist is
 """
 
 import math
-import re
 from contextlib import suppress
 from datetime import datetime
 from statistics import median, quantiles
@@ -15,12 +14,11 @@ import msgspec
 
 from hbvm_bench.campaign.entries import Limits, Role
 from hbvm_bench.campaign.file import Case
+from problems.errors import printable
 
 T = TypeVar("T")
 SCHEMA = 2  # 1 had position errors in units of length
 COMPILING = "compiling"
-# They command a terminal, or turn the direction in which a line is read.
-COMMANDS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 Outcome = Literal["ok", "stalled", "timeout", "killed", "crashed", "refused", "damaged", "outdated"]
 
@@ -37,17 +35,12 @@ def decoded(content: bytes, type_: type[T]) -> T:
     """
     with suppress(ValueError):  # nearly always, and ten times as fast
         text = content.decode()
-        if "\\u" not in text and not COMMANDS.search(text):
+        if "\\u" not in text and printable(text) == text:
             return msgspec.json.decode(text, type=type_)
     try:
         return msgspec.convert(_printable(msgspec.json.decode(content)), type_)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-
-
-def printable(text: str) -> str:
-    """Return text without the characters that command a terminal; line ends and tabs stay."""
-    return COMMANDS.sub("", text)
 
 
 def _printable(value: Any) -> Any:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from problems import double_double
-from problems.analysis import wide
 from problems.calculus.function import Function
 from problems.double_double import DD
 from problems.errors import InputError, shown
@@ -179,6 +178,8 @@ def errors(
     system: System, par: Array, y: ArrayLike, t: ArrayLike | None, *, start: tuple[float, Array]
 ) -> dict[str, Array]:
     """Return how far the invariants are from those at ``start``, see `problems.problem.Problem.errors`."""
+    from problems.analysis import wide  # which loads mpmath
+
     states = _states(system, y)
     times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states))
     found: dict[str, Array] = {}

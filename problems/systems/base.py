@@ -15,12 +15,13 @@ from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
 from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.errors import InputError, shown, unknown
+from problems.systems.stored import check_system
 from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
 
-_DECLARED = ("hamiltonian", "momentum", "domain", "invariant", "guard")  # kinds of functions that users write
+_DECLARED = ("hamiltonian", "momentum", "domain")  # functions that users write, with invariants and guards
 
 _COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
 
@@ -113,10 +114,12 @@ class System:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what was traced, without the functions that it was traced from, as JSON can keep it."""
+        own = {*_DECLARED, *(f"invariant:{n}" for n in self.invariant_names)}
+        own |= {f"guard:{n}" for n in self.guard_names}
         declared = {
             name: function.plain()
             for name, function in self._functions.items()
-            if function is not None and (name.partition(":")[0] in _DECLARED or self._writes(name))
+            if function is not None and (name in own or self._writes(name))
         }
         bodies = self.bodies and [self.bodies.masses, self.bodies.G, self.bodies.dimension]
         return {
@@ -133,6 +136,7 @@ class System:
         }
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
+        functions = check_system(state, [kind.__name__ for kind in type(self).__mro__])
         self.name, self.dim, self.dof = state["name"], state["dim"], state["dof"]
         self.bodies = state["bodies"] and Bodies(*state["bodies"])
         self.parameters = MappingProxyType(
@@ -141,9 +145,7 @@ class System:
         self._layout, self.n_par = _layout(self.parameters)
         self._graph = Graph.__new__(Graph)
         self._graph.__setstate__(state["graph"])
-        self._functions = {
-            name: Function.of_plain(self._graph, plain) for name, plain in state["functions"].items()
-        }
+        self._functions = {name: Function.of_plain(self._graph, plain) for name, plain in functions.items()}
         self._jacobians = {}
         self._vectors = set(state["vectors"])
         self.invariant_names, self.guard_names = tuple(state["invariants"]), tuple(state["guards"])

@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
-from problems.errors import InputError, shown
 from problems.trace.functions import FUNCTIONS
 from problems.trace.source_line import refuse, users_line
 
@@ -367,26 +366,35 @@ class Graph:
         return node
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the graph as numbers, texts and lists, which JSON and pickle can keep."""
-        return {
-            "dof": self.dof,
-            "loops": [loop.rows.tolist() for loop in self.loops],
-            "nodes": [
-                [node.op, [arg.id for arg in node.args], _plain(node.data), node.flags]
-                + ([] if node.loop is None else [node.loop.id])
-                for node in self.nodes
-            ],
-        }
+        """Return the graph as numbers, texts and lists, which JSON and pickle can keep.
+
+        Operations on symbols that stand for something else while functions are derived or emitted are
+        left out, as ``None``: no function depends on them, and they are made again when they are needed.
+        """
+        passing: set[int] = set()
+        nodes: list[list[Any] | None] = []
+        for node in self.nodes:
+            if (node.op == "symbol" and node.data[0] not in _SPACES) or any(
+                a.id in passing for a in node.args
+            ):
+                passing.add(node.id)
+                nodes.append(None)
+            else:
+                inside = [] if node.loop is None else [node.loop.id]
+                nodes.append([node.op, [a.id for a in node.args], _plain(node.data), node.flags, *inside])
+        return {"dof": self.dof, "loops": [loop.rows.tolist() for loop in self.loops], "nodes": nodes}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Make the graph again: the same nodes, with the same numbers."""
+        """Make the graph again: the same nodes, with the same numbers. See `problems.trace.stored`."""
         self.__init__(state["dof"])
         loops = [self.loop(np.array(rows, dtype=np.int64)) for rows in state["loops"]]
-        for op, args, data, flags, *inside in state["nodes"]:
+        for plain in state["nodes"]:
+            if plain is None:
+                self.nodes.append(Node(self, "const", (), 0.0, 0, None))  # which is not found by its key
+                continue
+            op, args, data, flags, *inside = plain
             loop = loops[inside[0]] if inside else None
             data = _OF_PLAIN[op](data, loops) if op in _OF_PLAIN else None
-            if op not in _OF_PLAIN and op not in FUNCTIONS and op not in _ARITHMETIC:
-                raise InputError(f"a graph has no operation {shown(op)}.")
             node = Node(self, op, tuple(self.nodes[i] for i in args), data, int(flags), loop)
             self.nodes.append(node)
             self._table[_key(node)] = node
@@ -591,8 +599,7 @@ class Graph:
                 return self.call(node.op, *args)
 
 
-_SPACES = ("t", "y", "par", "out")
-_ARITHMETIC = ("add", "sub", "mul", "div", "neg", "where")
+_SPACES = ("t", "y", "par")
 
 
 def _affine(plain: Sequence[Any]) -> Affine:
@@ -602,7 +609,7 @@ def _affine(plain: Sequence[Any]) -> Affine:
 _OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
     "const": lambda data, _: float(data),
     "symbol": lambda data, _: (
-        _SPACES[_SPACES.index(data[0])],  # which is printed into code: no other text
+        data[0],
         data[1] if isinstance(data[1], int) else _affine(data[1]),
     ),
     "index": lambda data, _: _affine(data),
