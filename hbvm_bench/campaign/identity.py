@@ -1,4 +1,4 @@
-"""What makes two runs of a case the same: names, options, versions, sources.
+"""What makes two integrations the same: problem, method, grid, and the sources and versions of both.
 
 The id of a case is the sha256 of canonical JSON of all this. A rerun therefore
 does only what is missing or stale, and two stores can be merged by id.
@@ -23,7 +23,6 @@ import problems.registry
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Checks
 from hbvm_bench.campaign.spec import Spec, parse_spec
-from hbvm_bench.reference import solutions
 from integrators.kernel.native import store as kept
 from integrators.protocol import MethodBase
 from problems import emit
@@ -31,10 +30,13 @@ from problems.errors import InputError
 from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
-WORKER = "hbvm_bench.run.worker"  # what it imports of the room measure makes the numbers of a case
-MEASURE = "hbvm_bench.measure."
-# They say, name and keep what is run; all that a number can depend on of it is in the key.
-BOOKKEEPING = ("hbvm_bench.campaign.", "hbvm_bench.store.", "integrators.plain", "problems.picture")
+INTEGRATES = "hbvm_bench.measure.raw"  # what a worker process integrates a case with
+# They say, name and keep what is run; all that an integration can depend on of it is in the key. A
+# reference is what it is compared with when it is read.
+BOOKKEEPING = (
+    *("hbvm_bench.campaign.", "hbvm_bench.store.", "hbvm_bench.reference."),
+    *("integrators.plain", "problems.picture"),
+)
 TOLERANCES = ("tol", "rtol", "epsilon")  # a method that has one takes h for its first step alone
 # A library's numbers also depend on what it computes with.
 COMPUTES_WITH = {
@@ -129,7 +131,6 @@ def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]
             "options": {name: repr(value) for name, value in method.options(defaults=True).items()},
             "grid": hashlib.sha256(grid.tobytes()).hexdigest(),
             "versions": versions_of(method),
-            "reference": solutions.digest(problem),
             "source": source_digest(method, case),
         }
         | {
@@ -175,26 +176,18 @@ def is_ours(method: MethodBase) -> bool:
 
 
 def source_digest(method: MethodBase, case: Case) -> str:
-    """Return the sha256 of the sources that decide about the measured numbers of a case.
+    """Return the sha256 of the sources that decide about an integration.
 
-    They are those that measure in a worker process, of the method and of the problem, and what these
+    They are those of the method, of the problem, and of `INTEGRATES`, and what these
     import, at their heads or anywhere below, of our packages and of the method's and the problem's own. So
     a row of a peer is not stale because our kernel changed, nor one of ours because of a peer,
-    nor any because of a metric, which is evaluated when a record is read, or of a report. Comments,
+    nor any because of a reference, a metric, the law of a drift, how times are taken, or a report. Comments,
     docstrings, the layout and what a problem's decorator says do not count. A problem of the user's
     own has no source: its name holds the digest of its formula.
     """
     spec = parse_spec(case.problem)
     made_in = [] if own.find(spec) else [problems.registry.factory(spec.name).__module__]
-    return digest_of((*measures(), type(method).__module__, *made_in))
-
-
-@cache
-def measures() -> tuple[str, ...]:
-    """Return the modules that a worker process measures with."""
-    path = _file_of(WORKER)
-    assert path is not None
-    return tuple(name for name in _read(WORKER, path)[1] if name.startswith(MEASURE))
+    return digest_of((INTEGRATES, type(method).__module__, *made_in))
 
 
 @cache

@@ -243,6 +243,8 @@ def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -
     visits = timing_pass.missing_visits(cases, store, campaign.timing)
     if not visits:
         return
+    if old := timing_pass.outdated(cases, store, campaign.timing):
+        live.say(f"the plan of the timing has changed: {old} cases are timed again")
     known = {key: record.seconds for key in set(visits) if (record := store.load(key)) is not None}
     live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)

@@ -1,23 +1,30 @@
-"""From a solution to what is measured on it: error series, guards, distances."""
+"""From what a worker returned to what is measured on it, by pure functions: errors, guards, distances."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hbvm_bench.campaign.entries import Checks, Ensemble
+from hbvm_bench.measure import drift
+from hbvm_bench.measure.starts import members
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.store.records import Compile, Counters, Law, Result, Timing
 from integrators.protocol import Status
-from integrators.solution import Solution
 from problems import emit
+from problems.analysis import invariants
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
+Series = dict[str, Array]
+NOTHING = partial(np.empty, 0)
 
 PLAIN = ("t", "y", "distance", "position_t", "position", "phase")
 PREFIXES = {"errors": "error.", "guards": "guard.", "drift": "drift.", "extra": "extra."}
-"""What of a `Measured` the store keeps as series: by its own name, and by that of each with a prefix."""
+"""What of a `Measured` is drawn: by its own name, and by that of each with a prefix."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +34,19 @@ class Measured:
     problem: Problem
     t: Array  # of the samples, shape (n,)
     y: Array  # shape (n, dim)
-    errors: dict[str, Array]  # of the invariants by name, relative where that has a meaning, shape (n,)
-    guards: dict[str, Array]  # what a symmetry keeps at exactly zero, shape (n,)
-    distance: Array  # largest of a body (or of q) from the origin, shape (n,)
-    position_t: Array  # times of the reference that were reached, shape (m,)
-    position: Array  # the error of the position there
-    phase: Array  # how far in time the run is ahead of the reference along its trajectory
     reference: Reference | None  # the trusted solution, where there is one
     complete: bool  # whether the end time was reached
     t_stop: float
+    # of the invariants by name, relative where that has a meaning, shape (n,)
+    errors: dict[str, Array] = field(default_factory=dict)
+    guards: dict[str, Array] = field(default_factory=dict)  # what a symmetry keeps at exactly zero, (n,)
+    distance: Array = field(
+        default_factory=NOTHING
+    )  # largest of a body (or of q) from the origin, shape (n,)
+    position_t: Array = field(default_factory=NOTHING)  # times of the reference that were reached, shape (m,)
+    position: Array = field(default_factory=NOTHING)  # the error of the position there
+    # how far in time the run is ahead of the reference along its trajectory
+    phase: Array = field(default_factory=NOTHING)
     counters: Counters = field(default_factory=Counters)
     compile: Compile | None = None
     timing: Timing | None = None
@@ -49,71 +60,140 @@ class Measured:
     extra: dict[str, Array] = field(default_factory=dict)
 
     def series(self) -> dict[str, Array]:
-        """Return the arrays that the store keeps beside the record."""
+        """Return the arrays that figures are drawn from, and tables of series made."""
         made = {name: getattr(self, name) for name in PLAIN}
         for field_, prefix in PREFIXES.items():
             made |= {f"{prefix}{name}": values for name, values in getattr(self, field_).items()}
         return made
 
 
-def measure(solution: Solution, reference: Reference | None) -> Measured:
-    """Evaluate everything on the samples of a solution, against the trusted one where there is one."""
-    problem, t, y = solution.problem, solution.t, solution.y
-    # an overflow is a result here: it becomes a sentence in the metrics
-    with np.errstate(all="ignore"):
-        errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
-        guards = {name: np.asarray(values, float) for name, values in problem.guards(y, t).items()}
-        distance = largest_distance(problem, positions(problem, y))
-        position_t, position, phase = _position_error(problem, t, y, reference)
-    stats = solution.stats
-    counts = {name: getattr(stats, name) for name in ("steps", "rejections", "evaluations", "iterations")}
-    counts = {name: None if count is None else int(count) for name, count in counts.items()}
-    histories = {name: v for name, v in stats.extra.items() if isinstance(v, np.ndarray)}
-    return Measured(
+def measure(
+    problem: Problem,
+    result: Result,
+    series: Series,
+    reference: Reference | None = None,
+    timing: Timing | None = None,
+    *,
+    ensemble: Ensemble | None = None,
+) -> Measured:
+    """Evaluate everything that does not judge on what a worker returned; see `hbvm_bench.measure.raw`.
+
+    ``reference`` is the trusted solution, where there is one; an ensemble brings its own.
+    """
+    t, y = series["t"], series["y"]
+    made = Measured(
         problem=problem,
         t=t,
         y=y,
-        errors=errors,
-        guards=guards,
-        distance=distance,
-        position_t=position_t,
-        position=position,
-        phase=phase,
-        reference=reference,
-        complete=solution.status is Status.FINISHED,
-        t_stop=float(solution.t_stop),
-        counters=Counters(**counts, solver=stats.solver),
-        compile=Compile(seconds=float(solution.compile_seconds), cached=solution.from_cache),
-        extra={name: values for name, values in histories.items() if values.dtype.kind in "fiu"},
-    )
-
-
-def restore(
-    problem: Problem,
-    series: dict[str, Array],
-    result: Result,
-    reference: Reference | None,
-    timing: Timing | None,
-) -> Measured:
-    """Put together again what was measured, from the store, with a timing."""
-    arrays: dict[str, Any] = {name: series[name] for name in PLAIN}
-    for field_, prefix in PREFIXES.items():
-        named = {name: values for name, values in series.items() if name.startswith(prefix)}
-        arrays[field_] = {name.removeprefix(prefix): values for name, values in named.items()}
-    return Measured(
-        problem=problem,
         reference=reference,
         complete=result.status == Status.FINISHED,
-        t_stop=float("nan") if result.t_stop is None else result.t_stop,
+        t_stop=math.nan if result.t_stop is None else result.t_stop,
         counters=result.counters,
         compile=result.compile,
         timing=timing,
         trajectories=result.trajectories,
-        laws=result.laws,
-        reversal=result.reversal.why if result.reversal.value is None else result.reversal.value,
         peak_gib=result.peak_gib,
-        **arrays,
+        reversal=_reversal(problem, result, series),
+        extra=_named(series, "extra."),
     )
+    # an overflow is a result here: it becomes a sentence in the metrics
+    with np.errstate(all="ignore"):
+        of_all = {
+            "distance": largest_distance(problem, positions(problem, y)),
+            "guards": {name: np.asarray(v, float) for name, v in problem.guards(y, t).items()},
+        }
+        if ensemble is not None:
+            return replace(made, **of_all, **_of_ensemble(problem, ensemble, series))
+        errors = {name: np.asarray(values, float) for name, values in problem.errors(y, t).items()}
+        position_t, position, phase = _position_error(problem, t, y, reference)
+    return replace(
+        made,
+        **of_all,
+        errors=errors,
+        position_t=position_t,
+        position=position,
+        phase=phase,
+        drift=_drift(problem, series),
+    )
+
+
+def with_laws(measured: Measured, asked: Checks) -> Measured:
+    """Return what was measured with the law of each invariant's drift, where a campaign asks for them."""
+    if not asked.starts:
+        return measured
+    if not measured.complete:
+        law = Law(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
+        return replace(measured, laws=dict.fromkeys(measured.problem.system.invariant_names, law))
+    rows = {name: values for name, values in measured.drift.items() if name != "t"}
+    found = {
+        name: drift.fit(measured.drift["t"], values, signed=name == "energy")
+        if values.shape[1]
+        else Law(why="no samples")
+        for name, values in rows.items()
+    }
+    return replace(measured, laws=found)
+
+
+def _named(series: Series, prefix: str) -> Series:
+    return {name.removeprefix(prefix): v for name, v in series.items() if name.startswith(prefix)}
+
+
+def _reversal(problem: Problem, result: Result, series: Series) -> float | str:
+    if "reversal.y" not in series:
+        return result.reversal.why
+    with np.errstate(all="ignore"):
+        return float(largest_distance(problem, positions(problem, series["reversal.y"] - problem.y0))[0])
+
+
+def _drift(problem: Problem, series: Series) -> Series:
+    """Return the errors that a law is found from, shape (starts, n), and their times since the start."""
+    if "starts.y0" not in series:
+        return _named(series, "drift.")  # of an archive, which has these errors instead of the states
+    t = np.abs(series["t"] - problem.t0)
+    starts = [problem.y0, *series["starts.y0"]]
+    states = [series["y"], *series["starts.y"]]
+    each = [_signed(problem, start, series["t"], y) for start, y in zip(starts, states, strict=True)]
+    errors = {name: np.stack([one[name] for one in each])[:, t > 0.0] for name in each[0]}
+    return {"t": t[t > 0.0], **errors} if errors else {}
+
+
+def _signed(problem: Problem, start: Array, t: Array, y: Array) -> Series:
+    """Return the errors against the values at ``start``, the energy's with their sign, shape (n,) each."""
+    found: Series = {}
+    states = np.ascontiguousarray(np.vstack([start[None], y]).T)
+    times = np.concatenate([[problem.t0], t])
+    for name in problem.system.invariant_names:
+        function = problem.system.function(f"invariant:{name}")
+        values = invariants.evaluate(function, times, states, problem.par)
+        gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])
+        size = float(np.linalg.norm([v.hi[0] for v in values])) or 1.0
+        found[name] = (gaps[0] if name == "energy" else np.linalg.norm(gaps, axis=0)) / size
+    return found
+
+
+def _of_ensemble(problem: Problem, ensemble: Ensemble, series: Series) -> dict[str, Any]:
+    """Return what differs of an ensemble: each trajectory's errors are against its own start."""
+    starts, par = members(problem, ensemble)
+    errors: Series = {}
+    for name in problem.system.invariant_names:
+        function = problem.system.function(f"invariant:{name}")
+        before = invariants.evaluate(function, problem.t0, np.ascontiguousarray(starts.T), par.T)
+        after = invariants.evaluate(function, problem.t_end, np.ascontiguousarray(series["y"].T), par.T)
+        gaps = np.stack([(a - b).rounded() for a, b in zip(after, before, strict=True)])
+        size = np.linalg.norm(np.stack([b.hi for b in before]), axis=0)
+        errors[name] = np.linalg.norm(gaps, axis=0) / np.where(size == 0.0, 1.0, size)
+    if "witness.index" not in series:
+        return {"errors": errors}
+    high, low = series["witness.high"], series["witness.low"]
+    gap = (series["y"][series["witness.index"].astype(int)] - high) - low
+    t = np.full(len(gap), problem.t_end)
+    return {
+        "errors": errors,
+        "position_t": t,
+        "position": np.sort(position_error(problem, gap, high)),  # the last is the largest
+        "phase": np.sort(np.abs(ahead(problem, t, high, gap))),
+        "reference": Reference(t, high, low, {}),
+    }
 
 
 def positions(problem: Problem, y: Array) -> Array:

@@ -4,7 +4,7 @@ A metric is a function from what was measured to a number, or to the sentence th
 none. Its docstring is what readers are told of it; a new metric is a function here.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,7 +18,6 @@ from problems.errors import unknown
 
 PLANETOID_Z = 8  # component of Sitnikov's state
 LOADED = "another case had loaded it; the timing pass measures it"
-TIMING_KEYS = ("warm_seconds", "throughput", "compile_seconds", "compile_cold", "compile_cached")
 
 Quantity = Callable[[Measured], float | str]
 
@@ -69,10 +68,11 @@ def guard_violation(measured: Measured) -> str:
     return ""
 
 
-def evaluate(measured: Measured, keys: Iterable[str] | None = None) -> dict[str, Value]:
-    """Return these metrics of a case by key; by default all that apply to its problem."""
-    chosen = METRICS.values() if keys is None else (find(key) for key in keys)
-    return {m.key: _value(m, measured) for m in chosen if m.problem in (None, measured.problem.name)}
+def evaluate(measured: Measured) -> dict[str, Value]:
+    """Return the metrics of a case that apply to its problem, by key."""
+    return {
+        m.key: _value(m, measured) for m in METRICS.values() if m.problem in (None, measured.problem.name)
+    }
 
 
 def _value(metric: Metric, measured: Measured) -> Value:

@@ -1,63 +1,102 @@
-"""Metrics of stored cases: evaluated from the series when read, and kept until their rule changes."""
+"""What is read off the stored integrations: errors, laws and metrics, pure functions of what is in the store.
 
+A reading is kept beside the records, in ``readings/``, until the record, its reference, or a source that
+makes it changes; a change makes it anew and runs no integration.
+"""
+
+import hashlib
 from contextlib import suppress
 from functools import cache
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from hbvm_bench.campaign.identity import digest_of, make_problem
-from hbvm_bench.measure import metrics
-from hbvm_bench.measure.measured import restore
+from hbvm_bench.measure import measured, metrics
+from hbvm_bench.measure.measured import Measured, Series
 from hbvm_bench.reference import solutions
-from hbvm_bench.store.records import Record
+from hbvm_bench.store.records import Reading, Record
 from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError
 
 
 def records(store: Store) -> list[Record]:
-    """Return the records of a run as `Store.records` does, all with the metrics of today.
-
-    Those that an earlier rule evaluated are evaluated again from their series, and written where
-    no run is writing, so that this is done once.
+    """Return the records of a run as `Store.records` does, with what is read off them.
 
     Raises
     ------
     problems.errors.InputError
         If the directory holds no run.
     """
-    read = store.records()
-    stale = {record.id for record in read if _is_stale(record)}
-    if not stale:
-        return read
-    made = {record.id: evaluated(record, store.series(record.id)) for record in read if record.id in stale}
-    with suppress(InputError, OSError), store.locked():  # else the next reader evaluates them again
-        for key in stale:
-            stored = store.load(key)
-            if stored is not None and _is_stale(stored):  # with the words of its own time
-                store.save(msgspec.structs.replace(made[key], case=stored.case))
-    return [made.get(record.id, record) for record in read]
+    return [kept(store, record) for record in store.records()]
 
 
-def evaluated(record: Record, series: dict[str, NDArray[np.float64]]) -> Record:
-    """Return a record with its metrics, and where its trajectory is another one than was asked for."""
-    problem = make_problem(record.case.problem)
-    if record.result.outcome not in ("ok", "stalled") or damage(record, series, problem.system.dim):
+def kept(store: Store, record: Record) -> Record:
+    """Return a record of a store with its reading: the one that is kept, or a new one, which is then kept."""
+    if record.result.outcome not in ("ok", "stalled") or record.result.metrics:
         return record
-    measured = restore(problem, series, record.result, solutions.find(problem), record.timing)
-    result = msgspec.structs.replace(
-        record.result, metrics=metrics.evaluate(measured), violation=metrics.guard_violation(measured)
+    reading = store.reading(record.id)
+    try:
+        reference = solutions.digest(make_problem(record.case.problem))
+    except InputError:  # of a plugin that is not here
+        return record if reading is None else with_reading(record, reading)
+    content = msgspec.json.encode([rule(), reference, record.id, record.finished, record.timing])
+    by = hashlib.sha256(content).hexdigest()
+    if reading is None or reading.by != by:
+        made = read(record, store.series(record.id))
+        reading = Reading(
+            metrics=made.result.metrics, violation=made.result.violation, laws=made.result.laws, by=by
+        )
+        with suppress(InputError, OSError):  # where nothing can be written it is read again next time
+            store.keep_reading(record.id, reading)
+    return with_reading(record, reading)
+
+
+def read(record: Record, series: Series) -> Record:
+    """Return a record with its laws, its metrics, and whether its trajectory is another than asked for."""
+    found = of(record, series)
+    if found is None:
+        return record
+    found = measured.with_laws(found, record.case.checks)
+    reading = Reading(
+        metrics=metrics.evaluate(found), violation=metrics.guard_violation(found), laws=found.laws
     )
-    return msgspec.structs.replace(record, result=result, evaluated_by=rule())
+    return with_reading(record, reading)
+
+
+def of(record: Record, series: Series) -> Measured | None:
+    """Return what is measured on a case, without laws; ``None`` where it has no trajectory.
+
+    A case that was read by an earlier version, which kept too little to read it again, has none either.
+    """
+    problem = make_problem(record.case.problem)
+    unusable = record.result.outcome not in ("ok", "stalled") or damage(record, series, problem.system.dim)
+    if unusable or is_read(series):
+        return None
+    known = solutions.find(problem)
+    asked = record.case.ensemble
+    return measured.measure(problem, record.result, series, known, record.timing, ensemble=asked)
+
+
+def drawn(record: Record, series: Series) -> Series:
+    """Return the series that figures are drawn from: errors, distances and positions beside the states."""
+    found = of(record, series)
+    return series if found is None else found.series()
+
+
+def is_read(series: Series) -> bool:
+    """Whether these series are a reading of an earlier version, and not what a worker returned."""
+    return "distance" in series
+
+
+def with_reading(record: Record, reading: Reading) -> Record:
+    """Return a record with a reading in the place of its own."""
+    result = msgspec.structs.replace(
+        record.result, metrics=reading.metrics, violation=reading.violation, laws=reading.laws
+    )
+    return msgspec.structs.replace(record, result=result)
 
 
 @cache
 def rule() -> str:
-    """Return the digest of the sources that make metrics of series."""
+    """Return the digest of the sources that make readings of series."""
     return digest_of((metrics.__name__,))
-
-
-def _is_stale(record: Record) -> bool:
-    # without a digest it is a record of an earlier version, which kept too little to evaluate it again
-    return record.evaluated_by not in ("", rule())

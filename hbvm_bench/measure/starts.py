@@ -51,6 +51,13 @@ def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
     return problem.y0 * (1.0 + asked.spread * x[:, : system.dim]), par
 
 
+def changed(problem: Problem, start: Array, par: Array, t_end: float) -> Problem:
+    """Return a problem with another start, other parameters and another end."""
+    values = problem.system.unpack(par)
+    parameters = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()}
+    return Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=t_end)
+
+
 def _evenly(count: int, dim: int) -> Array:
     """Return ``count`` points that fill [-1, 1]^dim evenly; the first is 0."""
     root = 1.5

@@ -163,7 +163,7 @@ def _read(record: Record, store: Store) -> tuple[Record, Series]:
     series = store.series(record.id)
     why = damage(record, series, make_problem(record.case.problem).system.dim)
     if not why:
-        return record, series
+        return record, reading.drawn(record, series)
     said = f"its series in the store are damaged ({why}): not drawn"
     note = "; ".join(text for text in (record.case.note, said) if text)
     return replace(record, case=replace(record.case, note=note)), {}

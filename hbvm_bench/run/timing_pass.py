@@ -10,10 +10,7 @@ from msgspec.structs import replace
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
-from hbvm_bench.measure import machine
-from hbvm_bench.measure import measured as measure
-from hbvm_bench.measure.metrics import TIMING_KEYS, evaluate
-from hbvm_bench.reference import solutions
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.run.task import decoded, start
 from hbvm_bench.run.worker import REPLY, Request
 from hbvm_bench.store.records import Record, Timing
@@ -59,7 +56,8 @@ def time_cases(
     failed: set[str] = set()  # in this pass; the next one tries them again
     with machine.leaving_a_core() as core:
         for number, group in _missing(cases, store, plan, here):
-            records = [record for one in group if (record := store.load(one.id)) is not None]
+            loaded = [record for one in group if (record := store.load(one.id)) is not None]
+            records = [reading.kept(store, record) for record in loaded]
             if len(records) < len(group) or group[0].id in failed:
                 continue
             tell(number, group[0])
@@ -67,17 +65,23 @@ def time_cases(
                 timings = _together(group, records, plan, limits, core, here)
             else:
                 (made,) = _asked(group, plan, limits, core)
-                before = _timing_of(records[0], here)
-                rounds = [*before.rounds, *made.rounds]
-                timings = [Timing(rounds=rounds, why=made.why, machine=before.machine)]
+                before = _timing_of(records[0], plan, here)
+                timings = [replace(before, rounds=[*before.rounds, *made.rounds], why=made.why)]
                 failed |= {group[0].id} if made.why else set()
-            for one, record, timing in zip(group, records, timings, strict=True):
-                store.save(_with_timing(store, record, one, timing))
+            for record, timing in zip(loaded, timings, strict=True):
+                store.save(replace(record, timing=timing))
 
 
 def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> list[str]:
     """Return the ids that `time_cases` has to visit, each as often as it does, at most."""
     return [group[0].id for _, group in _missing(cases, store, plan, machine.describe())]
+
+
+def outdated(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:
+    """Return how many cases have times that were taken by another plan, or do not say by which."""
+    records = (store.load(one.id) for one in cases)
+    timings = [record.timing for record in records if record is not None and record.timing is not None]
+    return sum(bool(timing.rounds) and timing.plan != plan for timing in timings)
 
 
 def timeable(record: Record) -> bool:
@@ -96,7 +100,7 @@ def _missing(
     loaded = ((one, store.load(one.id)) for one in cases)
     known = [(one, record) for one, record in loaded if record is not None and timeable(record)]
     if not plan.interleaved:
-        taken = {one.id: len(_timing_of(record, here).rounds) for one, record in known}
+        taken = {one.id: len(_timing_of(record, plan, here).rounds) for one, record in known}
         rounds = range(plan.rounds)
         return [(number, [one]) for number in rounds for one, _ in known if taken[one.id] <= number]
     groups: dict[object, list[tuple[Resolved, Record]]] = {}
@@ -110,8 +114,8 @@ def _missing(
 
 
 def _is_timed(group: Sequence[Record], plan: TimingPlan, here: Machine) -> bool:
-    """Whether one process has timed all cases of a problem in turn, on this machine."""
-    timings = [one.timing for one in group if one.timing and machine.same(one.timing.machine, here)]
+    """Whether one process has timed all cases of a problem in turn, by this plan and on this machine."""
+    timings = [one.timing for one in group if one.timing and _stands(one.timing, plan, here)]
     processes = {timing.process for timing in timings}
     enough = any(len(timing.rounds) >= plan.rounds for timing in timings)
     return len(timings) == len(group) and len(processes) == 1 and "" not in processes and enough
@@ -135,7 +139,7 @@ def _together(
     )
     made = zip((one.id for one in on), _asked(on, plan, together, core), strict=True) if on else ()
     timings = {one.id: Timing(why=OFF) for one in group} | dict(made)
-    return [replace(timing, machine=here, process=process) for timing in timings.values()]
+    return [replace(one, plan=plan, machine=here, process=process) for one in timings.values()]
 
 
 def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None) -> list[Timing]:
@@ -150,18 +154,15 @@ def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: in
     return [Timing(why=f"not timed: {ENDINGS.get(ended.cause, ended.words)}")] * len(cases)
 
 
-def _timing_of(record: Record, here: Machine) -> Timing:
-    """Return what was timed on this machine; seconds of another one are no rounds of the same pass.
+def _timing_of(record: Record, plan: TimingPlan, here: Machine) -> Timing:
+    """Return what was timed by this plan and on this machine; other seconds are no rounds of the same pass.
 
     Why a round failed is forgotten: it is tried again.
     """
-    if record.timing is None or (record.timing.machine and not machine.same(record.timing.machine, here)):
-        return Timing(machine=here)
+    if record.timing is None or not _stands(record.timing, plan, here):
+        return Timing(plan=plan, machine=here)
     return replace(record.timing, why="")
 
 
-def _with_timing(store: Store, record: Record, resolved: Resolved, timing: Timing) -> Record:
-    known = solutions.find(resolved.problem)
-    measured = measure.restore(resolved.problem, store.series(record.id), record.result, known, timing)
-    metrics = record.result.metrics | evaluate(measured, TIMING_KEYS)
-    return replace(record, result=replace(record.result, metrics=metrics), timing=timing)
+def _stands(timing: Timing, plan: TimingPlan, here: Machine) -> bool:
+    return timing.plan == plan and machine.same(timing.machine, here)

@@ -14,7 +14,6 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -24,14 +23,11 @@ import numpy as np
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
-from hbvm_bench.measure import ensemble, timing
-from hbvm_bench.measure.checks import check
-from hbvm_bench.measure.measured import Measured, measure
-from hbvm_bench.measure.solve import solve, solve_with_bare_end
+from hbvm_bench.measure import batch, ensemble, raw, timing
+from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import Run, Timeable
-from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic
-from hbvm_bench.store.records import Result, Timing, Value
+from hbvm_bench.store.records import Result, Timing
 from hbvm_bench.store.store import NAME, encode_series
 from integrators.protocol import Program, Status
 from integrators.solution import Solution
@@ -141,8 +137,8 @@ def _measure(request: Request, directory: Path) -> Result:
         program = _compiled(resolved)
         (directory / COMPILED).touch()
         if (asked := resolved.case.ensemble) is not None:
-            return _stored(directory, *ensemble.measure(resolved.problem, program, asked))
-        integrate = solve_with_bare_end if resolved.case.grid.own_steps else solve
+            return _stored(directory, *raw.ensemble(resolved.problem, program, asked))
+        integrate = raw.solve_with_bare_end if resolved.case.grid.own_steps else raw.solve
         solution = integrate(resolved.problem, resolved.method, program, grid)
     except OSError as error:
         if error.errno in DISK:
@@ -156,38 +152,19 @@ def _measure(request: Request, directory: Path) -> Result:
         return Result(outcome="crashed", reason=f"{type(error).__name__}: {error}")
     if wrong := _garbage(solution, grid):
         return Result(outcome="crashed", reason=wrong, status=solution.status.value)
-    measured = measure(solution, solutions.find(resolved.problem))
+    result, series = raw.of_solution(solution)
     try:
-        measured = check(measured, resolved.method, program, resolved.case.checks)
+        reversal, more = raw.beside(solution, program, resolved.case.checks)
     except Exception as error:
         traceback.print_exc()
         return Result(outcome="crashed", reason=f"in a check, {type(error).__name__}: {error}")
-    return _stored(directory, measured, solution.status, solution.reason, solution.warnings)
+    return _stored(directory, msgspec.structs.replace(result, reversal=reversal), series | more)
 
 
-def _stored(
-    directory: Path, measured: Measured, status: Status, reason: str, said: Sequence[str] = ()
-) -> Result:
+def _stored(directory: Path, result: Result, series: Series) -> Result:
     with atomic(directory / "series.npz") as temporary:
-        temporary.write_bytes(encode_series(measured.series()))
-    return Result(
-        outcome="stalled" if status is Status.STALLED else "ok",
-        status=status.value,
-        reason=reason,
-        t_stop=measured.t_stop if np.isfinite(measured.t_stop) else None,
-        counters=measured.counters,
-        compile=measured.compile,
-        laws=measured.laws,
-        trajectories=measured.trajectories,
-        warnings=list(said),
-        reversal=_value(measured.reversal),
-    )
-
-
-def _value(number: float | str) -> Value:
-    if isinstance(number, str):
-        return Value(why=number)
-    return Value(value=number) if np.isfinite(number) else Value(why="not finite")
+        temporary.write_bytes(encode_series(series))
+    return result
 
 
 def _peak_gib(parent: int, found: Found) -> float:
@@ -229,7 +206,7 @@ def _compiled(resolved: Resolved) -> Program:
     problem = resolved.problem
     program = resolved.method.compile(problem.system)
     if resolved.case.ensemble is not None and hasattr(program, "prepare_batch"):
-        ensemble.prepared(program, problem.y0[None], problem)
+        batch.prepared(program, problem.y0[None], problem)
     return program
 
 

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from hbvm_bench.campaign.entries import Limits, Role
+from hbvm_bench.campaign.entries import Limits, Role, TimingPlan
 from hbvm_bench.campaign.file import Case
 from problems.errors import printable
 
@@ -148,6 +148,8 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
         Round by round.
     why : str
         Why there are none, or fewer than planned.
+    plan : TimingPlan or None
+        Under which rules; ``None`` where an earlier version took them, and did not say.
     machine : dict
         Where all the rounds were taken; the case may have been measured on another one.
     process : str
@@ -161,6 +163,7 @@ class Timing(msgspec.Struct, frozen=True, kw_only=True):
 
     rounds: list[TimingRound] = []
     why: str = ""
+    plan: TimingPlan | None = None
     machine: dict[str, str | int] = {}
     process: str = ""
     call: float | None = None
@@ -264,18 +267,18 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         One sentence where something did not go as asked.
     t_stop : float or None
         Where the integration stopped.
-    violation : str
-        Where a symmetry guard says that this is another trajectory than the one asked for.
-    counters, metrics, compile
-        What was measured; the metrics are of the series, see `hbvm_bench.measure.reading`.
+    counters, compile
+        What the integration cost.
+    metrics, laws, violation
+        What is read off the series: metrics, how the error of each invariant grows, and where a symmetry
+        guard says that this is another trajectory than the one asked for. Empty as a worker returns it and
+        as the store keeps it; `hbvm_bench.measure.reading` fills them.
     warnings : list of str
         What the solution says of itself although it did not fail.
     reversal : Value
-        Distance from the start after integrating there and back.
+        Why there is no way back; without a reason the series have where it arrived.
     peak_gib : float or None
         Largest resident memory of the process.
-    laws : dict of Law
-        By invariant, where the campaign asks for them.
     trajectories : int
         More than one for an ensemble.
     """
@@ -293,6 +296,21 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     warnings: list[str] = []
     reversal: Value = Value(why="not asked for")
     peak_gib: float | None = None
+
+
+class Reading(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What was read off the series of a case; see `Result` for the first three.
+
+    Attributes
+    ----------
+    by : str
+        Digest of all that it depends on; see `hbvm_bench.measure.reading`.
+    """
+
+    metrics: dict[str, Value] = {}
+    violation: str = ""
+    laws: dict[str, Law] = {}
+    by: str = ""
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -318,8 +336,6 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
         The end of what the process printed, where it crashed.
     versions, machine, finished
         Where and when it was measured.
-    evaluated_by : str
-        Digest of the sources that made the metrics; see `hbvm_bench.measure.reading`.
     """
 
     id: str
@@ -336,7 +352,6 @@ class Record(msgspec.Struct, frozen=True, kw_only=True):
     versions: dict[str, str] = {}
     machine: dict[str, str | int] = {}
     finished: str = ""
-    evaluated_by: str = ""
     schema: int = SCHEMA
 
     def __post_init__(self) -> None:

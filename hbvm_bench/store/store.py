@@ -4,7 +4,8 @@
 
     DIR/campaign.json        what was asked for: the campaign and the ids of its cases
     DIR/cases/<id>.json      one record per case
-    DIR/cases/<id>.npz       its series
+    DIR/cases/<id>.npz       its series, as the integration gave them; see `hbvm_bench.measure.raw`
+    DIR/readings/<id>.json   what was read off them last; see `hbvm_bench.measure.reading`
     DIR/problems/<name>.json what is known of a problem that does not come with the package, or its reference
 
 A file is complete or not there, so that the store is also the cache: a rerun
@@ -36,16 +37,17 @@ from hbvm_bench.campaign.identity import make_method, make_problem, of_method
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic, ensure_writable, write_json
-from hbvm_bench.store.records import SCHEMA, Outcome, Record, Result, decoded
+from hbvm_bench.store.records import SCHEMA, Outcome, Reading, Record, Result, decoded
 from problems import limits
 from problems.errors import InputError
 
 INDEX = "campaign.json"
 CASES = "cases"
+READINGS = "readings"
 PROBLEMS = "problems"
 NAME_LENGTH = 24  # of the 64 digits of an id; 96 bits
 NAME = re.compile(r"\w[\w .-]{0,99}")
-SERIES = ("t", "y", "distance", "position_t", "position", "phase")  # every trajectory has them
+SERIES = ("t", "y")  # every trajectory has them
 FORGOTTEN = 3600.0  # seconds after which a half-written file has nobody who writes it
 
 
@@ -161,6 +163,20 @@ class Store:
         except OSError:
             return b""
 
+    def reading(self, case_id: str) -> Reading | None:
+        """Return what was read off a case last, or ``None``."""
+        try:
+            return decoded(self._reading_path(case_id).read_bytes(), Reading)
+        except (OSError, ValueError):
+            return None
+
+    def keep_reading(self, case_id: str, reading: Reading) -> None:
+        """Store what was read off a case; it is made again from the series where it is lost."""
+        path = self._reading_path(case_id)
+        path.parent.mkdir(exist_ok=True)
+        with atomic(path) as temporary:
+            temporary.write_bytes(msgspec.json.encode(reading))
+
     def write_index(self, index: Index) -> None:
         """Store what the run was asked to do, and its problems where they do not come with the package."""
         for text in dict.fromkeys(case.problem for _, case in index.listed()):
@@ -257,6 +273,9 @@ class Store:
     def _record_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.json"
 
+    def _reading_path(self, case_id: str) -> Path:
+        return self.directory / READINGS / f"{case_id[:NAME_LENGTH]}.json"
+
     def _series_path(self, case_id: str) -> Path:
         return self.cases / f"{case_id[:NAME_LENGTH]}.npz"
 
@@ -322,9 +341,24 @@ def damage(record: Record, series: Mapping[str, NDArray[np.float64]], dim: int) 
         return f"there is no {absent[0]}"
     t, y = series["t"], series["y"]
     lengths = {name: t.size for name in series if name.startswith(("distance", "error.", "guard."))}
-    lengths |= dict.fromkeys(("position", "phase"), series["position_t"].size)
+    if "position_t" in series:  # of an earlier version, as is the distance
+        lengths |= dict.fromkeys(("position", "phase"), series["position_t"].size)
     if t.ndim != 1 or y.shape != (t.size, dim):
         return f"t has the shape {t.shape} and y {y.shape}"
+    if "starts.y0" in series and series["starts.y0"].shape[1:] != (dim,):
+        return f"its further starts have the shape {series['starts.y0'].shape}"
+    states = (len(series.get("starts.y0", ())), t.size, dim)
+    if "starts.y0" in series and getattr(series.get("starts.y"), "shape", ()) != states:
+        return "the states of its further starts do not belong to its times"
+    if "reversal.y" in series and series["reversal.y"].shape != (1, dim):
+        return f"its way back ends in the shape {series['reversal.y'].shape}"
+    witnesses = series.get("witness.index", np.empty(0))
+    if not np.all((witnesses >= 0) & (witnesses < t.size)) or any(
+        getattr(series.get(f"witness.{part}"), "shape", ()) != (witnesses.size, dim)
+        for part in ("high", "low")
+        if witnesses.size
+    ):
+        return "its witnesses are not among its trajectories"
     if wrong := [name for name, length in lengths.items() if series[name].shape != (length,)]:
         return f"{wrong[0]} has the shape {series[wrong[0]].shape}, beside {lengths[wrong[0]]} times"
     if drifts := [name for name in series if name.startswith("drift.")]:

@@ -107,7 +107,7 @@ def read(directory: Path) -> Endurance:
     """
     store = Store(directory)
     run = kept.of(store, NAME, reading.records(store))
-    series = {one.case.method: store.series(one.id) for one in run.records}
+    series = {one.case.method: reading.drawn(one, store.series(one.id)) for one in run.records}
     times = [one["drift.t"] for one in series.values() if "drift.t" in one]
     return Endurance(
         run,

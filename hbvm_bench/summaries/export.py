@@ -129,6 +129,7 @@ def _series(record: Record, store: Store) -> Iterator[Row]:
     if why := damage(record, series, make_problem(record.case.problem).system.dim):
         yield (*_key(record), f"damaged: {why}", None, None, None, None)
         return
+    series = reading.drawn(record, series)
     for name, values in series.items():
         times = series["position_t" if name.startswith(("position", "phase")) else "t"]
         for i, parts in enumerate(values):

@@ -18,11 +18,10 @@ import problems
 from hbvm_bench import cli
 from hbvm_bench.campaign.file import Campaign, Case, Limits, MethodEntry
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.measure.measured import measure
-from hbvm_bench.measure.metrics import evaluate
+from hbvm_bench.measure import raw
 from hbvm_bench.run.loop import is_kept
 from hbvm_bench.store.files import write_all
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
+from hbvm_bench.store.records import Compile, Record, Timing, TimingRound
 from hbvm_bench.store.store import NAME_LENGTH, Index, Store, decode_series, encode_series
 from integrators.protocol import Stats, Status
 from integrators.solution import Solution
@@ -46,15 +45,14 @@ def small_run(directory, methods):
             t=t, y=y, status=Status.FINISHED, reason="", t_stop=5.0, stats=Stats(steps=20),
             compile_seconds=0.1, from_cache=False, problem=problem, method=resolved.method,
         )  # fmt: skip
-        measured = measure(solution, None)
-        result = Result(outcome="ok", status="finished", t_stop=5.0, metrics=evaluate(measured))
+        result, series = raw.of_solution(solution)
         compiled = Compile(seconds=0.1, cached=True)
         timing = Timing(rounds=[TimingRound(samples=[0.1, 0.2], repeats=1, compile=compiled)])
         record = Record(
             id=resolved.id, case=resolved.case, role="ours", library="hbvm-bench", order=4, result=result,
             timing=timing, finished="2026-11-21T10:00:00+00:00",
         )  # fmt: skip
-        store.save(record, measured.series())
+        store.save(record, series)
         ids.append(resolved.id)
     campaign = Campaign(name="x", problems=[PROBLEM], methods=[MethodEntry(use=m) for m in methods])
     store.write_index(Index(campaign=campaign, ids=ids, version="0", command="hbvm-bench run x"))
@@ -88,6 +86,10 @@ SERIES = [
     Damage("t all NaN", put(t=np.full(41, np.nan)), "do not go one way"),
     Damage("t back and forth", put(t=np.tile([0.0, 1.0], 21)[:41]), "do not go one way"),
     Damage("a number for all times", put(t=np.array(1.0)), r"t has the shape \(1,\)"),
+    Damage("starts of another problem", put(**{"starts.y0": np.ones((2, 3))}), r"starts have the shape"),
+    Damage("starts without states", put(**{"starts.y0": np.ones((2, 2))}), "further starts do not belong"),
+    Damage("a way back of another problem", put(**{"reversal.y": np.ones((1, 3))}), "way back"),
+    Damage("a witness beyond the end", put(**{"witness.index": np.array([41.0])}), "witnesses"),
     Damage("drift without times", put(**{"drift.energy": np.ones((2, 7))}), "drift"),
     Damage("steps without times", put(**{"extra.dt_history": np.ones(4)}), "step sizes"),
     Damage(

@@ -6,6 +6,7 @@ import pytest
 
 import integrators.registry
 from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.measure import reading
 from hbvm_bench.run.task import execute, task_of
 from hbvm_bench.store.records import Record, decoded
 from hbvm_bench.store.store import Store
@@ -57,8 +58,9 @@ def toys(toy_path, monkeypatch):
 
 
 def run_case(case, directory, limits):
-    """Measure one case in a process of its own and store it."""
+    """Integrate one case in a process of its own, store it, and return it with what is read off it."""
     record, series = execute(task_of(resolve(case), limits))
     made = decoded(record, Record)
-    Store(Path(directory)).save(made, series or None)
-    return made
+    store = Store(Path(directory))
+    store.save(made, series or None)
+    return reading.kept(store, made)

@@ -11,7 +11,7 @@ import pytest
 
 from hbvm_bench.campaign import identity
 from hbvm_bench.campaign.file import Case
-from hbvm_bench.campaign.identity import BOOKKEEPING, measures, resolve, sources
+from hbvm_bench.campaign.identity import BOOKKEEPING, INTEGRATES, resolve, sources
 from problems.catalogue import kepler
 
 ROOT = Path(identity.__file__).parents[2]
@@ -27,7 +27,7 @@ ours = [name for name in sys.modules if name.partition(".")[0] in packages]
 print(*(name for name in ours if sys.modules[name].__spec__))  # a former name has none
 """
 # A worker loads them and no number comes from them: what keeps the digests, and what
-# `import integrators` brings, since the bench takes its steps by `hbvm_bench.measure.solve`.
+# `import integrators` brings, since the bench takes its steps by `hbvm_bench.measure.raw`.
 NOT_ASKED = {
     *("hbvm_bench.run.worker", "integrators.kernel.native.store"),
     *(
@@ -38,6 +38,8 @@ NOT_ASKED = {
         "problems.deprecated",
         "integrators.running.watch",
     ),
+    # what takes times, and no case is integrated by
+    *("hbvm_bench.measure.ensemble", "hbvm_bench.measure.timing"),
     # which many trajectories may be asked for, and a case is not
     *("integrators.events", *(f"integrators.events.{name}" for name in ("event", "finder", "members"))),
 }
@@ -49,7 +51,7 @@ NOT_ASKED = {
 def test_nothing_that_a_worker_loads_is_left_out(method, module):
     command = [sys.executable, "-c", LOADED.format(method=method)]
     loaded = set(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
-    kept = set(sources([*measures(), module, "problems.catalogue.kepler"]))
+    kept = set(sources([INTEGRATES, module, "problems.catalogue.kepler"]))
     said = {name for name in loaded if name.startswith(BOOKKEEPING)}
     assert {"hbvm_bench.campaign.identity", "hbvm_bench.store.store", "problems.picture"} <= said
     assert not kept & said
@@ -81,9 +83,12 @@ EDITED = {
     "integrators/plugins/scipy/__init__.py": [False, False],
     "integrators/testing/rules.py": [False, False],
     "hbvm_bench/measure/metrics.py": [False, False],
-    "hbvm_bench/measure/measured.py": [True, True],
-    "hbvm_bench/measure/drift.py": [True, True],
-    "hbvm_bench/measure/timing.py": [True, True],
+    "hbvm_bench/measure/raw.py": [True, True],
+    "hbvm_bench/measure/starts.py": [True, True],
+    "hbvm_bench/measure/measured.py": [False, False],
+    "hbvm_bench/measure/drift.py": [False, False],
+    "hbvm_bench/measure/timing.py": [False, False],
+    "hbvm_bench/reference/solutions.py": [False, False],
     "hbvm_bench/store/records.py": [False, False],
     "hbvm_bench/store/store.py": [False, False],
     "hbvm_bench/campaign/file.py": [False, False],
@@ -155,7 +160,7 @@ def test_what_a_plugins_module_imports_of_its_own_package_belongs_to_it(tmp_path
     monkeypatch.delitem(sys.modules, "somebody")
 
 
-def test_another_reference_makes_a_case_stale(monkeypatch):
+def test_another_reference_makes_no_case_stale(monkeypatch):
     before = resolve(Case(problem="kepler", method=PEER)).id
-    monkeypatch.setattr("hbvm_bench.reference.solutions.digest", lambda problem: "")
-    assert resolve(Case(problem="kepler", method=PEER)).id != before
+    monkeypatch.setattr("hbvm_bench.reference.solutions.find_file", lambda problem: None)
+    assert resolve(Case(problem="kepler", method=PEER)).id == before

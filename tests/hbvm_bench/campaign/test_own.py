@@ -12,6 +12,7 @@ from hbvm_bench import cli
 from hbvm_bench.campaign import file, own
 from hbvm_bench.campaign.identity import make_problem, resolve, typed_problem
 from hbvm_bench.campaign.spec import parse_spec
+from hbvm_bench.measure import reading
 from hbvm_bench.report.campaign import document
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.store import Store
@@ -204,7 +205,7 @@ def test_a_run_has_positions_where_a_reference_was_asked_for(folder, capsys):
     printed = capsys.readouterr()
     assert "the two agree to " in printed.err
     assert "position" in printed.out.splitlines()[2]
-    [record] = Store(folder / "run").records()
+    [record] = reading.records(Store(folder / "run"))
     assert 0.0 < (record.result.metrics["position_end"].value or 0.0) < 1e-5
     assert cli.main(["run", "mine.toml", "--out", "run"]) == 0
     assert "computing" not in capsys.readouterr().err

@@ -1,27 +1,36 @@
+import msgspec
 import numpy as np
 import pytest
 
 import problems
 from hbvm_bench.campaign.file import Checks, Ensemble, TimingPlan
 from hbvm_bench.campaign.grid import Grid
-from hbvm_bench.measure import ensemble
-from hbvm_bench.measure.checks import check
-from hbvm_bench.measure.measured import measure
+from hbvm_bench.measure import raw
+from hbvm_bench.measure.ensemble import EnsembleRun
+from hbvm_bench.measure.measured import measure, with_laws
 from hbvm_bench.measure.metrics import evaluate
-from hbvm_bench.measure.solve import solve
+from hbvm_bench.measure.raw import solve
 from hbvm_bench.measure.starts import PERTURBATION, members, scaled
 from hbvm_bench.measure.timing import time_alone
 from hbvm_bench.reference.solutions import find
 from integrators import Gauss, Leapfrog
-from integrators.protocol import Status
 from problems.errors import InputError
 
 
 def measured_with(problem, method, checks, grid=None):
     program = method.compile(problem.system)
     times = (grid or Grid(count=200, spacing="log")).times(problem)
-    measured = measure(solve(problem, method, program, times), find(problem))
-    return measured, check(measured, method, program, checks)
+    solution = solve(problem, method, program, times)
+    result, series = raw.of_solution(solution)
+    reversal, more = raw.beside(solution, program, checks)
+    result = msgspec.structs.replace(result, reversal=reversal)
+    measured = measure(problem, result, series | more, find(problem))
+    return measured, with_laws(measured, checks)
+
+
+def of_ensemble(problem, program, asked):
+    result, series = raw.ensemble(problem, program, asked)
+    return measure(problem, result, series, ensemble=asked), result
 
 
 def test_scaled_starts_keep_a_symmetric_start_symmetric():
@@ -66,7 +75,7 @@ def test_the_phase_error_is_the_time_by_which_a_run_is_ahead():
     solution = solve(problem, Gauss(s=8, h=0.05), program, known.t)
     shifted = program.start(problem.y0).advance(np.append(known.t[1:] + 1e-5, problem.t_end + 1.0)).y[:-1]
     solution.y[1:] = shifted
-    measured = measure(solution, known)
+    measured = measure(problem, *raw.of_solution(solution), known)
     # 1e-5 is the shift; within 9.2e-13 of it measured
     assert np.abs(measured.phase[1:] - 1e-5).max() < 1e-10
 
@@ -84,20 +93,20 @@ def test_an_ensemble_is_measured_against_the_ends_of_its_witnesses():
     problem = problems.load("henon_heiles", energy=0.1, t_end=20.0)
     asked = Ensemble(count=40, spread=0.01)
     program = Gauss(s=8, h=0.5).compile(problem.system)
-    measured, status, reason = ensemble.measure(problem, program, asked)
-    assert status is Status.FINISHED
-    assert reason == ""
+    measured, result = of_ensemble(problem, program, asked)
+    assert measured.complete
+    assert result.reason == ""
     assert measured.y.shape == (40, 4)
-    assert measured.position.size == ensemble.WITNESSES == 32
+    assert measured.position.size == raw.WITNESSES == 32
     metrics = evaluate(measured)
     assert metrics["position_end"].value < 1e-14  # 1.6e-16 measured
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured
     assert metrics["throughput"].why == "not timed"
-    run = ensemble.EnsembleRun.of(problem, Gauss(s=8, h=0.5), program, asked)
+    run = EnsembleRun.of(problem, Gauss(s=8, h=0.5), program, asked)
     timed = time_alone(run, TimingPlan(samples=2, budget=1))
     assert len(timed.samples) == 2
     # a method without a batch path takes one after the other, to the same end
-    other, _, _ = ensemble.measure(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)
+    other, _ = of_ensemble(problem, Leapfrog(h=0.01, order=8).compile(problem.system), asked)
     assert np.abs(other.y - measured.y).max() < 1e-12  # 1.2e-14 measured
 
 
@@ -109,8 +118,8 @@ def test_parameters_of_an_ensemble_vary_by_their_names():
     assert np.array_equal(starts[0], problem.y0)
     assert np.array_equal(par[0], problem.par)
     assert np.ptp(par, axis=0).tolist() == pytest.approx([0.2, 0.4, 0.0], rel=0.3)
-    measured, status, _ = ensemble.measure(problem, Gauss(s=12, h=0.25).compile(problem.system), asked)
-    assert status is Status.FINISHED
+    measured, _ = of_ensemble(problem, Gauss(s=12, h=0.25).compile(problem.system), asked)
+    assert measured.complete
     metrics = evaluate(measured)
     assert metrics["position_end"].value < 1e-14  # 5.7e-16 measured: witnesses have their parameters
     assert metrics["energy_max"].value < 1e-14  # 3.4e-16 measured

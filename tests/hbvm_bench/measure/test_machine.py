@@ -8,6 +8,7 @@ import sys
 import msgspec
 import pytest
 
+from hbvm_bench.campaign.file import TimingPlan
 from hbvm_bench.cli import main
 from hbvm_bench.measure import machine, processor
 from hbvm_bench.report.markdown import markdown
@@ -77,12 +78,15 @@ def test_a_machine_is_itself_whatever_its_clock_says_today_and_what_older_result
     assert not machine.same(ZEN4, ZEN4 | {"ours_built_for": "AVX2"})
 
 
+PLAN = TimingPlan(rounds=2)
+
+
 def test_the_timing_pass_goes_on_where_only_the_clock_differs():
     class Kept:
-        timing = Timing(machine=ZEN4)
+        timing = Timing(plan=PLAN, machine=ZEN4)
 
-    assert timing_pass._timing_of(Kept, ZEN4 | {"clock_ghz": "2.6"}) == Kept.timing
-    assert timing_pass._timing_of(Kept, ZEN5) == Timing(machine=ZEN5)
+    assert timing_pass._timing_of(Kept, PLAN, ZEN4 | {"clock_ghz": "2.6"}) == Kept.timing
+    assert timing_pass._timing_of(Kept, PLAN, ZEN5) == Timing(plan=PLAN, machine=ZEN5)
 
 
 RESTRICTED = """

@@ -1,19 +1,24 @@
-"""Metrics are of the stored series: a new one, or a better word, runs nothing again."""
+"""What is read off the stored integrations is a pure function of them: another rule runs nothing again."""
 
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import Campaign, Case, Checks, Grid, Limits, MethodEntry
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.measure import metrics, reading
+from hbvm_bench.measure import drift, metrics, reading
+from hbvm_bench.reference import solutions
 from hbvm_bench.run import loop
+from hbvm_bench.store.records import Law
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries.rows import rows
 from tests.hbvm_bench.conftest import SHORT, run_case
 
 METHODS = ("Waving(h=0.3)", "Stalling()", "Cautious()")
+CHECKS = Checks(reversal=0.5, starts=3)
+LIMITS = Limits(wall_seconds=60)
 DOUBLED = replace(
     metrics.find("energy_max"),
     key="energy_doubled",
@@ -21,34 +26,47 @@ DOUBLED = replace(
 )
 
 
-@pytest.fixture
-def store(toys, tmp_path):
-    made = Store(tmp_path / "run")
+def run(directory, problem, methods, grid=None):
+    made = Store(directory)
     made.prepare()
-    cases = [
-        Case(problem=SHORT, method=method, grid=Grid(count=4), checks=Checks(reversal=0.5))
-        for method in METHODS
-    ]
-    records = [run_case(case, str(made.directory), Limits(wall_seconds=60)) for case in cases]
+    grid = grid or Grid(count=4)
+    cases = [Case(problem=problem, method=method, grid=grid, checks=CHECKS) for method in methods]
+    records = [run_case(case, str(made.directory), LIMITS) for case in cases]
     campaign = Campaign(
         name="x",
-        problems=[SHORT],
-        methods=[MethodEntry(use=method) for method in METHODS],
-        grid=Grid(count=4),
-        checks=Checks(reversal=0.5),
+        problems=[problem],
+        methods=[MethodEntry(use=method) for method in methods],
+        grid=grid,
+        checks=CHECKS,
     )
     made.write_index(Index(campaign=campaign, ids=[one.id for one in records], version="0", command=""))
     return made
 
 
 @pytest.fixture
-def another_rule(monkeypatch):
+def store(toys, tmp_path):
+    return run(tmp_path / "run", SHORT, METHODS)
+
+
+def is_complete(store):
+    """Whether a run of the same campaign would integrate nothing."""
+    return all(loop.is_kept(resolve(one.case), store, LIMITS) for one in store.records())
+
+
+def test_the_store_has_what_the_integration_gave_and_nothing_that_judges_it(store):
+    for record in store.records():
+        assert (record.result.metrics, record.result.laws, record.result.violation) == ({}, {}, "")
+        kinds = {name.partition(".")[0] for name in store.series(record.id)}
+        assert kinds <= {"t", "y", "extra", "starts", "reversal"}
+    series = store.series(store.records()[0].id)
+    assert series["starts.y"].shape == (2, *series["y"].shape)
+    assert series["reversal.y"].shape == (1, series["y"].shape[1])
+
+
+def test_a_new_metric_of_stored_cases_needs_no_run(store, monkeypatch):
+    before = reading.records(store)
     monkeypatch.setitem(metrics.METRICS, "energy_doubled", DOUBLED)
     monkeypatch.setattr(reading, "rule", lambda: "another")
-
-
-def test_a_new_metric_of_stored_cases_needs_no_run(store, another_rule):
-    before = store.records()
     now = reading.records(store)
     assert "energy_doubled" not in before[0].result.metrics
     values = now[0].result.metrics
@@ -60,27 +78,46 @@ def test_a_new_metric_of_stored_cases_needs_no_run(store, another_rule):
     ]
     assert values["reversal"].value == 0.0
     assert values["peak_memory"].value > 10
-    limits = Limits(wall_seconds=60)
-    assert all(loop.is_kept(resolve(one.case), store, limits) for one in now)
+    assert is_complete(store)
 
 
-def test_metrics_are_evaluated_once_and_kept(store, another_rule, monkeypatch):
+def test_another_reference_changes_positions_and_needs_no_run(toys, tmp_path, monkeypatch):
+    store = run(tmp_path, "sitnikov()", ["Waving(h=0.3)"], Grid(step=25.0))
+    (before,) = reading.records(store)
+    known = solutions.find_file(resolve(before.case).problem)
+    moved = msgspec.structs.replace(known, y=[["1.5" for _ in row] for row in known.y])
+    monkeypatch.setattr(solutions, "find_file", lambda problem: moved)
+    (now,) = reading.records(store)
+    assert now.result.metrics["position_end"].value != before.result.metrics["position_end"].value
+    assert now.result.metrics["energy_max"] == before.result.metrics["energy_max"]
+    assert is_complete(store)
+
+
+def test_another_law_needs_no_run(store, monkeypatch):
+    before = reading.records(store)[0].result.laws
+    assert before["energy"].starts == 3
+    monkeypatch.setattr(drift, "fit", lambda t, errors, *, signed: Law(law="linear", slope=1.0))
+    monkeypatch.setattr(reading, "rule", lambda: "another")
+    assert reading.records(store)[0].result.laws["energy"] == Law(law="linear", slope=1.0)
+    assert is_complete(store)
+
+
+def test_what_was_read_is_kept(store, monkeypatch):
     now = reading.records(store)
-    monkeypatch.setattr(reading, "evaluated", lambda *record: pytest.fail("evaluated again"))
-    assert reading.records(store) == store.records() == now
+    monkeypatch.setattr(reading, "read", lambda *record: pytest.fail("read again"))
+    assert reading.records(store) == now
 
 
-def test_while_a_run_is_writing_a_reader_writes_nothing(store, another_rule):
-    before = store.records()
-    with store.locked():
-        assert "energy_doubled" in reading.records(store)[0].result.metrics
-    assert store.records() == before
+def test_where_nothing_can_be_written_it_is_read_all_the_same(store, monkeypatch):
+    monkeypatch.setattr(Store, "keep_reading", lambda *_: (_ for _ in ()).throw(OSError("read-only")))
+    monkeypatch.setattr(reading, "rule", lambda: "another")
+    assert reading.records(store)[0].result.metrics["energy_max"].value > 0
 
 
-def test_a_record_of_an_earlier_version_is_shown_as_it_was_stored(store, another_rule):
-    (record, *_) = store.records()
-    store.save(msgspec.structs.replace(record, evaluated_by=""))
-    assert "energy_doubled" not in reading.records(store)[0].result.metrics
+def test_what_an_earlier_version_read_is_shown_as_it_was_stored(store):
+    record = reading.records(store)[0]
+    store.save(record, {"t": np.arange(2.0), "y": np.ones((2, 18)), "distance": np.ones(2)})
+    assert reading.records(store)[0] == record
 
 
 def test_what_a_solution_warns_of_is_in_its_record_and_its_row(store):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import Campaign, Ensemble, MethodEntry, TimingPlan
+from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.report import words
 from hbvm_bench.report.campaign import document
@@ -143,13 +144,13 @@ def test_void_numbers_are_in_brackets_and_in_no_summary(run, written):
     cells = [cell.strip() for cell in row.split("|")]
     assert "3.0e+00" in cells  # the guard itself
     assert sum(cell.startswith("(") for cell in cells) >= 4
-    best = [sentence for sentence in words.summary(run.records()) if sentence.startswith("Smallest")]
+    best = [sentence for sentence in words.summary(reading.records(run)) if sentence.startswith("Smallest")]
     assert "Radau" not in best[0]
     assert best[0].index("HBVM(k=16") < best[0].index("IAS15(mode")
 
 
 def test_a_peer_that_wins_is_named_first(run):
-    records = run.records()
+    records = reading.records(run)
     better = msgspec.structs.replace(
         records[2],
         result=msgspec.structs.replace(
@@ -163,7 +164,7 @@ def test_a_peer_that_wins_is_named_first(run):
 
 
 def test_our_own_weaknesses_are_said_with_their_numbers(run):
-    records = run.records()
+    records = reading.records(run)
     values = records[1].result.metrics
     worse = {"position_end": 4.7, "z_error": 1.8, "angular_momentum_max": 3.4e-3, "energy_max": 3.2e-14}
     metrics = values | {key: msgspec.structs.replace(values[key], value=v) for key, v in worse.items()}
@@ -192,7 +193,9 @@ def test_words_about_a_case_are_the_campaigns_present_ones(run):
         msgspec.structs.replace(index, campaign=msgspec.structs.replace(index.campaign, methods=renamed))
     )
     try:
-        assert {(record.case.note, record.case.settings) for record in run.records()} == {("new", "default")}
+        assert {(record.case.note, record.case.settings) for record in reading.records(run)} == {
+            ("new", "default")
+        }
     finally:
         run.write_index(index)
 
@@ -208,13 +211,13 @@ def test_a_report_without_a_finished_case_writes_nothing(tmp_path):
 
 
 def test_cases_look_different_from_each_other(run):
-    made = looks(record.case.method for record in run.records())
+    made = looks(record.case.method for record in reading.records(run))
     assert len({look.light for look in made.values()}) == len(METHODS)
     assert [look.number for look in made.values()] == list(range(1, len(METHODS) + 1))
 
 
 def test_panels_hold_all_cases_and_few_each(run):
-    records = run.records()
+    records = reading.records(run)
     grouped = panels(records * 3)
     assert sum(len(members) for _, members in grouped) == 3 * len(records)
     assert ("IAS15 · rebound" in dict(grouped)) == (
@@ -263,7 +266,7 @@ def test_the_rules_say_how_this_campaign_takes_times(plan, said, not_said):
 
 
 def test_without_a_reference_nothing_is_ranked(run):
-    record = run.records()[0]
+    record = reading.records(run)[0]
     metrics = {k: v for k, v in record.result.metrics.items() if not k.startswith("position")}
     bare = msgspec.structs.replace(record, result=msgspec.structs.replace(record.result, metrics=metrics))
     said = words.summary([bare, bare])
@@ -272,7 +275,7 @@ def test_without_a_reference_nothing_is_ranked(run):
 
 
 def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
-    record = run.records()[0]
+    record = reading.records(run)[0]
     case = msgspec.structs.replace(record.case, ensemble=Ensemble(count=100))
     record = msgspec.structs.replace(record, case=case)
     for ends, said in ((7, True), (0, False)):
@@ -296,7 +299,9 @@ def test_times_taken_on_a_busy_machine_say_so(run):
         return msgspec.structs.replace(record, timing=Timing(rounds=rounds))
 
     def said(share):
-        return [s for s in words.summary([with_share(r, share) for r in run.records()]) if "disturbed" in s]
+        return [
+            s for s in words.summary([with_share(r, share) for r in reading.records(run)]) if "disturbed" in s
+        ]
 
     assert said(0.99) == []
     assert "60% of a core" in said(0.6)[0]

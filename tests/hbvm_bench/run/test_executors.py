@@ -15,6 +15,7 @@ import pytest
 from hbvm_bench import cli
 from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.measure import reading
 from hbvm_bench.run import executors, loop
 from hbvm_bench.run.task import UnfinishedRunError, execute, task_of
 from hbvm_bench.store.store import Store
@@ -42,7 +43,7 @@ def values(store, chosen):
     """Return everything about cases that is not a matter of time and place."""
     found = {}
     for case in chosen:
-        record = store.load(case.id)
+        record = reading.kept(store, store.load(case.id))
         kept = {key: v for key, v in record.result.metrics.items() if key not in COST}
         result = msgspec.structs.replace(record.result, metrics=kept, compile=None, peak_gib=None)
         found[case.id] = (record.case, result, record.versions, store.series(case.id))

@@ -14,6 +14,7 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
 from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.measure import reading
 from hbvm_bench.run import executors, loop, supervise, timing_pass, warm
 from hbvm_bench.run import task as execute
 from hbvm_bench.store.store import Store
@@ -21,6 +22,7 @@ from tests.hbvm_bench.conftest import SHORT, run_case
 
 GENEROUS = Limits(wall_seconds=30, memory_gib=2)
 PLAN = TimingPlan(rounds=2, samples=2, shortest=1e-4, budget=1)
+TOGETHER = TimingPlan(rounds=3, shortest=1e-6, interleaved=True)
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def case(method):
 
 def run(store, method, limits=GENEROUS):
     record = run_case(case(method), str(store.directory), limits)
-    assert store.load(record.id) == record
+    assert reading.kept(store, store.load(record.id)) == record
     return record
 
 
@@ -161,22 +163,42 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
         cases, store, PLAN, GENEROUS, lambda round_, one: visits.append((round_, one.case.method))
     )
     assert visits == [(0, "Steady()"), (1, "Steady()")]
-    record = store.load(cases[0].id)
+    record = reading.kept(store, store.load(cases[0].id))
     assert [len(one.samples) for one in record.timing.rounds] == [2, 2]
     assert all(0 < one.share < 1.5 for one in record.timing.rounds)
     assert record.timing.compile.seconds == 0.25
     assert record.result.metrics["warm_seconds"].value == record.timing.summary["median"]
     assert record.result.metrics["compile_seconds"].value == 0.25
     timing_pass.time_cases(cases, store, PLAN, GENEROUS, lambda *visit: pytest.fail("timed again"))
-    more = msgspec.structs.replace(PLAN, rounds=3)
-    assert timing_pass.missing_visits(cases, store, more) == [cases[0].id]
+
+
+@pytest.mark.parametrize("plan", [PLAN, TOGETHER])
+@pytest.mark.parametrize(
+    "change",
+    [{"rounds": 1}, {"shortest": 2e-4}, {"samples": 1}, {"order": "alternating"}, {"clock": "thread"}],
+)
+def test_another_plan_takes_all_times_again_and_integrates_nothing(toys, store, plan, change):
+    one = resolve(case("Steady()"))
+    run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases([one], store, plan, GENEROUS)
+    before = store.load(one.id)
+    assert (before.timing.plan, timing_pass.outdated([one], store, plan)) == (plan, 0)
+    other = msgspec.structs.replace(plan, **change)
+    assert timing_pass.outdated([one], store, other) == 1
+    timing_pass.time_cases([one], store, other, GENEROUS)
+    now = store.load(one.id)
+    assert now.timing.plan == other
+    assert len(now.timing.rounds) == other.rounds  # none of those before stands among them
+    assert not {sample for one in now.timing.rounds for sample in one.samples} & set(before.timing.samples)
+    assert now.finished == before.finished
+    assert loop.is_kept(one, store, GENEROUS)
 
 
 def test_a_timing_that_fails_says_why(toys, store):
     one = resolve(case("Steady(wait=0.5)"))
     run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, PLAN, Limits(wall_seconds=0.1))
-    record = store.load(one.id)
+    record = reading.kept(store, store.load(one.id))
     assert record.timing.why == "not timed: the time limit"
     assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
     assert set(timing_pass.missing_visits([one], store, PLAN)) == {one.id}
@@ -184,9 +206,6 @@ def test_a_timing_that_fails_says_why(toys, store):
     timing_pass.time_cases([one], store, once, GENEROUS)
     assert store.load(one.id).timing.why == ""
     assert timing_pass.missing_visits([one], store, once) == []
-
-
-TOGETHER = TimingPlan(rounds=3, shortest=1e-6, interleaved=True)
 
 
 def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
@@ -200,7 +219,7 @@ def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
         cases, store, TOGETHER, GENEROUS, lambda round_, one: visits.append(one.case.method)
     )
     assert visits == ["Steady()"]
-    first, second, crashed, strayed = (store.load(one.id) for one in cases)
+    first, second, crashed, strayed = (reading.kept(store, store.load(one.id)) for one in cases)
     assert crashed.timing is None
     assert (strayed.timing.rounds, strayed.timing.why) == ([], timing_pass.OFF)
     assert first.timing.process == second.timing.process != ""
