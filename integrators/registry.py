@@ -39,11 +39,19 @@ def get(name: str) -> type[MethodBase]:
     ------
     problems.errors.UnknownNameError
         If there is none; the message gives the nearest names.
+    problems.errors.InputError
+        If two packages offer one of this name.
     """
     entries = _entries()
     if not isinstance(name, str) or name not in entries:
         raise unknown("method", name, entries)
-    return entries[name].load()
+    entry, *others = entries[name]
+    if others:
+        raise InputError(
+            f"two packages offer a method {name!r}: {entry.value} and {others[0].value}; "
+            "uninstall one of them, or rename one."
+        )
+    return entry.load()
 
 
 def create(name: str, **options: Any) -> MethodBase:
@@ -60,15 +68,15 @@ def create(name: str, **options: Any) -> MethodBase:
 
 
 @cache
-def _entries() -> dict[str, EntryPoint]:
+def _entries() -> dict[str, list[EntryPoint]]:
+    """Return what offers each name: one entry point, or several that clash, which only this name minds."""
     found = {
-        name: EntryPoint(name, f"{module}:{name}", GROUP) for module, own in BUILT_IN.items() for name in own
+        name: [EntryPoint(name, f"{module}:{name}", GROUP)]
+        for module, own in BUILT_IN.items()
+        for name in own
     }
     for entry in entry_points(group=GROUP):
-        other = found.setdefault(entry.name, entry)
-        if other.value != entry.value:
-            raise InputError(
-                f"two packages offer a method {entry.name!r}: {other.value} and {entry.value}; "
-                "uninstall one of them, or rename one."
-            )
+        same = found.setdefault(entry.name, [])
+        if entry.value not in [other.value for other in same]:
+            same.append(entry)
     return found

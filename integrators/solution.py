@@ -197,6 +197,8 @@ class Solution:
         if caveat is None and not kinks and implicit and implicit["steps"]:
             caveat = unseen(self.problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
         said = () if caveat is None else (caveat,)
+        if failure := self.stats.extra.get("checkpoint"):
+            said = (*said, failure)
         if not kinks:
             return said
         t, h = kinks[0]
@@ -414,6 +416,7 @@ def _stats(stored: Any) -> Stats:
     for t, h in stats.extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
         _of(float, t)
         _of(float, h)
+    _of(str, stats.extra.get("checkpoint", ""))
     _of(int, stats.extra.get("implicit", {"steps": 0})["steps"])
     return stats
 

@@ -172,6 +172,26 @@ class SciPyProgram(ProgramBase):
         return SciPyStepper(self, y, par, t)
 
 
+class _Factored:
+    """A sparse matrix with its factors, of which a copy or a file keeps the matrix: the factors follow."""
+
+    def __init__(self, matrix: Any, factors: Any):
+        self._matrix, self._factors = matrix, factors
+        self.solve = factors.solve
+
+    def __deepcopy__(self, memo: Any) -> "_Factored":
+        return self  # nothing of it ever changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _factored, (self._matrix,)
+
+
+def _factored(matrix: Any) -> _Factored:
+    from scipy.sparse.linalg import splu
+
+    return _Factored(matrix, splu(matrix))
+
+
 class SciPyStepper(StepperBase):
     """A trajectory of one of SciPy's solvers.
 
@@ -239,6 +259,11 @@ class SciPyStepper(StepperBase):
 
     def _begin(self, t: float, y: Array, sign: float) -> Any:
         solver = self._make(self._evaluate, t, y, sign * math.inf)
+        if hasattr(
+            getattr(solver, "J", None), "tocsc"
+        ):  # sparse: what it factors can be neither copied nor kept
+            factored = solver.lu
+            solver.lu = lambda matrix: _Factored(matrix, factored(matrix))
         self._note("jacobians", solver.njev)
         return solver
 

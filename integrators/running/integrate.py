@@ -78,7 +78,8 @@ def integrate(
         A file that is written every so many seconds, when the integration ends, and at Ctrl-C: what the
         continuation depends on, and the samples until then. It is always whole, whenever the process ends.
     every_seconds : float
-        Seconds from one file to the next, at least.
+        Seconds from one file to the next, at least. A file that cannot be written, as on a full disk,
+        ends nothing: the solution warns of it.
     resume : path, optional
         Go on from the checkpoint in this file, of the same problem, method, times, sampling and events: the
         solution has the same bits as without the break. If there is no such file and ``checkpoint`` is
@@ -156,6 +157,8 @@ def integrate(
     finished = samples.status is Status.FINISHED
     if isinstance(problem.system, Foreign):
         stats.extra = {**stats.extra, "field": problem.system.written}
+    if watch.failure:
+        stats.extra = {**stats.extra, "checkpoint": watch.failure}
     solution = Solution(
         t=samples.t,
         y=samples.y,
@@ -212,9 +215,14 @@ class _Way:
     def stats(self) -> Stats:
         """Counters of all the work, that before a break too."""
         now, before = replace(self._stepper.stats), self._before
+        if not before.steps:
+            return now
         for name in ("steps", "rejections", "evaluations", "iterations"):
             counts = [count for count in (getattr(now, name), getattr(before, name)) if count is not None]
             setattr(now, name, sum(counts) if counts else None)
+        names = [name for solver in (before.solver, now.solver) if solver for name in solver.split(", ")]
+        now.solver = ", ".join(dict.fromkeys(names)) or None
+        now.extra = _with_those_before(now.extra, before.extra)
         return now
 
     def save(self) -> dict[str, Any]:
@@ -269,6 +277,28 @@ class _Way:
             self._made += n if self._sample == "steps" else reached.t.size
         self._status, self._reason = reached.status, reached.reason
         self.t = float(part[-1]) if reached.status is Status.FINISHED else stepper.t
+
+
+_SETTINGS = ("k", "s")  # whole numbers in ``Stats.extra`` that count nothing
+
+
+def _with_those_before(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is told of an integration beside its counters, with what was told before a break."""
+    joined = {**before, **now}
+    for key in before.keys() & now.keys():
+        match before[key], now[key]:
+            case dict() as first, dict() as second:
+                joined[key] = _with_those_before(second, first)
+            case bool(), _:
+                pass
+            case (int() | float()) as first, (int() | float()) as second if key not in _SETTINGS:
+                joined[key] = first + second
+            case list() as first, list() as second if key == "kinks":
+                known = second[: len(first)] == first  # a stepper that was restored knows them
+                joined[key] = second if known else first + second
+            case _:
+                pass
+    return joined
 
 
 def _with_events(solution: Solution, search: Finder) -> Solution:

@@ -88,6 +88,8 @@ class Watch:
         self._began = self._written = perf_counter()
         self._first: float | None = None
         self._kept: dict[str, Any] | None = None
+        self.failure = ""
+        """Why the file could not be written, when that was tried last."""
         self.looks = report is not None or path is not None
         """Whether anybody wants to know of the way between two samples."""
 
@@ -107,13 +109,17 @@ class Watch:
             self._report(Progress(t, fraction, steps(), seconds, left))
 
     def write(self) -> None:
-        """Write the file now, if there is one and anything to keep."""
+        """Write the file now, if there is one and anything to keep; note where that cannot be done."""
         if self._path is None or self._kept is None:
             return
         kept = pickle.dumps(self._kept, protocol=5)
         head = json.dumps(self._identity).encode()
         parts = [MAGIC, head, hashlib.sha256(kept).hexdigest().encode(), kept]
-        write_whole(self._path, lambda file: file.write(b"\n".join(parts)))
+        try:
+            write_whole(self._path, lambda file: file.write(b"\n".join(parts)))
+            self.failure = ""
+        except InputError as error:  # a full disk: the solution is worth more than its checkpoint
+            self.failure = f"the last checkpoint is not of the end: {error}"
         self._written = perf_counter()
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from problems import limits
+from problems.errors import shown
 from problems.trace.stored import Shape, StoredGraph, integer, items, refuse
 
 _PARTS = {
@@ -43,7 +44,7 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
     kind = next((name for name in classes if name in _WRITTEN), "Foreign")
     canonical = kind in ("Hamiltonian", "Lagrangian")
     if (dof is not None) != canonical or (dof is not None and 2 * integer(dof, 1, dim + 1, "dof") != dim):
-        refuse(f"a {kind} has dim={dim} and dof={dof!r}")
+        refuse(f"a {kind} has dim={dim} and dof={shown(dof)}")
     parameters = state["parameters"]
     if not isinstance(parameters, Mapping) or not all(isinstance(name, str) for name in parameters):
         refuse("its parameters are no dictionary by name")

@@ -37,4 +37,4 @@ def test_a_third_partys_method_stands_beside_them(offered):
 def test_a_second_method_of_the_same_name_is_refused(offered):
     offered(HBVM="elsewhere:HBVM")
     with pytest.raises(InputError, match=r"two packages offer a method 'HBVM': .* and elsewhere:HBVM;"):
-        registry.names()
+        registry.get("HBVM")

@@ -204,7 +204,10 @@ class TaylorProgram(ProgramBase):
 
     def stepper(self, y: Array, par: Array, t: float) -> "TaylorStepper":
         """Return a trajectory."""
-        integrator = self._spare.pop() if self._spare else copy.copy(self.template)
+        try:
+            integrator = self._spare.pop()
+        except IndexError:  # there was none, or another thread has taken the last one
+            integrator = copy.copy(self.template)
         stepper = TaylorStepper(integrator, y, par, t)
         weakref.finalize(stepper, self._spare.append, integrator).atexit = False
         return stepper
