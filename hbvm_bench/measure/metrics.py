@@ -25,6 +25,9 @@ Quantity = Callable[[Measured], float | str]
 # trajectory, has not yet changed the trajectory; the row says so all the same.
 GUARD_TOLERANCE = 1e-9
 
+LOST_ENERGY = 0.5
+"""A relative error of the energy from which on nobody calls it the trajectory that was asked for."""
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -59,12 +62,15 @@ def metric(label: str, short: str, unit: str, more: str = "", **rest: Any) -> Ca
 
 
 def guard_violation(measured: Measured) -> str:
-    """Return a sentence where the trajectory left the one that was asked for, else ``""``."""
+    """Return a sentence where the symmetry or the energy that was asked for is lost, else ``""``."""
     size = float(np.max(measured.distance, initial=0.0))
     for name, values in measured.guards.items():
         worst = float(np.max(np.abs(values), initial=0.0))
         if not worst <= GUARD_TOLERANCE * size:
             return f"another trajectory: {name.replace('_', ' ')} reached {worst:.2g} instead of 0"
+    lost = float(np.max(measured.errors.get("energy", np.empty(0)), initial=0.0))
+    if measured.trajectories == 1 and lost >= LOST_ENERGY:
+        return f"another trajectory: the energy is wrong by {lost:.1g} times its size"
     return ""
 
 

@@ -24,7 +24,7 @@ from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import family_of, number
-from hbvm_bench.summaries.rows import at_once, group_of, grouped, rows
+from hbvm_bench.summaries.rows import at_once, grouped, reached, rows
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -143,7 +143,7 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
 
 def _rank(case: Drawn) -> tuple[bool, float]:
     errors = [number(case.record, key) for key in ("position_end", "energy_max")]
-    return group_of(case.record) != "on", next((error for error in errors if error is not None), np.inf)
+    return not reached(case.record), next((error for error in errors if error is not None), np.inf)
 
 
 # fmt: off

@@ -8,7 +8,7 @@ from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, number
-from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reason_of, seconds, status_of
+from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reached, reason_of, seconds, status_of
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 """The errors in the summary's question "who is fastest among those that are right?\""""
@@ -98,11 +98,16 @@ def summary(records: Sequence[Record]) -> list[str]:
     """Return what came out of a problem's cases, in sentences, whoever wins."""
     groups = {key: [r for r in records if group_of(r) == key] for key in GROUPS}
     cases = "1 case" if len(records) == 1 else f"{len(records)} cases"
-    sentences = [
-        f"{cases}: {len(groups['on'])} follow the trajectory to the end, "
-        f"{len(groups['off'])} lost its symmetry, {len(groups['ended'])} did not reach the end."
-    ]
-    if ranked := _ranked(groups["on"], "position_end"):
+    counted = {
+        "on": "follow the trajectory to the end",
+        "apart": "reach the end in another place",
+        "uncompared": "reach the end and are compared with no reference",
+        "off": "lost its symmetry or its energy",
+        "ended": "did not reach the end",
+    }
+    some = [f"{len(groups[key])} {words}" for key, words in counted.items() if groups[key] or key == "on"]
+    sentences = [f"{cases}: {', '.join(some)}."]
+    if ranked := _ranked([r for r in records if reached(r)], "position_end"):
         sentences.append(_best("Smallest position error at the end", ranked, "position_end"))
         fast = _ranked([r for r in ranked if accurate(r, RIGHT)], "warm_seconds")
         level = " and ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in RIGHT.items())
@@ -110,7 +115,7 @@ def summary(records: Sequence[Record]) -> list[str]:
             sentences.append(_best(f"Fastest of the {len(fast)} that keep {level}", fast, "warm_seconds"))
         elif any(r.timing for r in ranked):
             sentences.append(f"No case that was timed keeps {level}.")
-    elif groups["on"]:
+    elif groups["uncompared"]:
         sentences.append(
             "This problem has no stored reference: positions are not measured, and nothing is ranked. "
             "`reference = true` in the campaign file, or `--reference`, computes one before the run."
@@ -127,7 +132,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
     shown = [*WEAKNESSES, *([ANGULAR_MOMENTUM] if turning else [])]
     for record in records:
         position, energy = number(record, "position_end"), number(record, "energy_max")
-        ours = record.role == "ours" and group_of(record) == "on"
+        ours = record.role == "ours" and reached(record)
         if not ours or position is None or energy is None or position < 1e-2:
             continue
         z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
@@ -146,7 +151,7 @@ def excluded(records: Sequence[Record]) -> list[str]:
     return [
         f"{record.case.method} on {record.case.problem}: {reason_of(record)}".rstrip(". ") + "."
         for record in records
-        if group_of(record) != "on"
+        if not reached(record)
     ]
 
 

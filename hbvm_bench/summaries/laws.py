@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from hbvm_bench.store.records import Law, Record
 from hbvm_bench.summaries.points import by_family
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.rows import reached
 from hbvm_bench.summaries.table import Table
 
 SHORT = {
@@ -21,7 +21,7 @@ SHORT = {
 
 def counts(records: Sequence[Record]) -> dict[str, Counter[str]]:
     """Return for each family how many cases have which law of the energy; ``"none"`` where none is clear."""
-    found = [one for one in records if "energy" in one.result.laws and group_of(one) == "on"]
+    found = [one for one in records if "energy" in one.result.laws and reached(one)]
     return {
         family: Counter(one.result.laws["energy"].law or "none" for one in members)
         for family, members in by_family(found).items()

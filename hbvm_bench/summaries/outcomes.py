@@ -7,16 +7,18 @@ from typing import Literal, NamedTuple
 
 from hbvm_bench.store.records import Load, Record, TimingRound
 from hbvm_bench.summaries.points import by_family, by_problem, family_of, singles
-from hbvm_bench.summaries.rows import group_of, reason_of
+from hbvm_bench.summaries.rows import group_of, reached, reason_of
 from hbvm_bench.summaries.table import Table
 
 UNDISTURBED = 0.9  # of a core, in the timing pass
 STEADY = 1.5  # quartiles of the calibration around a timing sample
 BUSY = 0.05  # of a core: more than this beside the timings makes them doubtful
 
-State = Literal["on", "off", "ended", "refused", "absent"]
+State = Literal["on", "apart", "uncompared", "off", "ended", "refused", "absent"]
 
-SIGNS: dict[State, str] = {"on": "●", "off": "◐", "ended": "○", "refused": "–", "absent": ""}
+SIGNS: dict[State, str] = {
+    "on": "●", "apart": "◑", "uncompared": "◎", "off": "◐", "ended": "○", "refused": "–", "absent": ""
+}  # fmt: skip
 """From best to worst."""
 
 
@@ -24,7 +26,7 @@ class Outcome(NamedTuple):
     """What became of all settings of a family on a problem."""
 
     state: State  # the best that any of them did, a key of `SIGNS`
-    reached: int  # settings that reached the end on the trajectory
+    reached: int  # settings that reached the end with their symmetry and energy
     settings: int
     reasons: list[str]  # why the others did not, each once, with the setting it is said of
 
@@ -56,14 +58,15 @@ def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
         "Which integrator on which problem",
         ("problem", *families),
         [(problem, *map(_sign, row.values())) for problem, row in found.items()],
-        "● reached the end on its trajectory; ◐ on another one; ○ did not reach the end; – refused. "
+        "● reached the end on its trajectory; ◑ in another place; ◎ compared with no reference; ◐ lost the "
+        "symmetry or the energy; ○ did not reach the end; – refused. "
         "Numbers: how many of its settings reached the end, where not all did.",
     )
     return made, reasons
 
 
 def _sign(one: Outcome) -> str:
-    some = one.state == "on" and one.reached < one.settings
+    some = 0 < one.reached < one.settings
     return SIGNS[one.state] + (f" {one.reached}/{one.settings}" if some else "")
 
 
@@ -72,12 +75,12 @@ def _outcome(records: Sequence[Record]) -> Outcome:
     said: dict[str, list[str]] = {}
     for record in records:
         states.append("refused" if record.result.outcome == "refused" else group_of(record))
-        if states[-1] != "on":
+        if not reached(record):
             said.setdefault(reason_of(record), []).append(record.case.method)
     same = len({reason_of(record) for record in records}) == 1
     reasons = [reason if same else f"{', '.join(who)}: {reason}" for reason, who in said.items()]
     found: list[State] = [state for state in SIGNS if state in states]
-    return Outcome(found[0] if found else "absent", states.count("on"), len(states), reasons)
+    return Outcome(found[0] if found else "absent", sum(map(reached, records)), len(states), reasons)
 
 
 def sentences(records: Sequence[Record]) -> list[str]:
@@ -110,7 +113,7 @@ def doubts(records: Sequence[Record]) -> list[str]:
                 f"The speed of the machine was not steady: a fixed computation took {high / low:.1f} times "
                 "as long at the slow end as at the fast end, the outermost tenths left out."
             )
-    if not rounds and any(group_of(record) == "on" for record in records):
+    if not rounds and any(map(reached, records)):
         said.append(
             "No times were taken: work is counted in steps and evaluations, and seconds of compilation are "
             "those of cases that ran side by side."

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import by, group_of
+from hbvm_bench.summaries.rows import by, reached
 
 T = TypeVar("T")
 
@@ -41,8 +41,8 @@ def number(record: Record, key: str) -> float | None:
 
 
 def accurate(record: Record, within: Mapping[str, float]) -> bool:
-    """Whether a case reached its end on the trajectory asked for, with errors at most these."""
-    if group_of(record) != "on":
+    """Whether a case reached its end, with errors at most these."""
+    if not reached(record):
         return False
     errors = [(number(record, key), bound) for key, bound in within.items()]
     return all(error is not None and error <= bound for error, bound in errors)

@@ -16,11 +16,14 @@ HEADLINE = (
     *("steps", "evaluations", "warm_seconds", "throughput", "compile_seconds"),
 )
 RANKED_BY = "position_end"
+APART = 0.1  # position error at the end; the trajectory is another one there
 K = TypeVar("K")
 
 GROUPS = {
     "on": "On the trajectory that was asked for",
-    "off": "On another trajectory: the symmetry was lost; position and time are void",
+    "apart": "At the end in another place: a position error of 10 % or more, as chaos brings in time",
+    "uncompared": "At the end; no reference tells how far from the trajectory that was asked for",
+    "off": "On another trajectory: the symmetry or the energy was lost; position and time are void",
     "ended": "Did not reach the end",
 }
 
@@ -102,7 +105,7 @@ def grouped(found: Sequence[Row]) -> list[tuple[str, list[Row]]]:
     made = []
     for group, title in GROUPS.items():
         members = [row for row in found if row.group == group]
-        ranked = group == "on" and any(math.isfinite(_sort_value(row, RANKED_BY)) for row in members)
+        ranked = group in ("on", "apart")
         made += [(title + ", by position error at the end" * ranked, members)] if members else []
     return made
 
@@ -113,12 +116,23 @@ def numbers(records: Sequence[Record]) -> dict[str, int]:
     return {record.id: methods.setdefault(record.case.method, len(methods) + 1) for record in records}
 
 
-def group_of(record: Record) -> Literal["on", "off", "ended"]:
+Group = Literal["on", "apart", "uncompared", "off", "ended"]
+
+
+def group_of(record: Record) -> Group:
     """Return the key in `GROUPS` of a case."""
     result = record.result
     if result.outcome != "ok" or result.status != "finished":
         return "ended"
-    return "off" if result.violation else "on"
+    if result.violation:
+        return "off"
+    position = result.metrics.get(RANKED_BY, Value()).value
+    return "uncompared" if position is None else "on" if position < APART else "apart"
+
+
+def reached(record: Record) -> bool:
+    """Whether a case reached its end with its symmetry and its energy: its numbers may be compared."""
+    return group_of(record) not in ("off", "ended")
 
 
 def status_of(record: Record) -> str:

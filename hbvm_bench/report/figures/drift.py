@@ -11,7 +11,7 @@ from hbvm_bench.report.figures.over_time import Drawn, family_panels, panel_lege
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.store.records import Law
 from hbvm_bench.summaries.laws import text
-from hbvm_bench.summaries.rows import group_of
+from hbvm_bench.summaries.rows import reached
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def _drift(case: Drawn) -> Found | None:
     if stored is not None and "drift.energy" in case.series:
         t, rows = case.series["drift.t"], np.atleast_2d(case.series["drift.energy"])
         return (t, rows, stored) if t.size > 1 else None
-    if group_of(case.record) != "on" or "error.energy" not in case.series:
+    if not reached(case.record) or "error.energy" not in case.series:
         return None
     t, error = np.abs(case.series["t"] - case.series["t"][0]), case.series["error.energy"]
     later = t >= t[-1] / EARLIEST

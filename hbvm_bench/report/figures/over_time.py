@@ -50,7 +50,7 @@ class Drawn:
 
     def legend(self, *, named: bool) -> str:
         """Return its number, its name if ``named``, its options, and a mark where it failed."""
-        mark = {"on": "", "off": " †", "ended": " ‡"}[group_of(self.record)]
+        mark = {"off": " †", "ended": " ‡"}.get(group_of(self.record), "")
         name = f"{family_of(self.record)}  " if named else ""
         return f"{self.look.number}  {name}{options(self.record)}{mark}"
 

@@ -109,6 +109,16 @@ def test_a_guard_that_is_lost_too_little_to_matter_voids_nothing(sitnikov):
     assert not any(value.void for value in got.values())
 
 
+def test_an_energy_that_is_lost_is_another_trajectory(sitnikov):
+    made = solution(sitnikov)
+    made.y[-1, 9:] *= 1e10  # the momenta
+    got = values(made)
+    assert got["energy_max"].value > 1e10
+    assert not got["energy_max"].void  # the fact itself
+    assert got["position_end"].void
+    assert got["position_end"].why.startswith("another trajectory: the energy is wrong by ")
+
+
 def test_an_early_end_voids_the_part(sitnikov):
     known = solutions.find(sitnikov)
     got = values(solution(sitnikov, t=known.t[:5], status=Status.STALLED))

@@ -13,6 +13,7 @@ from hbvm_bench.summaries.rows import (
     group_of,
     grouped,
     numbers,
+    reached,
     rows,
     seconds,
     status_of,
@@ -40,10 +41,10 @@ ALL = [FAR, STALLED, OFF, NEAR, REFUSED, DIVERGED]
 
 def test_a_table_without_positions_does_not_claim_to_be_sorted_by_them():
     ((title, _),) = grouped(rows([record("a()")]))
-    assert title == "On the trajectory that was asked for"
-    (ranked, _), (ended, _) = grouped(rows([record("a()"), NEAR, STALLED]))
-    assert ranked.endswith(", by position error at the end")
-    assert "position error" not in ended
+    assert title == "At the end; no reference tells how far from the trajectory that was asked for"
+    (ranked, _), (alone, _), (ended, _) = grouped(rows([record("a()"), NEAR, STALLED]))
+    assert ranked == "On the trajectory that was asked for, by position error at the end"
+    assert "position error" not in alone + ended
 
 
 def test_settings_that_nobody_recommended_are_not_called_so():
@@ -80,13 +81,16 @@ def test_every_failure_says_what_and_when():
 
 
 def test_groups():
-    assert [group_of(r) for r in (FAR, OFF, STALLED, REFUSED, DIVERGED)] == [
-        "on",
-        "off",
-        "ended",
-        "ended",
-        "ended",
-    ]
+    assert {r.id: group_of(r) for r in (*ALL, record("a()"))} == {
+        "near()": "on",
+        "far()": "apart",
+        "a()": "uncompared",
+        "off()": "off",
+        "stalled()": "ended",
+        "refused()": "ended",
+        "diverged()": "ended",
+    }
+    assert [r.id for r in ALL if reached(r)] == ["far()", "near()"]
 
 
 def test_a_void_number_is_shown_and_not_ranked():
