@@ -183,6 +183,8 @@ class Trajectories:
         The last time, or that of the last own step before a failure.
     steps : ndarray of int, shape (n,)
         Own steps; accepted ones where lengths vary.
+    extra : dict of int to dict
+        By a trajectory's number, what of its `Stats.extra` warnings may follow from; see `telling`.
     """
 
     t: Array
@@ -191,6 +193,12 @@ class Trajectories:
     reason: list[str]
     t_stop: Array
     steps: NDArray[np.int64]
+    extra: dict[int, dict[str, Any]] = field(default_factory=dict, kw_only=True)
+
+
+def telling(stats: Stats) -> dict[str, Any]:
+    """Return what of ``stats.extra`` warnings may follow from: kinks, and what the implicit solver did."""
+    return {name: stats.extra[name] for name in ("kinks", "implicit") if name in stats.extra}
 
 
 @runtime_checkable
@@ -351,6 +359,14 @@ class MethodBase(Called):
     def caveat(self, problem: Problem) -> str | None:
         """Return why ``problem`` is outside what the method was made for although it runs, if it is."""
         return None
+
+    def conserved(self, system: System) -> dict[str, float]:
+        """Return the invariants that the method conserves, and by how much each may change in a step.
+
+        Relative to its size; 0: by rounding only. What changes by much more has met something that no step
+        saw, and `integrators.Solution.warnings` say so.
+        """
+        return {}
 
     def compile(self, system: System) -> Program:
         """Compile for ``system``; see the module's guide."""

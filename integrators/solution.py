@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.caveats import unseen
+from integrators.caveats import lost_invariants, warnings
 from integrators.plain import (
     doubles,
     packed,
@@ -192,22 +192,16 @@ class Solution:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what a user should know about a solution although it did not fail."""
-        caveat = self.method.caveat(self.problem)
-        kinks, implicit = (self.stats.extra.get(name) for name in ("kinks", "implicit"))
-        if caveat is None and not kinks and implicit and implicit["steps"]:
-            caveat = unseen(self.problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
-        said = () if caveat is None else (caveat,)
-        if failure := self.stats.extra.get("checkpoint"):
+        problem, extra = self.problem, self.stats.extra
+        said = warnings(problem, self.method.caveat(problem), extra)
+        if failure := extra.get("checkpoint"):
             said = (*said, failure)
-        if not kinks:
+        conserved = {} if extra.get("sample") == "dense" else self.method.conserved(problem.system)
+        if not self.t.size or not conserved:
             return said
-        t, h = kinks[0]
-        return (
-            *said,
-            f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} "
-            f"and {t + h!r}): steps were cut there, and what lies between two nodes may have been missed; "
-            "give breakpoints where the times are known.",
-        )
+        start, end = (problem.t0, problem.y0[None]), (float(self.t[-1]), self.y[-1:])
+        steps = np.array([self.stats.steps])
+        return said + lost_invariants(problem.system, conserved, start, end, problem.par[None], steps)[0]
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from integrators.events.finder import Ending
-from integrators.protocol import Array, Status, Trajectories, UserError
+from integrators.protocol import Array, Status, Trajectories, UserError, telling
 from integrators.solution import Occurrences
 
 Member = tuple[Trajectories, dict[str, Occurrences]]
@@ -72,4 +72,5 @@ def _one(
     n = ending.count(samples.t, stepper.search)
     y[0, :n], steps[0] = samples.y[:n], stepper.stats.steps
     made = Trajectories(times, y, [ending.status], [ending.reason], np.array([ending.stop]), steps)
+    made.extra[0] = telling(stepper.stats)
     return made, stepper.search.hits.occurrences()

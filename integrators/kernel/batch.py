@@ -24,7 +24,7 @@ from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
-from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times
+from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times, telling
 from integrators.running.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown
@@ -155,6 +155,8 @@ class _Work:
         stats = stepper.stats
         result.steps[i], result.iterations[i] = stats.steps, stats.iterations or 0
         result.evaluations[i] = stats.evaluations or 0
+        if found := telling(stats):
+            result.extra[i] = found
 
 
 @dataclass(frozen=True, eq=False)

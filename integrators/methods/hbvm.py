@@ -199,6 +199,16 @@ class HBVM(MethodBase):
         why = "the steps that keep a Poisson system's energy do not look for kinks" if poisson else None
         return unseen(problem, why or blind(self.k, self.tol, self.solver))
 
+    def conserved(self, system: System) -> dict[str, float]:
+        """Return the energy, with a tolerance; only where k is chosen is the quadrature error at rounding."""
+        if (
+            self.tol is None
+            or "energy" not in system.invariant_names
+            or "hamiltonian" not in system.offered()
+        ):
+            return {}
+        return {"energy": 0.0 if self.k is None else self.tol}
+
     def control(self) -> dict[str, Any]:
         """Return those of the options ``max_step``, ``breakpoints`` and ``max_steps`` that are given."""
         names = ("max_step", "breakpoints", "max_steps")

@@ -161,6 +161,11 @@ class LineIntegral(MethodBase):
         """Name a field with kinks: they are not looked for."""
         return unseen(problem, "line integral methods do not look for kinks")
 
+    def conserved(self, system: System) -> dict[str, float]:
+        """Return the invariants that are kept, with a tolerance."""
+        tol, names = self.tol, system.invariant_names
+        return {} if tol is None else {name: tol for name in self.invariants if name in names}
+
     def compile(self, system: System) -> Program:
         """Compile the vector field and the gradients, and the kernel if this machine has not yet.
 

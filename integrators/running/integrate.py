@@ -159,6 +159,8 @@ def integrate(
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch.failure:
         stats.extra = {**stats.extra, "checkpoint": watch.failure}
+    if sample == "dense":  # the polynomials conserve nothing
+        stats.extra = {**stats.extra, "sample": sample}
     solution = Solution(
         t=samples.t,
         y=samples.y,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
+from integrators.caveats import lost_invariants, warnings
 from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
 from integrators.events.members import follow
@@ -26,6 +27,7 @@ from integrators.protocol import (
     check_batch,
     check_problem,
     check_times,
+    telling,
 )
 from integrators.running.watch import SOON, Bar, Progress, Report
 from integrators.solution import Occurrences
@@ -54,6 +56,8 @@ class Solutions(Trajectories):
         Whether the compiled code came from a cache; ``None`` where nothing is compiled.
     problem, method
         What was integrated, and how.
+    warnings : list of tuple of str
+        What to know about each trajectory although it did not fail, as `Solution.warnings`.
     events : list of dict of str to Occurrences
         What happened in each trajectory, by the events' names: nothing in one that Ctrl-C has left out.
         Empty where none were looked for.
@@ -78,6 +82,15 @@ class Solutions(Trajectories):
 
     def __len__(self) -> int:
         return len(self.status)
+
+    @property
+    def warnings(self) -> list[tuple[str, ...]]:
+        """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
+        problem = self.problem
+        caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
+        start, end = (problem.t0, self.starts), (float(self.t[-1]), self.y[:, -1])
+        lost = lost_invariants(problem.system, conserved, start, end, self.par, self.steps)
+        return [warnings(problem, caveat, self.extra.get(i, {})) + said for i, said in enumerate(lost)]
 
     @property
     def arrived(self) -> Any:
@@ -231,6 +244,7 @@ def _integrate(
         )
         for name in ("y", "status", "reason", "t_stop", "steps"):
             getattr(made, name)[here] = getattr(piece, name)
+        made.extra.update({first + i: extra for i, extra in piece.extra.items() if extra})
         first = min(first + size, n)
         now = perf_counter()
         if batch is not None and now - before < SOON / 2.0:
@@ -254,6 +268,7 @@ def _with_events(
         reason=[piece.reason[0] for piece in pieces],
         t_stop=np.concatenate([piece.t_stop for piece in pieces]),
         steps=np.concatenate([piece.steps for piece in pieces]),
+        extra={i: extra for i, piece in enumerate(pieces) for extra in piece.extra.values()},
     )
 
 
@@ -297,4 +312,6 @@ def _one(program: Program, start: Array, par: Array, times: Array, t0: float) ->
     samples = stepper.advance(times)
     y[0, : samples.t.size], steps[0] = samples.y, stepper.stats.steps
     stop = times[-1] if samples.status is Status.FINISHED else stepper.t
-    return Trajectories(times, y, [samples.status], [samples.reason], np.array([stop]), steps)
+    made = Trajectories(times, y, [samples.status], [samples.reason], np.array([stop]), steps)
+    made.extra[0] = telling(stepper.stats)
+    return made
