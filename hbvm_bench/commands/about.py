@@ -69,6 +69,7 @@ def advise(
                 "problem": repr(advice.problem),
                 "accuracy": accuracy,
                 "reached": advice.reached,
+                "until": advice.until,
                 "why": advice.why,
                 "proposals": [{**vars(one), "method": repr(one.method)} for one in advice.proposals],
             }

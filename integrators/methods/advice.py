@@ -82,11 +82,12 @@ class Advice:
         The settings that are expected to be as accurate as asked, the fastest first; without one,
         the most accurate that was found.
     reached : bool
-        Whether the accuracy is expected to be reached.
+        Whether the accuracy is expected to be reached at `until`, the time up to which settings were tried.
+        What comes after it was not looked at: the errors of the proposals there are extrapolations.
     piece : float
         Time from the start to which everything was tried.
     why : str
-        The reasons, in one to three sentences.
+        The reasons, in one to four sentences.
     """
 
     problem: Problem
@@ -95,6 +96,11 @@ class Advice:
     reached: bool
     piece: float
     why: str
+
+    @property
+    def until(self) -> float:
+        """The time up to which settings were tried; ``reached`` says nothing of later ones."""
+        return self.problem.t0 + self.piece
 
     @property
     def method(self) -> MethodBase:
@@ -310,6 +316,7 @@ def _fixed(piece: _Piece, goal: float, k: int, s: int) -> _Trial | None:
 
 
 def _why(piece: _Piece, proposals: tuple[Proposal, ...], reached: bool, accuracy: float) -> str:
+    """Return the reasons, with how far they were looked for."""
     first = proposals[0]
     end = piece.end if piece.chaotic else piece.problem.t_end
     words = [f"expected to be off by {first.position:.1g} at t={end:g}, and to take {first.seconds:.2g} s"]
@@ -320,6 +327,11 @@ def _why(piece: _Piece, proposals: tuple[Proposal, ...], reached: bool, accuracy
         words[0] += f", the fastest of {len(proposals)} settings that meet {accuracy:g}."
     else:
         words[0] += f", the only setting that meets {accuracy:g}."
+    if end != piece.end:
+        words.append(
+            f"Settings were tried up to t={piece.end:g}, {100.0 / piece.whole:.2g} % of the span; what comes "
+            "later is extrapolated, and wrong where the motion becomes chaotic or an encounter comes."
+        )
     keeping = next((one for one in proposals if (one.energy or 0.0) <= KEPT), None)
     if first.energy is not None and first.energy > KEPT and keeping is not None:
         words.append(

@@ -68,3 +68,18 @@ def test_first_order_systems_have_no_energy() -> None:
 def test_accuracies_that_are_none(accuracy: float) -> None:
     with pytest.raises(InputError, match="relative error between 0 and 1"):
         advise(problems.load("kepler"), accuracy)
+
+
+def test_how_far_it_looked_is_told() -> None:
+    problem = problems.load("pythagorean")  # regular at first; its last encounters part all neighbours
+    advice = advise(problem, 1e-6)
+    assert advice.until == problem.t0 + advice.piece < problem.t_end
+    assert f"up to t={advice.until:g}" in advice.why
+    assert f"at t={advice.until:g}" in advice.why or "what comes later is extrapolated" in advice.why
+
+
+def test_nothing_is_extrapolated_where_everything_was_tried() -> None:
+    problem = _orbits(0.1, 1)
+    advice = advise(problem, 1e-8)
+    assert advice.until == pytest.approx(problem.t_end)
+    assert "extrapolated" not in advice.why
