@@ -49,8 +49,9 @@ _LATER = {  # imported when first used
 _FORMER = {
     **{name: f"methods.{name}" for name in ("advice", "automatic", "gauss", "hbvm", "line_integral")},
     **{name: f"coefficients.{name}" for name in ("legendre", "order", "tableau")},
-    **{name: f"running.{name}" for name in ("checkpoints", "integrate", "many", "one_thread")},
-    **{name: f"running.{name}" for name in ("poincare", "times", "watch", "watchdog")},
+    **{name: f"running.{name}" for name in ("checkpoints", "integrate", "many", "poincare")},
+    **{name: f"running.{name}" for name in ("times", "watch", "watchdog")},
+    "one_thread": "refusals",
 }
 deprecated.moved(__name__, _FORMER, removed_in="0.2")
 

@@ -26,15 +26,36 @@ class attributes, ``accepts`` and the function that takes the steps are left to 
    end time, where it is another than the method's best: that one is timed.
 7. A numerical failure is a `Status`, never an exception, never a silent NaN,
    never an endless loop; the samples computed before it are returned.
-8. ``checkpoint`` returns all that makes the continuation bit for bit the same, and
-   what it belongs to (`integrators.running.checkpoints.Identity`); ``restore`` takes it back, and
-   nothing else.
-9. Register the class under the entry point group ``hbvm_bench.integrators``;
+8. Register the class under the entry point group ``hbvm_bench.integrators``;
    `integrators.testing` then checks it against these sentences.
+
+What follows is optional. Each capability is a class of this module, which the rest of the package asks for
+by `offers`; without it the method still integrates. The conformance kit checks those that are offered.
+
+9. `Samplings`: a stepper states in ``samplings`` which ways of sampling its ``advance`` has, the default
+   first. Without it all of `SAMPLINGS` are expected.
+10. `Checkpoints`: ``checkpoint`` returns all that makes the continuation bit for bit the same, and what it
+    belongs to (`integrators.running.checkpoints.Identity`); ``restore`` takes it back, and nothing else.
+    Files of checkpoints need it (``integrate(checkpoint=...)``).
+11. `Destination`: a stepper that ends when its steps collapse is told in ``destination`` where the whole
+    integration ends, since `integrate` goes there in pieces. `integrators.running.watchdog` has the rule.
+12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception that a function of the user raised.
+13. `Events`: ``with_events`` of a program starts steppers that look for events in their steps. Such an
+    `EventStepper` has the ``search``, and ``look_to``, which searches the step ahead up to the last time.
+14. `Interruptible`: another thread sets ``stop`` of a stepper to call it back from ``advance``. Events of
+    many trajectories are looked for in several threads.
+15. `Batches`: ``batch`` of a program integrates many starts better than one after another, for
+    `integrate_many`. `PreparedBatches`: ``prepare_batch`` does all of it that is not integrating, so that
+    the bench can time the rest. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`: ``piece`` is
+    the number of trajectories that it is best given first.
+16. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
+    plugins then know its coefficients.
 """
 
 import dataclasses
 import inspect
+import threading
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache
@@ -43,7 +64,6 @@ from typing import Any, ClassVar, Protocol, cast, get_type_hints, runtime_checka
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems import limits
 from problems.calls import Called
 from problems.checks import checked
 from problems.errors import InputError, shown
@@ -248,25 +268,6 @@ class Stepper(Protocol):
         """
         ...
 
-    def checkpoint(self) -> Any:
-        """Return all that the continuation depends on (a value, not a view)."""
-        ...
-
-    def restore(self, checkpoint: Any) -> None:
-        """Go back to a checkpoint of this program; the continuation is bit for bit the same.
-
-        The checkpoint may be that of another stepper of the program, or of another program of the
-        same method and system. It brings no parameters along: the stepper must have been started
-        with the same.
-
-        Raises
-        ------
-        problems.errors.InputError
-            For anything else: the checkpoint of another method, of other options, of another
-            system, of other parameters. The stepper stays where it is.
-        """
-        ...
-
 
 @runtime_checkable
 class Program(Protocol):
@@ -300,6 +301,199 @@ class Compiled:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self.method).compile, (self.method, self.system)
+
+
+class Samplings(Protocol):
+    """A stepper that has not all of `integrators.protocol.SAMPLINGS`, or another default.
+
+    Attributes
+    ----------
+    samplings : tuple of str
+        Those that its ``advance`` takes, the default first; it refuses all others.
+    """
+
+    samplings: tuple[str, ...]
+
+
+class Destination(Protocol):
+    """A stepper that is told where the whole integration ends, which ``advance`` reaches piece by piece.
+
+    A stepper that notices when it no longer gets anywhere judges by this distance, not by that of a piece.
+    The samples do not depend on it.
+
+    Attributes
+    ----------
+    destination : float or None
+        That time; ``None``: each ``advance`` is an integration of its own.
+    """
+
+    destination: float | None
+
+
+class KeptError(Protocol):
+    """A stepper that keeps what a function of the user raised.
+
+    Attributes
+    ----------
+    error : Exception or None
+        The user's own exception, where the status is ``USER_ERROR``.
+    """
+
+    error: Exception | None
+
+
+class Checkpoints(Protocol):
+    """A stepper that can be continued later, bit for bit: what files of checkpoints are made of."""
+
+    def checkpoint(self) -> Any:
+        """Return all that the continuation depends on (a value, not a view), which can be pickled."""
+        ...
+
+    def restore(self, checkpoint: Any) -> None:
+        """Go back to a checkpoint of this program; the continuation is bit for bit the same.
+
+        The checkpoint may be that of another stepper of the program, or of another program of the
+        same method and system. It brings no parameters along: the stepper must have been started
+        with the same.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For anything else: the checkpoint of another method, of other options, of another
+            system, of other parameters (`integrators.running.checkpoints.Identity`). The stepper
+            stays where it is.
+        """
+        ...
+
+
+class Interruptible(Protocol):
+    """A stepper that another thread can call back.
+
+    Attributes
+    ----------
+    stop : threading.Event or None
+        When it is set, ``advance`` ends soon by raising `KeyboardInterrupt`; what was made is not wanted.
+    """
+
+    stop: threading.Event | None
+
+
+class EventStepper(Protocol):
+    """A stepper that looks for events in its steps, as `Events.with_events` starts it.
+
+    Attributes
+    ----------
+    search : integrators.events.finder.Finder
+        The search at work, and what it has found.
+    """
+
+    search: Any
+
+    def look_to(self, end: float) -> Status:
+        """Look for events from the last own step to a time within the step ahead."""
+        ...
+
+
+class Events(Protocol):
+    """A program whose steps can be searched for events."""
+
+    def with_events(
+        self, problem: Problem, events: Mapping[str, Any]
+    ) -> Callable[[ArrayLike, ArrayLike | None, float, float], Any]:
+        """Compile the functions of events; return what starts a trajectory that looks for them.
+
+        What is returned takes the arguments of ``start``, and the time up to which is looked; it
+        returns an `EventStepper`. The events change neither steps nor samples, but a terminal one
+        ends the integration with the status ``EVENT``.
+
+        Parameters
+        ----------
+        problem : Problem
+            Whose variables the functions name.
+        events : mapping of str to integrators.events.Event
+            What to look for.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a function that the program cannot use.
+        """
+        ...
+
+
+class Batches(Protocol):
+    """A program that has a better way to integrate many starts than one after another."""
+
+    def batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Trajectories:
+        """Integrate starts, shape (n, dim), with parameters (n, n_par), from ``t0`` to the same times (m,).
+
+        What comes out for one does not depend on the others. One that fails has its status, reason and
+        time, and leaves the others alone.
+        """
+        ...
+
+
+class PreparedBatches(Protocol):
+    """A program whose batches can be prepared, so that a clock runs for the integration alone."""
+
+    def prepare_batch(
+        self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
+    ) -> Callable[[], Trajectories]:
+        """Compile, check and allocate all that `Batches.batch` needs; return what then does it, once."""
+        ...
+
+
+class Threads(Protocol):
+    """A program whose ``batch`` also takes ``threads=``, a number of threads to share the work among.
+
+    Attributes
+    ----------
+    threaded : bool
+        Whether it does.
+    """
+
+    threaded: bool
+
+
+class PieceSize(Protocol):
+    """A program whose ``batch`` is best given a certain number of trajectories first.
+
+    Attributes
+    ----------
+    piece : int
+        That number; later pieces have more where they take little time.
+    """
+
+    piece: int
+
+
+class AsHBVM(Protocol):
+    """A method that is HBVM(k, s) for certain k and s, of which tableau and order are known."""
+
+    def as_hbvm(self) -> "MethodBase":
+        """Return it as `integrators.HBVM`."""
+        ...
+
+
+CAPABILITIES: tuple[type, ...] = (
+    Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
+    Events, Batches, PreparedBatches, Threads, PieceSize, AsHBVM,
+)  # fmt: skip
+"""All of them."""
+
+
+def offers(thing: Any, capability: type) -> bool:
+    """Whether a method, a program or a stepper has everything that a capability names."""
+    return all(hasattr(thing, name) for name in members(capability))
+
+
+@cache
+def members(capability: type) -> tuple[str, ...]:
+    """Return the names that a capability consists of."""
+    named = {**inspect.get_annotations(capability), **vars(capability)}
+    return tuple(name for name in named if not name.startswith("_"))
 
 
 class _Signature:
@@ -404,112 +598,3 @@ def check_problem(problem: Problem, method: MethodBase) -> None:
     reason = method.accepts(problem)
     if reason is not None:
         raise InputError(f"{method!r} cannot integrate {problem!r}: {reason}")
-
-
-def check_times(times: ArrayLike, t: float) -> Array:
-    """Return ``times`` as a float64 array, or raise for times no stepper can serve.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Requested times; n >= 1, finite, strictly monotone; none behind ``t``
-        in the direction of integration.
-    t : float
-        The stepper's present time.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the times are empty, not finite, not strictly monotone or behind ``t``.
-    """
-    grid = np.atleast_1d(as_numbers("times", times))
-    if grid.ndim != 1 or grid.size == 0:
-        raise InputError(f"times must be a non-empty one-dimensional array, not of shape {grid.shape}.")
-    if not np.isfinite(grid).all():
-        raise InputError("times must be finite numbers.")
-    rest = grid if grid[0] != t else grid[1:]
-    path = np.concatenate([[t], rest])
-    gaps = np.diff(path)
-    if not (np.all(gaps > 0) or np.all(gaps < 0)):
-        raise InputError(
-            f"times must be strictly monotone and ahead of the present time {t!r}; "
-            f"got {float(grid[0])!r} ... {float(grid[-1])!r}."
-        )
-    return grid
-
-
-def as_numbers(what: str, value: ArrayLike) -> Array:
-    """Return an array of float64, or refuse what is not made of numbers."""
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what} must be numbers, not {shown(value)}.") from None
-
-
-def check_start(t0: Any) -> float:
-    """Return the time of a start, a finite number, or refuse it."""
-    time = as_numbers("t0", t0)
-    if time.ndim or not np.isfinite(time):
-        raise InputError(f"t0={shown(t0)} must be one finite number.")
-    return float(time)
-
-
-def check_parameters(par: ArrayLike | None, system: System) -> Array:
-    """Return a parameter vector as a fresh array, the system's own by default, or refuse it.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If it is not made of numbers, or not of the system's length.
-    """
-    own = system.pack()
-    if par is None:
-        return own
-    values = as_numbers("par", par)
-    if values.shape != own.shape:
-        raise InputError(f"par must have shape {own.shape}, not {values.shape}; see system.pack.")
-    return values.copy()
-
-
-def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: System) -> tuple[Array, Array]:
-    """Return a batch's starts (n, dim) and parameters (n, n_par) as fresh arrays, or refuse them.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If they are of other shapes or not finite, or if n trajectories at so many times take too much memory.
-    """
-    rows = np.atleast_2d(as_numbers("Y0", Y0))
-    if rows.ndim != 2 or rows.shape[0] == 0:
-        raise InputError(f"Y0 must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
-    n = rows.shape[0]
-    limits.check(f"a batch of {n} trajectories", "GIB", 8 * times.size * rows.size / 2**30)
-    if rows.shape[1] != system.dim or not np.isfinite(rows).all():
-        for row in rows:
-            check_state(row, system.dim)
-    starts = np.array(rows, order="C")
-    given = None if par is None else as_numbers("par", par)
-    if given is None or given.ndim == 1:
-        return starts, np.tile(check_parameters(given, system), (n, 1))
-    if given.shape != (n, system.n_par):
-        raise InputError(
-            f"par must have shape ({system.n_par},) or ({n}, {system.n_par}), not {given.shape}."
-        )
-    return starts, np.array(given, order="C")
-
-
-def check_state(y0: ArrayLike, dim: int) -> Array:
-    """Return ``y0`` as a fresh float64 array of shape (dim,), or refuse it.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the shape is wrong or an entry is not finite.
-    """
-    y = as_numbers("the initial state", y0).copy()
-    if y.shape != (dim,):
-        raise InputError(f"the initial state must have shape ({dim},), not {y.shape}.")
-    if not np.isfinite(y).all():
-        where = int(np.flatnonzero(~np.isfinite(y))[0])
-        raise InputError(f"the initial state must be finite numbers; y0[{where}] is {float(y[where])!r}.")
-    return y

@@ -24,7 +24,8 @@ from integrators.plain import (
     unpacked_method,
     unpacked_problem,
 )
-from integrators.protocol import Array, MethodBase, Program, Stats, Status, as_numbers
+from integrators.protocol import Array, MethodBase, Program, Stats, Status
+from integrators.refusals import as_numbers
 from problems.calls import readable
 from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
@@ -232,8 +233,9 @@ class Solution:
     def _with(self) -> str:
         """Return how it was integrated, with what the method chose itself, and how it ended."""
         method, extra, steps = self.method, self.stats.extra, self.stats.steps
-        chosen = [f"{key}={extra[key]}" for key in "ks" if key in extra and getattr(method, key, 0) is None]
-        if steps and (getattr(method, "h", None) is None or getattr(method, "tol", None) is not None):
+        options = method.options(defaults=True)
+        chosen = [f"{key}={extra[key]}" for key in "ks" if key in extra and options.get(key, 0) is None]
+        if steps and (options.get("h") is None or options.get("tol") is not None):
             chosen.append(f"steps of {abs(self.t_stop - self.problem.t0) / steps:.3g} on average")
         words = f" ({', '.join(chosen)})" if chosen else ""
         ended = f"{self.status} at t = {self.t_stop:.15g}, {self.t.size} states"

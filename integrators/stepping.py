@@ -8,6 +8,7 @@ their steps; `FixedStepper` also for libraries that hold the state of a fixed-st
 import math
 import threading
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import Any, ClassVar, Protocol, TypeGuard
 from weakref import WeakKeyDictionary
@@ -16,22 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.options import Step
-from integrators.protocol import (
-    Array,
-    Compiled,
-    MethodBase,
-    Samples,
-    Stats,
-    Status,
-    UserError,
-    check_parameters,
-    check_start,
-    check_state,
-    check_times,
-)
+from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, UserError
+from integrators.refusals import check_parameters, check_start, check_state, check_times, one_thread
 from integrators.running.checkpoints import Identity
-from integrators.running.one_thread import one_thread
 from integrators.running.times import plan
+from integrators.running.watchdog import Crawl
 from problems.errors import unknown
 from problems.problem import System
 
@@ -58,7 +48,7 @@ class ProgramBase(Compiled):
         """
         values = check_parameters(par, self.system)
         stepper = self.stepper(check_state(y0, self.system.dim), values, check_start(t0))
-        stepper.identity = Identity.of(repr(self.method), self.system, values)
+        stepper.started = self, values
         return stepper
 
     def stepper(self, y: Array, par: Array, t: float) -> "StepperBase":
@@ -82,7 +72,7 @@ class StepperBase:
     """A trajectory; satisfies `integrators.protocol.Stepper`.
 
     A subclass states its ``samplings`` (the default first) and implements
-    `_serve`, `_own_steps`, `_one`, `_save` and `_load`.
+    `_serve`, `_own_steps` and `_one`. One with checkpoints is a `RestorableStepper`.
 
     The *present* time ``t`` and state ``y`` are those last returned. The library
     itself may be ahead of them (an adaptive method, whose own steps are not
@@ -91,9 +81,14 @@ class StepperBase:
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
-    identity: Identity
+    started: tuple[ProgramBase, Array]
+    """The program and the parameters that it was started with."""
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
+    destination: float | None = None
+    """Where the whole integration ends, if ``advance`` goes there in pieces."""
+    crawl: Crawl | None = None
+    """What watches the way to the destination; see `integrators.running.watchdog`."""
 
     def __init__(self, y: Array, t: float):
         self._at_work = threading.RLock()
@@ -181,26 +176,6 @@ class StepperBase:
         status = self._status if self._status.failed else Status.FINISHED
         return Samples(grid, states, status, self._reason)
 
-    @one_thread
-    def checkpoint(self) -> Checkpoint:
-        """Return a copy of all that the continuation depends on."""
-        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
-
-    @one_thread
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Go back to a checkpoint of the same program; the counters keep counting.
-
-        Raises
-        ------
-        problems.errors.InputError
-            If the checkpoint is that of another method, of other options, another system or
-            other parameters; the stepper stays where it is.
-        """
-        self.identity.check(checkpoint, Checkpoint)
-        self._t, self._y = checkpoint.t, checkpoint.y.copy()
-        self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
-        self._load(checkpoint.inner)
-
     def _arrive(self, t: float, y: Array) -> None:
         self._t, self._y = t, np.array(y, dtype=np.float64)
 
@@ -229,6 +204,36 @@ class StepperBase:
         """Take one own step and return where it arrived; ``None`` after a failure."""
         raise NotImplementedError
 
+
+class RestorableStepper(StepperBase):
+    """A trajectory with `integrators.protocol.Checkpoints`; a subclass implements `_save` and `_load` too."""
+
+    @cached_property
+    def identity(self) -> Identity:
+        """What its checkpoints belong to."""
+        program, par = self.started
+        return Identity.of(repr(program.method), program.system, par)
+
+    @one_thread
+    def checkpoint(self) -> Checkpoint:
+        """Return a copy of all that the continuation depends on."""
+        return Checkpoint(self._t, self._y.copy(), self._status, self._reason, self._save(), self.identity)
+
+    @one_thread
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Go back to a checkpoint of the same program; the counters keep counting.
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the checkpoint is that of another method, of other options, another system or
+            other parameters; the stepper stays where it is.
+        """
+        self.identity.check(checkpoint, Checkpoint)
+        self._t, self._y = checkpoint.t, checkpoint.y.copy()
+        self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
+        self._load(checkpoint.inner)
+
     def _save(self) -> Any:
         """Return a copy of the library's own state."""
         raise NotImplementedError
@@ -238,7 +243,7 @@ class StepperBase:
         raise NotImplementedError
 
 
-class FixedStepper(StepperBase):
+class FixedStepper(RestorableStepper):
     """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
 
     ``"side"`` (default)

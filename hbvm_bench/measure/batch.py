@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.protocol import Program, Status
+from integrators.protocol import Batches, PreparedBatches, Program, Status, offers
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Members:
 
 
 def prepared(
-    program: Program, starts: Array, problem: Problem, par: Array | None = None
+    program: Any, starts: Array, problem: Problem, par: Array | None = None
 ) -> Callable[[], Any] | None:
     """Return the call of a program's batch, compiled, checked and allocated where it can prepare one.
 
@@ -41,10 +41,9 @@ def prepared(
     """
     par = problem.par if par is None else par
     arguments = {"times": np.array([problem.t_end]), "t0": problem.t0}
-    if prepare := getattr(program, "prepare_batch", None):
-        return prepare(starts, par, **arguments)
-    batch = getattr(program, "batch", None)
-    return None if batch is None else partial(batch, starts, par, **arguments)
+    if offers(program, PreparedBatches):
+        return program.prepare_batch(starts, par, **arguments)
+    return partial(program.batch, starts, par, **arguments) if offers(program, Batches) else None
 
 
 def integrate(

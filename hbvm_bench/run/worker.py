@@ -29,7 +29,7 @@ from hbvm_bench.measure.timing import Run, Timeable
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing
 from hbvm_bench.store.store import NAME, encode_series
-from integrators.protocol import Program, Status
+from integrators.protocol import PreparedBatches, Program, Status, offers
 from integrators.solution import Solution
 from problems.errors import InputError
 
@@ -205,7 +205,7 @@ def _compiled(resolved: Resolved) -> Program:
     """Compile; where an ensemble is asked for, also what a program leaves to its first batch."""
     problem = resolved.problem
     program = resolved.method.compile(problem.system)
-    if resolved.case.ensemble is not None and hasattr(program, "prepare_batch"):
+    if resolved.case.ensemble is not None and offers(program, PreparedBatches):
         batch.prepared(program, problem.y0[None], problem)
     return program
 

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from integrators.coefficients.legendre import legendre, legendre_integrals
 from integrators.coefficients.tableau import Tableau, tableau
-from integrators.protocol import Array, MethodBase
+from integrators.protocol import Array, AsHBVM, MethodBase, offers
 from problems.calls import readable
 from problems.errors import InputError
 
@@ -181,10 +181,9 @@ def _height_two(A: Array, b: Array, c: Array, most: int) -> int:
 def _tableau(method: Any) -> Tableau:
     if isinstance(method, Tableau):
         return method
-    as_hbvm = getattr(method, "as_hbvm", None)
-    found = as_hbvm() if as_hbvm is not None else method
-    k, s = getattr(found, "k", None), getattr(found, "s", None)
-    if getattr(found, "family", None) != "hbvm" or k is None or s is None:
+    options = method.as_hbvm().options() if offers(method, AsHBVM) else {}
+    k, s = options.get("k"), options.get("s")
+    if k is None or s is None:
         raise InputError(
             f"{method!r} is no Runge-Kutta method whose coefficients are known; "
             "give HBVM or Gauss with k and s, or a Tableau."

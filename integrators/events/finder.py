@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.events.event import Event
-from integrators.protocol import Array, Program, Status
+from integrators.protocol import Array, Events, MethodBase, Status, offers
 from integrators.solution import Occurrences
 from problems.errors import InputError
 from problems.problem import Problem
@@ -175,7 +175,7 @@ class Ending:
 
 
 def started_with_events(
-    program: Program, problem: Problem, events: Mapping[str, Event]
+    program: Any, method: MethodBase, problem: Problem, events: Mapping[str, Event]
 ) -> Callable[..., Any]:
     """Return what starts a trajectory that looks for events: ``start(y0, par, t0, end)``.
 
@@ -184,11 +184,9 @@ def started_with_events(
     problems.errors.InputError
         If the method cannot find events, or a function cannot be used.
     """
-    prepare: Any = getattr(program, "with_events", None)
-    if prepare is None:
-        method = getattr(program, "method", program)
+    if not offers(program, Events):
         raise InputError(
             f"{method!r} cannot find events: it does not offer the states inside its steps that "
             "finding them takes; use HBVM, Gauss, LineIntegral or Taylor."
         )
-    return prepare(problem, events)
+    return program.with_events(problem, events)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from integrators.events.finder import Ending
-from integrators.protocol import Array, Status, Trajectories, UserError, telling
+from integrators.protocol import Array, Interruptible, Status, Trajectories, UserError, offers, telling
 from integrators.solution import Occurrences
 
 Member = tuple[Trajectories, dict[str, Occurrences]]
@@ -62,7 +62,8 @@ def _one(
     except UserError as raised:
         reason = f"{raised} at the start, t = {t0!r}."
         return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps), {}
-    stepper.stop = stop
+    if offers(stepper, Interruptible):
+        stepper.stop = stop
     samples = stepper.advance(times)
     status = samples.status
     if status is Status.FINISHED:

@@ -24,7 +24,8 @@ from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
-from integrators.protocol import Array, Status, Trajectories, UserError, check_batch, check_times, telling
+from integrators.protocol import Array, Status, Trajectories, UserError, telling
+from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts, plan
 from problems.checks import checked
 from problems.errors import unknown

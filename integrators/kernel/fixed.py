@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike
 
 from integrators.kernel.context import DENSE, LAND, SIDE
 from integrators.kernel.stepper import HBVMStepper
-from integrators.protocol import Array, Samples, Status, check_state
-from integrators.running.one_thread import one_thread
+from integrators.protocol import Array, Samples, Status
+from integrators.refusals import check_state, one_thread
 from integrators.running.times import Counts, plan
 
 

@@ -28,7 +28,8 @@ from integrators.kernel.step.engine import steps
 from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, TOLERANCE
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
-from integrators.protocol import Array, Compiled, check_parameters, check_start, check_state
+from integrators.protocol import Array, Compiled
+from integrators.refusals import check_parameters, check_start, check_state
 from problems import emit
 from problems.analysis.switches import Switches
 from problems.errors import InputError

@@ -30,10 +30,11 @@ from integrators.kernel.native import engine
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, check_times
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError
+from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
-from integrators.running.one_thread import one_thread
 from integrators.running.times import Counts
+from integrators.running.watchdog import Crawl
 from problems.errors import unknown
 from problems.problem import System
 
@@ -119,6 +120,11 @@ class HBVMStepper(ABC):
     """What a function of the user raised, where the status is ``USER_ERROR``."""
     search: KernelSearch | None = None
     """What looks for events in the steps, see `look_for`."""
+    samplings: tuple[str, ...] = SAMPLINGS
+    destination: float | None = None
+    """Where the whole integration ends, if ``advance`` goes there in pieces."""
+    crawl: Crawl | None = None
+    """What watches the way to the destination; see `integrators.running.watchdog`."""
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: Program, y: Array, par: Array, t0: float):

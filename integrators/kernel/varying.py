@@ -12,7 +12,7 @@ from integrators.kernel.native import engine
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST
 from integrators.protocol import Array, Samples, Stats, Status
-from integrators.running.one_thread import one_thread
+from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
 
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least

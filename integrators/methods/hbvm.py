@@ -209,6 +209,10 @@ class HBVM(MethodBase):
             return {}
         return {"energy": 0.0 if self.k is None else self.tol}
 
+    def as_hbvm(self) -> "HBVM":
+        """Return this method itself."""
+        return self
+
     def control(self) -> dict[str, Any]:
         """Return those of the options ``max_step``, ``breakpoints`` and ``max_steps`` that are given."""
         names = ("max_step", "breakpoints", "max_steps")

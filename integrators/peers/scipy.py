@@ -14,7 +14,7 @@ from integrators.options import NotNegative, Share
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.running.watchdog import Crawl, crawl
-from integrators.stepping import ProgramBase, StepperBase
+from integrators.stepping import ProgramBase, RestorableStepper
 from problems.errors import InputError
 from problems.problem import System
 
@@ -192,7 +192,7 @@ def _factored(matrix: Any) -> _Factored:
     return _Factored(matrix, splu(matrix))
 
 
-class SciPyStepper(StepperBase):
+class SciPyStepper(RestorableStepper):
     """A trajectory of one of SciPy's solvers.
 
     ``"side"`` (default)

@@ -1,9 +1,10 @@
 """Integrate a problem with a method: the one function most users need."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,25 +16,32 @@ from integrators.events.finder import Ending, Finder, started_with_events
 from integrators.protocol import (
     SAMPLINGS,
     Array,
+    Checkpoints,
+    Destination,
+    KeptError,
     MethodBase,
-    Samples,
-    Stats,
+    Program,
+    Samplings,
     Status,
     UserError,
-    as_numbers,
     check_problem,
-    check_times,
+    offers,
 )
-from integrators.running.watch import Bar, Pieces, Report, Watch, identity, read
+from integrators.refusals import as_numbers, check_times
+from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
 from problems import limits
 from problems.calls import readable
 from problems.checks import Must, checked
 from problems.errors import InputError, shown, unknown
-from problems.problem import Problem
+from problems.problem import Problem, System
 from problems.systems.untraced import Foreign
 
 DEFAULT_SAMPLES = 1001
+SECONDS = 60.0  # from one file to the next
+FIRST = 1e-5  # of the interval: the first piece, when nothing is known of its cost ...
+UNSEEN = 1e-3  # ... and where nobody wants to know of it
+PROGRAMS = 8  # kept with each system
 NotNegative = Annotated[float, Must("a number of seconds, 0 or more", lambda x: x >= 0)]
 
 
@@ -47,7 +55,7 @@ def integrate(
     *,
     progress: bool | Report = False,
     checkpoint: str | os.PathLike[str] | None = None,
-    every_seconds: float = 60.0,
+    every_seconds: float = SECONDS,
     resume: str | os.PathLike[str] | None = None,
 ) -> Solution:
     """Integrate ``problem`` with ``method`` and return the states at ``times``.
@@ -113,194 +121,169 @@ def integrate(
         raise unknown("sampling", sample, SAMPLINGS)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
-    seconds = checked("integrate", "every_seconds", every_seconds, NotNegative)
+    if every_seconds is not SECONDS:
+        every_seconds = checked("integrate", "every_seconds", every_seconds, NotNegative)
     if progress is True:
         with Bar() as bar:
             return integrate(
                 problem, method, times, sample, events,
-                progress=bar, checkpoint=checkpoint, every_seconds=seconds, resume=resume,
+                progress=bar, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
             )  # fmt: skip
-    program = method.compile(problem.system)
+
+    program, known = _compiled(method, problem.system)
     grid = _grid(problem, times)
-    looked_for: dict[str, Event] = {}
-    if not isinstance(events, Sequence) or events:
-        if sample == "land":
-            raise InputError(
-                "events are those of the method's own steps, which sample='land' changes; use 'side'."
-            )
-        looked_for = named(events)
-    end = float(check_times(grid, problem.t0)[-1]) if grid.size or looked_for else problem.t0
-    path = None if checkpoint is None else Path(checkpoint)
-    kept, belongs = {}, {}
-    if path is not None or resume is not None:
-        belongs = identity(problem, method, grid, sample, looked_for)
-    if resume is not None and (Path(resume) != path or Path(resume).exists()):
-        kept = read(resume, belongs)
-    report = progress or None
-    watch = Watch(problem.t0, end, report, path, seconds, belongs)
+    wanted = _wanted(events, sample)
+    end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
+    watch, kept = None, None
+    if progress or checkpoint is not None or resume is not None:
+        belongs = identity(problem, method, grid, sample, wanted)
+        path = None if checkpoint is None else Path(checkpoint)
+        if resume is not None and (Path(resume) != path or Path(resume).exists()):
+            kept = read(resume, belongs)
+        watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)
+
+    stepper = _start(program, method, problem, wanted, end)
+    if (checkpoint is not None or resume is not None) and not offers(stepper, Checkpoints):
+        raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
+    if grid.size and offers(stepper, Destination):
+        stepper.destination = end
+    t, y, made = [grid[:0]], [np.empty((0, problem.system.dim))], 0
+    here, status, reason, before = problem.t0, Status.FINISHED, "", None
+    if kept is not None:
+        stepper.restore(kept["stepper"])
+        t, y, made = [kept["t"]], [kept["y"]], kept["made"]
+        here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
+        if wanted:
+            stepper.search.load(kept["search"])
+
+    by_steps = watch is not None and watch.looks and _goes_by_steps(stepper, sample)
+    length = abs(end - problem.t0) * (FIRST if watch is not None and watch.looks else UNSEEN)
     try:
-        if looked_for:
-            stepper: Any = started_with_events(program, problem, looked_for)(
-                problem.y0, problem.par, problem.t0, end
-            )
-        else:
-            stepper = program.start(problem.y0, problem.par, problem.t0)
-    except UserError as raised:
-        raise raised.error from None
-    way = _Way(stepper, grid, sample, kept.get("way"))
-    way.go(watch)
-    watch.write()
-    samples, stats = way.samples, way.stats
-    error: Exception | None = getattr(stepper, "error", None)
+        while made < grid.size and status is Status.FINISHED:
+            piece, how, count = _next_piece(grid, made, here, length, sample, by_steps)
+            began = perf_counter()
+            samples = stepper.advance(piece, sample=how)
+            length *= _growth(perf_counter() - began)
+            status, reason = samples.status, samples.reason
+            here = float(piece[-1]) if status is Status.FINISHED else stepper.t
+            if how == sample:
+                t.append(samples.t)
+                y.append(samples.y)
+                made += count if sample == "steps" else samples.t.size
+            if watch is not None:
+                stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
+                if watch.keeps:
+                    t, y = [np.concatenate(t)], [np.concatenate(y)]
+                    watch.keep(
+                        {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": made, "here": here}
+                        | {"status": status, "reason": reason, "stats": stats}
+                        | ({"search": stepper.search.save()} if wanted else {})
+                    )
+                watch.look(here, stats.steps)
+        if wanted and grid.size and status is Status.FINISHED:
+            stepper.look_to(end)
+    except KeyboardInterrupt:
+        status, reason = Status.INTERRUPTED, "Ctrl-C was pressed."
+    if watch is not None:
+        watch.write()
+
+    error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
         raise error
-    finished = samples.status is Status.FINISHED
+    stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
     if isinstance(problem.system, Foreign):
         stats.extra = {**stats.extra, "field": problem.system.written}
-    if watch.failure:
+    if watch is not None and watch.failure:
         stats.extra = {**stats.extra, "checkpoint": watch.failure}
     if sample == "dense":  # the polynomials conserve nothing
         stats.extra = {**stats.extra, "sample": sample}
+    reached = np.concatenate(t)
     solution = Solution(
-        t=samples.t,
-        y=samples.y,
-        status=samples.status,
-        reason=samples.reason,
-        t_stop=float(samples.t[-1]) if finished and samples.t.size else way.t,
+        t=reached,
+        y=np.concatenate(y),
+        status=status,
+        reason=reason,
+        t_stop=float(reached[-1]) if status is Status.FINISHED and reached.size else here,
         stats=stats,
-        compile_seconds=program.compile_seconds,
-        from_cache=program.from_cache,
+        compile_seconds=program.compile_seconds - (known or 0.0),
+        from_cache=program.from_cache if known is None else program.from_cache is not None or None,
         problem=problem,
         method=method,
         error=error,
     )
-    return _with_events(solution, stepper.search) if looked_for else solution
+    return _with_events(solution, stepper.search) if wanted else solution
 
 
-class _Way:
-    """The samples of a trajectory, made piece by piece, with the very bits of one call of ``advance``.
+def _compiled(method: MethodBase, system: System) -> tuple[Program, float | None]:
+    """Return the method compiled for the system, and the seconds it took if that was for an earlier call.
 
-    Parameters
-    ----------
-    stepper : Stepper
-        At the start.
-    grid : ndarray, shape (n,)
-        Times asked for.
-    sample : str or None
-        The sampling.
-    kept : mapping, optional
-        What `save` returned, of the same integration: it goes on from there.
+    The last programs of a system are kept with it, and end with it.
     """
-
-    def __init__(self, stepper: Any, grid: Array, sample: str | None, kept: Mapping[str, Any] | None):
-        self._stepper, self._grid, self._sample = stepper, grid, sample
-        self._t, self._y = [grid[:0]], [np.empty((0, stepper.y.size))]
-        self._made, self._before = 0, Stats()
-        self._status, self._reason = Status.FINISHED, ""
-        self.t = stepper.t
-        self._search: Finder | None = getattr(stepper, "search", None)
-        if grid.size:
-            stepper.destination = float(grid[-1])  # collapsed steps are judged by the whole way
-        if kept is not None:
-            stepper.restore(kept["stepper"])
-            self._t, self._y, self._made, self._before = [kept["t"]], [kept["y"]], kept["made"], kept["stats"]
-            self._status, self._reason, self.t = kept["status"], kept["reason"], kept["here"]
-            if "search" in kept:
-                stepper.search.load(kept["search"])
-
-    @property
-    def samples(self) -> Samples:
-        """All until now."""
-        return Samples(np.concatenate(self._t), np.concatenate(self._y), self._status, self._reason)
-
-    @property
-    def stats(self) -> Stats:
-        """Counters of all the work, that before a break too."""
-        now, before = replace(self._stepper.stats), self._before
-        if not before.steps:
-            return now
-        for name in ("steps", "rejections", "evaluations", "iterations"):
-            counts = [count for count in (getattr(now, name), getattr(before, name)) if count is not None]
-            setattr(now, name, sum(counts) if counts else None)
-        names = [name for solver in (before.solver, now.solver) if solver for name in solver.split(", ")]
-        now.solver = ", ".join(dict.fromkeys(names)) or None
-        now.extra = _with_those_before(now.extra, before.extra)
-        return now
-
-    def save(self) -> dict[str, Any]:
-        """Return what the continuation depends on."""
-        samples = self.samples
-        self._t, self._y = [samples.t], [samples.y]
-        return {
-            "stepper": self._stepper.checkpoint(), "t": samples.t, "y": samples.y, "made": self._made,
-            "stats": self.stats, "status": self._status, "reason": self._reason, "here": self.t,
-            **({} if self._search is None else {"search": self._search.save()}),
-        }  # fmt: skip
-
-    def go(self, watch: Watch) -> None:
-        """Go to the end, a failure or Ctrl-C; ``watch`` looks after each piece."""
-        grid, ways = self._grid, getattr(self._stepper, "samplings", SAMPLINGS)
-        walks = watch.looks and "steps" in ways and self._sample != "land"
-        walks = walks and (self._sample is not None or ways[0] != "land")
-        pieces = Pieces(grid[-1] - self._stepper.t, watch) if grid.size else None
-        try:
-            while pieces is not None and self._made < grid.size and self._status is Status.FINISHED:
-                with pieces:
-                    self._piece(pieces.length, walks)
-                watch.look(self.t, lambda: self.stats.steps, lambda: {"way": self.save()})
-            if self._search is not None and grid.size and self._status is Status.FINISHED:
-                self._stepper.look_to(float(grid[-1]))
-        except KeyboardInterrupt:
-            self._status = Status.INTERRUPTED
-            self._reason = "Ctrl-C was pressed."
-
-    def _piece(self, length: float, walks: bool) -> None:
-        """Go on for a length of time: to its samples, or else by own steps, or else to the next sample."""
-        stepper, grid, made = self._stepper, self._grid, self._made
-        sign = 1.0 if grid[-1] >= self.t else -1.0
-        goal = self.t + sign * length
-        ahead = sign * (grid[made:] - goal) <= 0.0
-        n = int(np.count_nonzero(ahead))
-        how = self._sample
-        if how == "steps":
-            done = sign * (goal - grid[-1]) >= 0.0
-            part = np.array([grid[-1] if done else goal])
-            part = np.append(grid[:1], part) if grid[0] == self.t != part[0] else part
-            n = grid.size if done else 0
-        elif n or not walks or goal == self.t:
-            n = n or 1
-            part = grid[made : made + n]
-        else:
-            part, how = np.array([goal]), "steps"
-        reached = stepper.advance(part, sample=how)
-        if how == self._sample:
-            self._t.append(reached.t)
-            self._y.append(reached.y)
-            self._made += n if self._sample == "steps" else reached.t.size
-        self._status, self._reason = reached.status, reached.reason
-        self.t = float(part[-1]) if reached.status is Status.FINISHED else stepper.t
+    programs = vars(system).setdefault("_programs", {})
+    if (program := programs.get(method)) is not None:
+        return program, program.compile_seconds
+    program = method.compile(system)
+    if len(programs) >= PROGRAMS:
+        programs.pop(next(iter(programs)), None)
+    programs[method] = program
+    return program, None
 
 
-_SETTINGS = ("k", "s")  # whole numbers in ``Stats.extra`` that count nothing
+def _wanted(events: Any, sample: str | None) -> dict[str, Event]:
+    """Return the events to look for, by name."""
+    if isinstance(events, Sequence) and not events:
+        return {}
+    if sample == "land":
+        raise InputError(
+            "events are those of the method's own steps, which sample='land' changes; use 'side'."
+        )
+    return named(events)
 
 
-def _with_those_before(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what is told of an integration beside its counters, with what was told before a break."""
-    joined = {**before, **now}
-    for key in before.keys() & now.keys():
-        match before[key], now[key]:
-            case dict() as first, dict() as second:
-                joined[key] = _with_those_before(second, first)
-            case bool(), _:
-                pass
-            case (int() | float()) as first, (int() | float()) as second if key not in _SETTINGS:
-                joined[key] = first + second
-            case list() as first, list() as second if key == "kinks":
-                known = second[: len(first)] == first  # a stepper that was restored knows them
-                joined[key] = second if known else first + second
-            case _:
-                pass
-    return joined
+def _start(
+    program: Program, method: MethodBase, problem: Problem, events: dict[str, Event], end: float
+) -> Any:
+    """Return a stepper at the problem's start; what a function of the user raises there is raised."""
+    try:
+        if events:
+            start = started_with_events(program, method, problem, events)
+            return start(problem.y0, problem.par, problem.t0, end)
+        return program.start(problem.y0, problem.par, problem.t0)
+    except UserError as raised:
+        raise raised.error from None
+
+
+def _goes_by_steps(stepper: Any, sample: str | None) -> bool:
+    """Whether own steps can be taken between two samples, and change nothing of the samples."""
+    ways = stepper.samplings if offers(stepper, Samplings) else SAMPLINGS
+    return "steps" in ways and (sample or ways[0]) != "land"
+
+
+def _next_piece(
+    grid: Array, made: int, here: float, length: float, sample: str | None, by_steps: bool
+) -> tuple[Array, str | None, int]:
+    """Return the times of the next piece, how to sample them, and how many of the grid they serve.
+
+    A piece goes on for about ``length``: to the samples that lie there, or else by own steps, or else to
+    the next sample. So pieces give the bits of one call of ``advance``.
+    """
+    sign = 1.0 if grid[-1] >= here else -1.0
+    goal = here + sign * length
+    count = int(np.count_nonzero(sign * (grid[made:] - goal) <= 0.0))
+    if sample == "steps":
+        done = sign * (goal - grid[-1]) >= 0.0
+        last = grid[-1] if done else goal
+        piece = np.array([here, last] if grid[0] == here != last else [last])
+        return piece, sample, grid.size if done else 0
+    if count == 0 and by_steps and goal != here:
+        return np.array([goal]), "steps", 0
+    count = max(count, 1)
+    return grid[made : made + count], sample, count
+
+
+def _growth(seconds: float) -> float:
+    """Return by what factor the next piece is longer, after one that took so long."""
+    return 4.0 if seconds < SOON / 4.0 else 0.5 if seconds > 2.0 * SOON else 1.0
 
 
 def _with_events(solution: Solution, search: Finder) -> Solution:

@@ -18,17 +18,19 @@ from integrators.events.members import follow
 from integrators.options import Count
 from integrators.protocol import (
     Array,
+    Batches,
     MethodBase,
+    PieceSize,
     Program,
     Status,
+    Threads,
     Trajectories,
     UserError,
-    as_numbers,
-    check_batch,
     check_problem,
-    check_times,
+    offers,
     telling,
 )
+from integrators.refusals import as_numbers, check_batch, check_times
 from integrators.running.watch import SOON, Bar, Progress, Report
 from integrators.solution import Occurrences
 from problems.calls import readable
@@ -190,7 +192,7 @@ def integrate_many(
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
     if looked_for and backend is not None:
         raise InputError(f"events are not looked for with backend={backend!r}; leave it out.")
-    start = started_with_events(program, problem, looked_for) if looked_for else None
+    start = started_with_events(program, method, problem, looked_for) if looked_for else None
     made = Solutions(
         t=grid,
         y=np.full((n, grid.size, system.dim), np.nan),
@@ -223,16 +225,16 @@ def _program(system: System, method: MethodBase, backend: str | None) -> Program
 
 
 def _integrate(
-    program: Program, made: Solutions, threads: int, report: Report | None, start: Callable[..., Any] | None
+    program: Any, made: Solutions, threads: int, report: Report | None, start: Callable[..., Any] | None
 ) -> None:
     """Integrate piece by piece, each of which takes about `SOON`; ``start`` where events are looked for."""
-    batch: Any = getattr(program, "batch", None)
+    batch: Any = program.batch if offers(program, Batches) else None
     if start is not None:
         batch = partial(_with_events, start, made)
     options = {"times": made.t, "t0": made.problem.t0}
-    if getattr(program, "threaded", False):
+    if offers(program, Threads) and program.threaded:
         options["threads"] = threads
-    few = getattr(program, "piece", FIRST * threads)
+    few = program.piece if offers(program, PieceSize) else FIRST * threads
     size = 1 if batch is None else threads if start is not None else few
     first, began, n = 0, perf_counter(), len(made)
     while first < n:

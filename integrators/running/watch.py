@@ -6,15 +6,15 @@ import os
 import pickle
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
-from integrators.protocol import Array, MethodBase
+from integrators.protocol import Array, MethodBase, Stats
 from integrators.solution import write_whole
 from problems import emit
 from problems.errors import InputError, shown
@@ -23,8 +23,6 @@ from problems.systems.code_digest import code_digest
 
 MAGIC = b"hbvm-bench checkpoint 1"
 SOON = 0.1  # seconds from one look to the next, about
-FIRST = 1e-5  # of the way: the first piece, when nothing is known of its cost ...
-UNSEEN = 1e-3  # ... and where nobody wants to know of it
 
 
 @dataclass(frozen=True)
@@ -93,20 +91,27 @@ class Watch:
         self.looks = report is not None or path is not None
         """Whether anybody wants to know of the way between two samples."""
 
-    def look(self, t: float, steps: Callable[[], int], kept: Callable[[], dict[str, Any]]) -> None:
-        """Take note that the integration is at ``t`` after ``steps()``, from where ``kept()`` goes on."""
-        now = perf_counter()
-        if self._path is not None:
-            self._kept = kept()
-            if now - self._written >= self._every:
-                self.write()
+    @property
+    def keeps(self) -> bool:
+        """Whether there is a file to write."""
+        return self._path is not None
+
+    def keep(self, kept: dict[str, Any]) -> None:
+        """Take note of what the continuation depends on, and write the file if it is time."""
+        self._kept = kept
+        if perf_counter() - self._written >= self._every:
+            self.write()
+
+    def look(self, t: float, steps: int) -> None:
+        """Report that the integration is at ``t`` after so many steps."""
         if self._report is not None:
+            now = perf_counter()
             way = (t - self._t0) / (self._end - self._t0) if self._end != self._t0 else 1.0
             fraction = min(max(way, 0.0), 1.0)
             self._first = fraction if self._first is None else self._first
             seconds, made = now - self._began, fraction - self._first
             left = seconds * (1.0 - fraction) / made if made > 0.0 else float("inf")
-            self._report(Progress(t, fraction, steps(), seconds, left))
+            self._report(Progress(t, fraction, steps, seconds, left))
 
     def write(self) -> None:
         """Write the file now, if there is one and anything to keep; note where that cannot be done."""
@@ -121,27 +126,6 @@ class Watch:
         except InputError as error:  # a full disk: the solution is worth more than its checkpoint
             self.failure = f"the last checkpoint is not of the end: {error}"
         self._written = perf_counter()
-
-
-class Pieces:
-    """Lengths of time that take about `SOON` to integrate, as measured.
-
-    Attributes
-    ----------
-    length : float
-        Of the next piece, in units of the problem's time.
-    """
-
-    def __init__(self, way: float, watch: Watch):
-        self.length = (FIRST if watch.looks else UNSEEN) * abs(way)
-
-    def __enter__(self) -> Self:
-        self._began = perf_counter()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        took = perf_counter() - self._began
-        self.length *= 4.0 if took < SOON / 4.0 else 0.5 if took > 2.0 * SOON else 1.0
 
 
 def identity(
@@ -190,6 +174,42 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
                 "resume that integration, or leave out resume=."
             )
     return pickle.loads(kept)
+
+
+def both(before: Stats, now: Stats) -> Stats:
+    """Return the counters of all the work, that before a break and that since."""
+    total = replace(now)
+    if not before.steps:
+        return total
+    for name in ("steps", "rejections", "evaluations", "iterations"):
+        counts = [count for count in (getattr(now, name), getattr(before, name)) if count is not None]
+        setattr(total, name, sum(counts) if counts else None)
+    names = [name for solver in (before.solver, now.solver) if solver for name in solver.split(", ")]
+    total.solver = ", ".join(dict.fromkeys(names)) or None
+    total.extra = _with_those_before(now.extra, before.extra)
+    return total
+
+
+_SETTINGS = ("k", "s")  # whole numbers in ``Stats.extra`` that count nothing
+
+
+def _with_those_before(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is told of an integration beside its counters, with what was told before a break."""
+    joined = {**before, **now}
+    for key in before.keys() & now.keys():
+        match before[key], now[key]:
+            case dict() as first, dict() as second:
+                joined[key] = _with_those_before(second, first)
+            case bool(), _:
+                pass
+            case (int() | float()) as first, (int() | float()) as second if key not in _SETTINGS:
+                joined[key] = first + second
+            case list() as first, list() as second if key == "kinks":
+                known = second[: len(first)] == first  # a stepper that was restored knows them
+                joined[key] = second if known else first + second
+            case _:
+                pass
+    return joined
 
 
 class Bar:

@@ -1,7 +1,9 @@
 """When steps of varying length have collapsed: the same rule for every method, ours and the peers'."""
 
 import math
-from typing import Any
+from typing import Protocol
+
+from integrators.protocol import Destination
 
 CRAWL_STEPS = 200_000
 """Steps after which a method must have got somewhere."""
@@ -83,16 +85,26 @@ class Crawl:
         )
 
 
-def crawl(stepper: Any, t: float, end: float) -> Crawl:
+class Watched(Destination, Protocol):
+    """A stepper that is watched on its way.
+
+    Attributes
+    ----------
+    crawl : Crawl or None
+        What watches it, where it has a destination; kept here from piece to piece.
+    """
+
+    crawl: Crawl | None
+
+
+def crawl(stepper: Watched, t: float, end: float) -> Crawl:
     """Return what watches a stepper on its way from ``t`` to ``end``.
 
     Where somebody has it go piece by piece, to its attribute ``destination``, one watch serves all the
     pieces, and what is a small share of the way is measured by the whole of it.
     """
-    destination = getattr(stepper, "destination", None)
-    if destination is None:
+    if stepper.destination is None:
         return Crawl(t, end)
-    watch = getattr(stepper, "_crawl", None)
-    if watch is None:
-        stepper._crawl = watch = Crawl(t, destination)
-    return watch
+    if stepper.crawl is None:
+        stepper.crawl = Crawl(t, stepper.destination)
+    return stepper.crawl

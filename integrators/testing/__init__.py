@@ -15,6 +15,18 @@ rule does not apply to the method. `check_method` runs them all;
 from collections.abc import Callable
 
 from integrators.protocol import MethodBase
+from integrators.testing.capabilities import (
+    a_destination_leaves_the_samples_alone,
+    batches_are_single_trajectories,
+    comes_back_when_it_is_stopped,
+    finds_events_beside_its_steps,
+    is_the_hbvm_that_it_names,
+    keeps_the_error_of_a_user_s_function,
+    prepared_batches_are_batches,
+    samplings_are_as_stated,
+    the_size_of_a_piece_is_a_count,
+    threads_change_no_bits,
+)
 from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit, refuses_other_checkpoints
 from integrators.testing.convergence import measured_order
 from integrators.testing.description import (
@@ -72,6 +84,16 @@ CHECKS: tuple[Check, ...] = (
     refuses_bad_times,
     refuses_bad_states,
     failure_is_a_status,
+    samplings_are_as_stated,
+    a_destination_leaves_the_samples_alone,
+    keeps_the_error_of_a_user_s_function,
+    comes_back_when_it_is_stopped,
+    finds_events_beside_its_steps,
+    batches_are_single_trajectories,
+    prepared_batches_are_batches,
+    threads_change_no_bits,
+    the_size_of_a_piece_is_a_count,
+    is_the_hbvm_that_it_names,
 )
 
 

@@ -5,19 +5,23 @@ from typing import Any
 
 import numpy as np
 
-from integrators.protocol import MethodBase
+from integrators.protocol import Checkpoints, MethodBase, offers
 from integrators.testing.exercises import blow_up, pendulum, two_bodies
 from integrators.testing.rules import finished, irregular, raises, require, start
 from problems import Problem, emit
 from problems.errors import InputError
+
+NONE = "it has no checkpoints"
 
 
 def checkpoints_continue_bit_for_bit(method: MethodBase, problem: Problem) -> str | None:
     """Check that a restored checkpoint continues with the same bits, here and in a new stepper."""
     grid = irregular(problem)
     head, tail = grid[:7], grid[7:]
-    program = method.compile(problem.system)
+    program: Any = method.compile(problem.system)
     stepper = program.start(problem.y0, problem.par, problem.t0)
+    if not offers(stepper, Checkpoints):
+        return NONE
     stepper.advance(head)
     checkpoint = stepper.checkpoint()
     there = (stepper.t, stepper.y.copy())
@@ -40,6 +44,8 @@ def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | Non
     """Check that no checkpoint but those of this method, system and parameters is taken."""
     grid = irregular(problem)
     stepper = start(method, problem)
+    if not offers(stepper, Checkpoints):
+        return NONE
     stepper.advance(grid[:7])
     others: dict[str, Any] = {"None": None, "a number": 1.5, "an empty tuple": (), "an array": problem.y0}
     for name, value in method.options(defaults=True).items():
@@ -56,7 +62,8 @@ def refuses_other_checkpoints(method: MethodBase, problem: Problem) -> str | Non
         if not same and method.accepts(other) is None:
             others[f"that of {other.system.name}"] = start(method, other).checkpoint()
     if problem.par.size:
-        twice = method.compile(problem.system).start(problem.y0, problem.par * 2.0, problem.t0)
+        program: Any = method.compile(problem.system)
+        twice = program.start(problem.y0, problem.par * 2.0, problem.t0)
         others["that of other parameters"] = twice.checkpoint()
     there = (stepper.t, stepper.y, stepper.status)
     for what, checkpoint in others.items():

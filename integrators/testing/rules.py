@@ -1,10 +1,11 @@
 """What the checks have in common: how they fail, and what they put to a method."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from integrators.protocol import Array, MethodBase, Samples, Status, Stepper
+from integrators.protocol import Array, MethodBase, Samples, Status
 from problems import Problem
 
 
@@ -23,8 +24,8 @@ def raises(error: type[Exception], call: Callable[[], object], rule: str) -> Non
     raise AssertionError(f"broken: {rule} (no {error.__name__} was raised)")
 
 
-def start(method: MethodBase, problem: Problem) -> Stepper:
-    """Return a stepper at the problem's start."""
+def start(method: MethodBase, problem: Problem) -> Any:
+    """Return a stepper at the problem's start; what it offers beyond `Stepper` is asked for by `offers`."""
     return method.compile(problem.system).start(problem.y0, problem.par, problem.t0)
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 import integrators
 from integrators import HBVM, Gauss, registry, testing
-from integrators.protocol import Status, check_state, check_times
+from integrators.protocol import Status
+from integrators.refusals import check_state, check_times
 from integrators.running.times import plan
 from problems import Hamiltonian, Problem
 from problems.errors import InputError, UnknownNameError

@@ -8,7 +8,7 @@ import numpy as np
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status
 from integrators.running.watchdog import CRAWL_STEPS, Crawl, crawl
-from integrators.stepping import FixedStepper, ProgramBase, StepperBase
+from integrators.stepping import FixedStepper, ProgramBase, RestorableStepper, StepperBase
 from problems.errors import InputError
 from problems.problem import System
 
@@ -133,7 +133,7 @@ class DiffraxStepper(FixedStepper):
         self._way = self._way.towards(sign)
 
 
-class AdaptiveStepper(StepperBase):
+class AdaptiveStepper(RestorableStepper):
     """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
 
     ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain

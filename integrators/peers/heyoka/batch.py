@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.peers import load
-from integrators.protocol import Array, Status, Trajectories, check_batch, check_times
+from integrators.protocol import Array, Status, Trajectories
+from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts
 from integrators.running.watchdog import CRAWL_STEPS, Crawl
 from problems import emit

@@ -20,7 +20,7 @@ from integrators.peers.heyoka.batch import Lanes
 from integrators.peers.heyoka.events import TaylorSearch, heyoka_events
 from integrators.protocol import Array, MethodBase, Status, Trajectories
 from integrators.running.watchdog import CRAWL_STEPS, crawl
-from integrators.stepping import ProgramBase, StepperBase
+from integrators.stepping import ProgramBase, RestorableStepper
 from problems.problem import Problem, System
 
 EPS = float(np.finfo(np.float64).eps)
@@ -228,7 +228,7 @@ def _caches(hy: Any) -> Iterator[bool]:
         hy.llvm_state.set_diskcache_enabled(enabled)
 
 
-class TaylorStepper(StepperBase):
+class TaylorStepper(RestorableStepper):
     """A trajectory of heyoka's; ``"side"`` (default), ``"steps"`` or ``"land"``, see `Taylor`."""
 
     samplings = ("side", "steps", "land")

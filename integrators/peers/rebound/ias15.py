@@ -10,7 +10,7 @@ from integrators.options import NotNegative, Step
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundMethod, ReboundProgram, calls, choose
 from integrators.protocol import Array, Status
 from integrators.running.watchdog import CRAWL_STEPS
-from integrators.stepping import StepperBase
+from integrators.stepping import RestorableStepper
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -119,7 +119,7 @@ class IAS15(ReboundMethod):
         return IAS15Stepper(program, layout, self, y, t)
 
 
-class IAS15Stepper(StepperBase):
+class IAS15Stepper(RestorableStepper):
     """A trajectory of IAS15: ``"land"`` (default) or ``"steps"``."""
 
     samplings = ("land", "steps")

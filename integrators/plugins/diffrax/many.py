@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.plugins import diffrax as plugin  # says what is missing, if JAX or diffrax is
-from integrators.protocol import Array, MethodBase, Status, Trajectories, check_batch, check_times
+from integrators.protocol import Array, MethodBase, Status, Trajectories
+from integrators.refusals import check_batch, check_times
 from integrators.running.times import plan
 from problems import emit
 from problems.errors import InputError

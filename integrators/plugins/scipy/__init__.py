@@ -21,7 +21,7 @@ from integrators.options import Count, Stages, Step
 from integrators.plugins.scipy.field import Field, field, recognised
 from integrators.plugins.scipy.native import NativeSteps
 from integrators.plugins.scipy.python import PythonSteps
-from integrators.protocol import as_numbers
+from integrators.refusals import as_numbers
 from problems.checks import Positive, checked
 from problems.errors import InputError, shown
 

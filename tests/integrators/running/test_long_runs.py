@@ -25,8 +25,8 @@ from integrators import (
     Taylor,
     WHFast,
     integrate,
-    watch,
 )
+from integrators.running import watch
 from integrators.stepping import FixedStep
 from problems import InputError
 

@@ -1,0 +1,157 @@
+"""What a stepper refuses: times, states and parameters that it cannot use, and a second thread."""
+
+import functools
+import threading
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from problems import limits
+from problems.errors import InputError, shown
+from problems.problem import System
+
+Array = NDArray[np.float64]
+
+P = ParamSpec("P")
+Result = TypeVar("Result")
+
+
+class Guarded(Protocol):
+    """What has a lock of its own."""
+
+    _at_work: threading.RLock  # type: ignore[valid-type]
+
+
+S = TypeVar("S", bound=Guarded)
+
+
+def check_times(times: ArrayLike, t: float) -> Array:
+    """Return ``times`` as a float64 array, or raise for times no stepper can serve.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        Requested times; n >= 1, finite, strictly monotone; none behind ``t``
+        in the direction of integration.
+    t : float
+        The stepper's present time.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the times are empty, not finite, not strictly monotone or behind ``t``.
+    """
+    grid = np.atleast_1d(as_numbers("times", times))
+    if grid.ndim != 1 or grid.size == 0:
+        raise InputError(f"times must be a non-empty one-dimensional array, not of shape {grid.shape}.")
+    if not np.isfinite(grid).all():
+        raise InputError("times must be finite numbers.")
+    rest = grid if grid[0] != t else grid[1:]
+    path = np.concatenate([[t], rest])
+    gaps = np.diff(path)
+    if not (np.all(gaps > 0) or np.all(gaps < 0)):
+        raise InputError(
+            f"times must be strictly monotone and ahead of the present time {t!r}; "
+            f"got {float(grid[0])!r} ... {float(grid[-1])!r}."
+        )
+    return grid
+
+
+def as_numbers(what: str, value: ArrayLike) -> Array:
+    """Return an array of float64, or refuse what is not made of numbers."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} must be numbers, not {shown(value)}.") from None
+
+
+def check_start(t0: Any) -> float:
+    """Return the time of a start, a finite number, or refuse it."""
+    time = as_numbers("t0", t0)
+    if time.ndim or not np.isfinite(time):
+        raise InputError(f"t0={shown(t0)} must be one finite number.")
+    return float(time)
+
+
+def check_parameters(par: ArrayLike | None, system: System) -> Array:
+    """Return a parameter vector as a fresh array, the system's own by default, or refuse it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is not made of numbers, or not of the system's length.
+    """
+    if par is None:
+        return system.pack()
+    values = as_numbers("par", par)
+    if values.shape != (system.n_par,):
+        raise InputError(f"par must have shape ({system.n_par},), not {values.shape}; see system.pack.")
+    return values.copy()
+
+
+def check_batch(Y0: ArrayLike, par: ArrayLike | None, times: Array, system: System) -> tuple[Array, Array]:
+    """Return a batch's starts (n, dim) and parameters (n, n_par) as fresh arrays, or refuse them.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If they are of other shapes or not finite, or if n trajectories at so many times take too much memory.
+    """
+    rows = np.atleast_2d(as_numbers("Y0", Y0))
+    if rows.ndim != 2 or rows.shape[0] == 0:
+        raise InputError(f"Y0 must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
+    n = rows.shape[0]
+    limits.check(f"a batch of {n} trajectories", "GIB", 8 * times.size * rows.size / 2**30)
+    if rows.shape[1] != system.dim or not np.isfinite(rows).all():
+        for row in rows:
+            check_state(row, system.dim)
+    starts = np.array(rows, order="C")
+    given = None if par is None else as_numbers("par", par)
+    if given is None or given.ndim == 1:
+        return starts, np.tile(check_parameters(given, system), (n, 1))
+    if given.shape != (n, system.n_par):
+        raise InputError(
+            f"par must have shape ({system.n_par},) or ({n}, {system.n_par}), not {given.shape}."
+        )
+    return starts, np.array(given, order="C")
+
+
+def check_state(y0: ArrayLike, dim: int) -> Array:
+    """Return ``y0`` as a fresh float64 array of shape (dim,), or refuse it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the shape is wrong or an entry is not finite.
+    """
+    y = as_numbers("the initial state", y0).copy()
+    if y.shape != (dim,):
+        raise InputError(f"the initial state must have shape ({dim},), not {y.shape}.")
+    if not np.isfinite(y).all():
+        where = int(np.flatnonzero(~np.isfinite(y))[0])
+        raise InputError(f"the initial state must be finite numbers; y0[{where}] is {float(y[where])!r}.")
+    return y
+
+
+def one_thread(method: Callable[Concatenate[S, P], Result]) -> Callable[Concatenate[S, P], Result]:
+    """Let a method of a stepper raise `InputError` while another thread is in one of its methods.
+
+    Compiled code and the peers' libraries release the interpreter's lock while they work on a stepper's
+    memory: two threads in it at once would give numbers that belong to neither.
+    """
+
+    @functools.wraps(method)
+    def guarded(stepper: S, *args: P.args, **kwargs: P.kwargs) -> Result:
+        if not stepper._at_work.acquire(blocking=False):
+            raise InputError(
+                f"this {type(stepper).__name__} is at work in another thread; "
+                "start one stepper for each thread (one program serves them all)."
+            )
+        try:
+            return method(stepper, *args, **kwargs)
+        finally:
+            stepper._at_work.release()
+
+    return guarded

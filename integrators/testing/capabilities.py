@@ -1,0 +1,234 @@
+"""Checks of what a method offers beyond the protocol: where a capability is offered, it keeps its promise."""
+
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from integrators.coefficients.order import order_of
+from integrators.events.event import Event
+from integrators.protocol import (
+    SAMPLINGS,
+    AsHBVM,
+    Batches,
+    Checkpoints,
+    Destination,
+    Events,
+    EventStepper,
+    Interruptible,
+    KeptError,
+    MethodBase,
+    PieceSize,
+    PreparedBatches,
+    Samplings,
+    Status,
+    Threads,
+    offers,
+)
+from integrators.running.integrate import integrate
+from integrators.testing.checkpoints import checkpoints_continue_bit_for_bit
+from integrators.testing.rules import finished, irregular, raises, regular, require, start
+from problems import Foreign, Problem
+from problems.errors import InputError
+
+BATCH_BOUND = 1e-6
+"""Largest difference between a batch and single trajectories, of states of size 1: their steps may differ."""
+
+ROUNDING = 1e-13
+"""Largest change of a sample by events: heyoka compiles other code then (measured: 2.4e-15; ours: 0)."""
+
+EVENT_BOUND = 1e-9
+"""Largest value of an event's function where it is said to vanish."""
+
+
+def samplings_are_as_stated(method: MethodBase, problem: Problem) -> str | None:
+    """Check that the stated samplings are taken, the first by default, and that no others are."""
+    grid = irregular(problem)
+    stepper = start(method, problem)
+    if not offers(stepper, Samplings):
+        return "all samplings are expected of it"
+    stated = stepper.samplings
+    for sample in stated:
+        finished(start(method, problem).advance(grid[-1:], sample=sample), method)
+    for sample in set(SAMPLINGS) - set(stated):
+        raises(
+            InputError,
+            lambda s=sample: start(method, problem).advance(grid, sample=s),
+            f"sample={sample!r}, which is not stated, is refused",
+        )
+    plain, first = (
+        start(method, problem).advance(grid),
+        start(method, problem).advance(grid, sample=stated[0]),
+    )
+    require(np.array_equal(plain.y, first.y), f"sample={stated[0]!r}, stated first, is the default")
+    return None
+
+
+def a_destination_leaves_the_samples_alone(method: MethodBase, problem: Problem) -> str | None:
+    """Check that pieces on the way to a destination have the bits of one call."""
+    if not offers(start(method, problem), Destination):
+        return "it takes no destination"
+    grid = irregular(problem)
+    whole, stepper = start(method, problem).advance(grid), start(method, problem)
+    stepper.destination = float(grid[-1])
+    pieces = [stepper.advance(piece) for piece in np.array_split(grid, 3)]
+    require(
+        np.array_equal(np.concatenate([piece.y for piece in pieces]), whole.y),
+        "a destination does not change the samples",
+    )
+    return None
+
+
+def keeps_the_error_of_a_user_s_function(method: MethodBase, problem: Problem) -> str | None:
+    """Check that after ``USER_ERROR`` the stepper has the very exception that a function raised."""
+    if not offers(start(method, problem), KeptError):
+        return "it keeps no errors"
+    raised = RuntimeError("no field beyond t = 3")
+
+    def field(t: float, y: Any) -> Any:
+        if t > 3.0:
+            raise raised
+        return [y[1], -y[0]]
+
+    swing = Problem(Foreign(field, dim=2), y0=[1.0, 0.0], t_end=6.0)
+    if (refusal := method.accepts(swing)) is not None:
+        return refusal
+    stepper = start(method, swing)
+    samples = stepper.advance(regular(swing, 7))
+    require(
+        samples.status is Status.USER_ERROR,
+        f"a function that raises ends it as user_error, not {samples.status}",
+    )
+    require(stepper.error is raised, "error is what the function raised")
+    require(samples.t.size > 1, "the states before are returned")
+    return None
+
+
+def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str | None:
+    """Check that events lie where their function vanishes, end what is terminal, and change no sample."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, Events):
+        return "it finds no events"
+    grid, level = irregular(problem), float(problem.y0[0])
+
+    def crossing(q: Any, t: Any) -> Any:
+        return q[0] - level - 1e-3 * (t - problem.t0)
+
+    begin = program.with_events(problem, {"crossing": Event(crossing)})
+    stepper = begin(problem.y0, problem.par, problem.t0, float(grid[-1]))
+    require(offers(stepper, EventStepper), "what with_events starts is an EventStepper")
+    plain = integrate(problem, method, grid)
+    solution = integrate(problem, method, grid, events=Event(crossing, name="crossing"))
+    change = float(np.max(np.abs(solution.y - plain.y)))
+    require(change < ROUNDING, f"events change no sample, but by {change:.1e}")
+    found = solution.events["crossing"]
+    require(found.t.size > 0, "an event that happens is found")
+    there = [
+        abs(float(y[0]) - level - 1e-3 * (t - problem.t0)) for t, y in zip(found.t, found.y, strict=True)
+    ]
+    require(max(there) < 1e-9, f"the function vanishes at its events, but: {max(there):.1e}")
+    ended = integrate(problem, method, grid, events=Event(crossing, name="crossing", terminal=True))
+    require(ended.status is Status.EVENT and ended.t_stop == found.t[0], "a terminal event ends it")
+    return None
+
+
+def comes_back_when_it_is_stopped(method: MethodBase, problem: Problem) -> str | None:
+    """Check that ``advance`` raises KeyboardInterrupt once ``stop`` is set."""
+    stepper = start(method, problem)
+    if not offers(stepper, Interruptible):
+        return "another thread cannot call it back"
+    stepper.stop = threading.Event()
+    stepper.stop.set()
+    try:
+        stepper.advance(irregular(problem))
+    except KeyboardInterrupt:
+        return None
+    raise AssertionError("broken: advance comes back when stop is set")
+
+
+def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
+    """Check that a batch gives what its trajectories give alone, in any order, prepared, and with threads."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, Batches):
+        return "it has no batches"
+    grid = regular(problem, 4)[1:] * 0.25 + 0.75 * problem.t0
+    starts, par = np.outer([1.0, 1.001, 0.999], problem.y0), np.tile(problem.par, (3, 1))
+    options: dict[str, Any] = {"times": grid, "t0": problem.t0}
+    batch = program.batch(starts, par, **options)
+    require(
+        batch.y.shape == (3, grid.size, problem.system.dim), f"y has shape (n, m, dim), not {batch.y.shape}"
+    )
+    require(all(status is Status.FINISHED for status in batch.status), f"all finish, but: {batch.reason}")
+    for y0, states in zip(starts, batch.y, strict=True):
+        alone = program.start(y0, problem.par, problem.t0).advance(grid).y
+        miss = float(np.max(np.abs(alone - states)))
+        require(miss < BATCH_BOUND, f"a trajectory of a batch is that from its start, but for {miss:.1e}")
+    turned = program.batch(starts[::-1], par, **options)
+    require(np.array_equal(turned.y[::-1], batch.y), "a trajectory does not depend on its place in the batch")
+    return None
+
+
+def prepared_batches_are_batches(method: MethodBase, problem: Problem) -> str | None:
+    """Check that a batch that was prepared has the bits of one that was not."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, PreparedBatches):
+        return "it prepares no batches"
+    _same_bits(program, problem, lambda *rows, **options: program.prepare_batch(*rows, **options)())
+    return None
+
+
+def threads_change_no_bits(method: MethodBase, problem: Problem) -> str | None:
+    """Check that a batch in two threads has the bits of one."""
+    program: Any = method.compile(problem.system)
+    if not (offers(program, Threads) and program.threaded):
+        return "its batches take no threads"
+    _same_bits(program, problem, partial(program.batch, threads=2))
+    return None
+
+
+def the_size_of_a_piece_is_a_count(method: MethodBase, problem: Problem) -> str | None:
+    """Check that the size of a first piece is a whole number above 0."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, PieceSize):
+        return "it asks for no size of a piece"
+    require(isinstance(program.piece, int) and program.piece > 0, f"piece is a count, not {program.piece!r}")
+    return None
+
+
+def is_the_hbvm_that_it_names(method: MethodBase, problem: Problem) -> str | None:
+    """Check that the HBVM that a method says it is has its order and its trajectory."""
+    if not offers(method, AsHBVM):
+        return "it is no HBVM"
+    same: Any = method.as_hbvm()  # type: ignore[attr-defined]
+    if method.order is not None:
+        require(order_of(method) == method.order, "its tableau has the order that it states")
+    ours, theirs = (start(each, problem).advance(regular(problem, 5)).y for each in (method, same))
+    require(np.array_equal(ours, theirs), f"{method!r} gives the bits of {same!r}")
+    return None
+
+
+CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
+    Samplings: samplings_are_as_stated,
+    Destination: a_destination_leaves_the_samples_alone,
+    KeptError: keeps_the_error_of_a_user_s_function,
+    Checkpoints: checkpoints_continue_bit_for_bit,
+    Interruptible: comes_back_when_it_is_stopped,
+    Events: finds_events_beside_its_steps,
+    EventStepper: finds_events_beside_its_steps,
+    Batches: batches_are_single_trajectories,
+    PreparedBatches: prepared_batches_are_batches,
+    Threads: threads_change_no_bits,
+    PieceSize: the_size_of_a_piece_is_a_count,
+    AsHBVM: is_the_hbvm_that_it_names,
+}
+"""Which check a capability has."""
+
+
+def _same_bits(program: Any, problem: Problem, run: Callable[..., Any]) -> None:
+    """Fail unless ``run`` gives the bits of ``program.batch``."""
+    starts, par = np.outer([1.0, 1.001, 0.999], problem.y0), np.tile(problem.par, (3, 1))
+    options: dict[str, Any] = {"times": regular(problem, 9)[1:2], "t0": problem.t0}
+    plain, other = program.batch(starts, par, **options), run(starts, par, **options)
+    require(np.array_equal(plain.y, other.y), "it has the bits of a plain batch")
