@@ -1,8 +1,14 @@
 """What a Python function is, as a hash: its code and all that it takes from around it."""
 
+import dis
 import hashlib
 import pickle
+import sys
+import sysconfig
+from contextlib import suppress
 from functools import partial
+from importlib import import_module
+from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -20,7 +26,8 @@ def _feed(digest: Any, value: Any, seen: dict[int, tuple[int, Any]]) -> None:
     """Add to a digest what a value is, the same from process to process.
 
     Of a function that is its code and all that it takes from around it: defaults, variables of
-    functions around it, globals, and the functions among these likewise; of a bound method also the
+    functions around it, globals, the functions among these likewise, and what it names of modules and
+    classes that are no library's; of a bound method also the
     object, of an object that can be called what is run then. ``seen`` numbers what may contain itself,
     by id, and keeps it: an id names a value only while that lives.
     """
@@ -40,10 +47,10 @@ def _feed(digest: Any, value: Any, seen: dict[int, tuple[int, Any]]) -> None:
         digest.update(value.co_code + repr((value.co_names, value.co_varnames, value.co_freevars)).encode())
         _feed(digest, value.co_consts, seen)
     elif isinstance(value, FunctionType):
-        cells = [cell.cell_contents for cell in value.__closure__ or ()]
-        named = {
-            name: value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__
-        }
+        names = _names(value.__code__)
+        cells = [_used(cell.cell_contents, names) for cell in value.__closure__ or ()]
+        around = _imported(value.__code__) | value.__globals__
+        named = {name: _used(around[name], names) for name in names if name in around}
         _feed(digest, (value.__code__, value.__defaults__, value.__kwdefaults__, tuple(cells), named), seen)
     elif isinstance(value, MethodType):
         _feed(digest, (value.__func__, value.__self__), seen)
@@ -63,6 +70,41 @@ def _feed(digest: Any, value: Any, seen: dict[int, tuple[int, Any]]) -> None:
     else:
         run = type(value).__call__ if callable(value) else None
         _feed(digest, (_held(value), run if isinstance(run, FunctionType) else None), seen)
+
+
+def _used(value: Any, names: list[str], within: tuple[Any, ...] = ()) -> Any:
+    """Return what code that looks up ``names`` takes from a value: of a user's module or class, attributes.
+
+    A library's modules and classes count as what their names say.
+    """
+    own = isinstance(value, ModuleType | type) and not _of_a_library(value)
+    if not own or any(value is outer for outer in within):
+        return value
+    wanted = [*names, "__init__", "__call__"] if isinstance(value, type) else names
+    held = {name: vars(value)[name] for name in wanted if name in vars(value)}
+    return value, {name: _used(item, names, (*within, value)) for name, item in held.items()}
+
+
+def _imported(code: CodeType) -> dict[str, Any]:
+    """Return the modules that code imports itself, by name; what cannot be imported is left out."""
+    found = {}
+    for step in dis.get_instructions(code):
+        if step.opname == "IMPORT_NAME":
+            with suppress(Exception):  # whatever the module raises; the function will, too
+                found[step.argval] = import_module(step.argval)
+    return found
+
+
+def _of_a_library(value: ModuleType | type) -> bool:
+    """Whether a module, or that of a class, is Python's own or an installed one."""
+    module = value if isinstance(value, ModuleType) else sys.modules.get(value.__module__)
+    file = getattr(module, "__file__", None)
+    if file is None:  # built in, but for the program's own
+        return getattr(module, "__name__", "") != "__main__"
+    return any(Path(file).is_relative_to(folder) for folder in _LIBRARIES)
+
+
+_LIBRARIES = {sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
 
 
 def _held(value: Any) -> Any:
