@@ -36,7 +36,7 @@ from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index, Store, again, damage, progress
 from hbvm_bench.summaries import export, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
-from hbvm_bench.summaries.rows import by, columns, tasks
+from hbvm_bench.summaries.rows import Task, by, columns, tasks
 from hbvm_bench.summaries.table import Table
 from problems.errors import InputError
 
@@ -118,15 +118,16 @@ def document(stores: Store | Sequence[Store]) -> Document:
     brief = len(tables) > BRIEF_PROBLEMS or len(records) > BRIEF_CASES
     parts = [
         part(
-            text,
+            task.problem,
             [(record, series[record.id]) for record in members],
             look,
-            [case for case in missing if (printed[case.problem], case.ensemble) == (text, ensemble)],
+            [case for case in missing if Task.of(replace(case, problem=printed[case.problem])) == task],
             number,
+            sampled=task.sampled(tables),
             brief=brief,
             summarized=len(tables) > FEW,
         )
-        for number, ((text, ensemble), members) in enumerate(tables.items(), 1)
+        for number, (task, members) in enumerate(tables.items(), 1)
     ]
     one = len(runs) == 1
     title = runs[0].title if one else f"{len(runs)} runs together: {'; '.join(run.title for run in runs)}"

@@ -51,12 +51,14 @@ def part(
     *,
     brief: bool,
     summarized: bool,
+    sampled: str = "",
 ) -> ProblemPart:
     """Make what the report says about one problem, or about an ensemble of it.
 
     ``found`` are its cases, at least one, with their series, and ``missing`` those that have no result yet.
     An ensemble's series are over its trajectories and not over time: it has rows and no figures. ``brief``
-    draws only the main figures, of the most telling cases; ``summarized`` puts the summary into the section.
+    draws only the main figures, of the most telling cases; ``summarized`` puts the summary into the section;
+    ``sampled`` tells it from another part on the problem, by its samples.
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
@@ -70,7 +72,7 @@ def part(
         (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
     )
     wrong = attempt((f"our shortcomings on {text}", lambda: Items(words.shortcomings(records))))
-    title = f"{problem.title}{at_once(ensemble)}"
+    title = f"{problem.title}{at_once(ensemble)}{sampled}"
     unrun = Items([f"`{case.method}`" for case in missing])
     blocks: list[Block] = [
         *(summary if summarized else []),

@@ -83,9 +83,10 @@ def results(
 
     The metrics are those of ``keys``, or the headline ones that fit into the width, in characters.
     """
+    found = tasks(records)
     return [
-        _results(problem + at_once(ensemble), members, keys, sort, width)
-        for (problem, ensemble), members in tasks(records).items()
+        _results(task.problem + at_once(task.ensemble) + task.sampled(found), members, keys, sort, width)
+        for task, members in found.items()
     ]
 
 

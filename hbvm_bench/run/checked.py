@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 
 from hbvm_bench.campaign.file import (
     Campaign,
-    Ensemble,
     EnsembleEntry,
     Goal,
     Limits,
@@ -24,6 +23,7 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
+from hbvm_bench.summaries.rows import Task
 from problems.errors import InputError, unknown
 
 LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
@@ -108,18 +108,18 @@ def _ensemble(many: EnsembleEntry) -> None:
 def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:
     """Return the cases by what a campaign calls their problems and ensembles."""
     found: dict[str, list[Resolved]] = {}
-    texts: dict[tuple[str, Ensemble | None], str] = {
-        (repr(make_problem(fill(entry.use, values))), None): name_of(entry)
+    there = {
+        Task.on(repr(make_problem(fill(entry.use, values))), entry.grid or campaign.grid): name_of(entry)
         for entry in campaign.entries()
         for values in chosen(entry)
+    } | {
+        Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble): name_of(many.entry)
+        for many in campaign.ensembles
     }
-    texts |= {
-        (repr(make_problem(many.problem)), many.ensemble): name_of(many.entry) for many in campaign.ensembles
-    }
-    for name in texts.values():
+    for name in there.values():
         found.setdefault(name, [])
     for one in cases:
-        found[texts[one.case.problem, one.case.ensemble]].append(one)
+        found[there[Task.of(one.case)]].append(one)
     return found
 
 

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.rows import by, reached
+from hbvm_bench.summaries.rows import by, reached, tasks
 
 T = TypeVar("T")
 
@@ -20,8 +20,9 @@ def family_of(record: Record) -> str:
 
 
 def by_problem(records: Sequence[Record]) -> dict[str, list[Record]]:
-    """Return the cases that are no ensembles, problem by problem, in order."""
-    return by(lambda record: record.case.problem, singles(records))
+    """Return the cases that are no ensembles, problem by problem, in order; one with two grids is two."""
+    found = tasks(singles(records))
+    return {task.problem + task.sampled(found): members for task, members in found.items()}
 
 
 def by_family(records: Sequence[Record]) -> dict[str, list[Record]]:

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
-from hbvm_bench.campaign.entries import Ensemble
+import msgspec
+
+from hbvm_bench.campaign.file import Case, Ensemble, Grid
 from hbvm_bench.measure.metrics import METRICS, Metric, find
 from hbvm_bench.store.records import Record, Value
 from hbvm_bench.summaries.table import NONE
@@ -87,9 +89,34 @@ def by(key: Callable[[Record], K], records: Iterable[Record]) -> dict[K, list[Re
     return made
 
 
-def tasks(records: Sequence[Record]) -> dict[tuple[str, Ensemble | None], list[Record]]:
-    """Return the records of each table: one trajectory of a problem, or an ensemble, in order."""
-    return by(lambda record: (record.case.problem, record.case.ensemble), records)
+class Task(NamedTuple):
+    """What the rows of one table share: one trajectory of a problem, or an ensemble, and its samples."""
+
+    problem: str
+    ensemble: Ensemble | None
+    grid: str  # as JSON
+
+    @classmethod
+    def of(cls, case: Case) -> "Task":
+        """Return that of a case."""
+        return cls.on(case.problem, case.grid, case.ensemble)
+
+    @classmethod
+    def on(cls, problem: str, grid: Grid | None = None, ensemble: Ensemble | None = None) -> "Task":
+        """Return that of a problem, as it prints."""
+        return cls(problem, ensemble, msgspec.json.encode(grid or Grid()).decode())
+
+    def sampled(self, tasks: Iterable["Task"]) -> str:
+        """Return what tells it from others of ``tasks`` that differ in their samples alone; else ``""``."""
+        if not any(one != self and one[:2] == self[:2] for one in tasks):
+            return ""
+        said = [f"{name}={value!r}" for name, value in msgspec.json.decode(self.grid).items()]
+        return f", sampled with {', '.join(said) or 'the usual grid'}"
+
+
+def tasks(records: Sequence[Record]) -> dict[Task, list[Record]]:
+    """Return the records of each table, in order: errors at different times are not compared."""
+    return by(lambda record: Task.of(record.case), records)
 
 
 def at_once(ensemble: Ensemble | None) -> str:

@@ -12,7 +12,7 @@ from hbvm_bench.campaign.sweep import combinations, fill
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import accurate, family_of, number
-from hbvm_bench.summaries.rows import tasks
+from hbvm_bench.summaries.rows import Task, tasks
 
 TIME = "warm_seconds"
 
@@ -33,9 +33,11 @@ def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[Problem
     for entry in campaign.entries():
         for chosen in combinations(entry.sweep):
             problem = make_problem(fill(entry.use, entry.values | chosen))
-            found.append((entry, tables.get((repr(problem), None), [])))
+            grid = campaign.grid if entry.grid is None else entry.grid
+            found.append((entry, tables.get(Task.on(repr(problem), grid), [])))
     for many in campaign.ensembles:
-        found.append((many.entry, tables.get((repr(make_problem(many.problem)), many.ensemble), [])))
+        task = Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble)
+        found.append((many.entry, tables.get(task, [])))
     return found
 
 

@@ -1,10 +1,11 @@
 import math
 
 import pytest
+from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Case, Ensemble
+from hbvm_bench.campaign.file import Case, Ensemble, Grid
 from hbvm_bench.store.records import Compile, Law, Load, Record, Result, Timing, TimingRound, Value
-from hbvm_bench.summaries import laws, needs, outcomes, points
+from hbvm_bench.summaries import laws, needs, outcomes, points, rows
 
 
 def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
@@ -67,6 +68,18 @@ def test_an_ensemble_is_in_no_summary_of_single_trajectories():
     assert points.by_problem([many]) == {}
     assert needs.profile([many], {"position_end": 1e-4}, "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})
+
+
+def test_a_problem_with_two_grids_has_two_tables():
+    both = [record("Gauss(s=8, h=0.1)"), record("Taylor()")]
+    other = [replace(one, case=replace(one.case, grid=Grid(count=7, also=[0.5]))) for one in both]
+    found = rows.tasks([*both, *other])
+    assert list(found.values()) == [both, other]
+    assert list(points.by_problem([*both, *other])) == [
+        "kepler(), sampled with the usual grid",
+        "kepler(), sampled with count=7, also=[0.5]",
+    ]
+    assert list(points.by_problem(both)) == ["kepler()"]
 
 
 def test_a_profile_counts_problems_within_a_factor_of_the_best():
