@@ -31,6 +31,8 @@ from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
 
 FORMAT = 1  # of files
+ROUNDING = 1e-14  # relative to its largest size, how far a component may be from a sample that is met
+FAR, MOST_AT_ONCE = 4, 1024  # intervals between samples: not gone through for nothing, and at a time
 LOOKED_AT = 2000  # states of which the errors are printed, at most
 
 
@@ -114,8 +116,9 @@ class Solution:
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times that the trajectory covers.
 
-        From the last sample before a time the method goes on as it began there: own steps, and what
-        its `Stepper.advance` makes between them. So these states have the method's order, and
+        From a sample before a time the method goes on as it began there: own steps, and what
+        its `Stepper.advance` makes between them. It goes on past the next
+        samples as long as it meets them. So these states have the method's order, and
         those of an energy-preserving method its energy, which no interpolation has; the price is
         at most the steps from one sample to the next. At a sample's own time it is that sample.
 
@@ -150,20 +153,38 @@ class Solution:
             )
         found = np.empty((wanted.size, self.problem.system.dim))
         sample = np.searchsorted(sign * at, wanted, side="right") - 1
-        for i in np.unique(sample):
-            mine = sample == i
-            goals = sign * wanted[mine]
-            here = int(goals[0] == at[i])
-            made = np.repeat(states[i : i + 1], here, axis=0)
-            if goals.size > here:
-                stepper = self._program.start(states[i], self.problem.par, float(at[i]))
-                reached = stepper.advance(goals[here:])
-                if reached.status.failed:
-                    raise InputError(
-                        f"{self.method!r} does not go on from t = {float(at[i])!r}: {reached.reason}"
-                    )
-                made = np.concatenate([made, reached.y])
-            found[mine] = made
+        close = max(ROUNDING, getattr(self.method, "tol", None) or 0.0) * np.abs(states).max(axis=0)
+        intervals, first, count = np.unique(sample), 0, 1
+        while first < intervals.size:
+            group = intervals[first : first + count]
+            far = np.flatnonzero(np.diff(group) > FAR)
+            group = group[: far[0] + 1] if far.size else group
+            mine = np.flatnonzero((sample >= group[0]) & (sample <= group[-1]))
+            ends = sign * at[group]
+            goals = np.union1d(wanted[mine], ends[1:])
+            goals = goals[goals > ends[0]]
+            reached = states[:0]
+            if goals.size:
+                start = float(at[group[0]])
+                advanced = self._program.start(states[group[0]], self.problem.par, start).advance(
+                    sign * goals
+                )
+                if advanced.status.failed and group.size > 1:
+                    count = 1
+                    continue
+                if advanced.status.failed:
+                    raise InputError(f"{self.method!r} does not go on from t = {start!r}: {advanced.reason}")
+                reached = advanced.y
+            goals, reached = np.append(ends[0], goals), np.concatenate([states[group[:1]], reached])
+            # As long as the samples are met the method goes on from where it is, else from them.
+            met = (np.abs(reached[np.searchsorted(goals, ends)] - states[group]) <= close).all(axis=1)
+            done = group.size if met.all() else int(np.argmin(met))
+            mine = mine[sample[mine] <= group[done - 1]]
+            found[mine] = reached[np.searchsorted(goals, wanted[mine])]
+            first += done
+            count = min(2 * count, MOST_AT_ONCE) if done == group.size else done
+        own = wanted == sign * at[sample]
+        found[own] = states[sample[own]]
         return found[places.reshape(times.shape)]
 
     @cached_property
