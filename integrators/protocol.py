@@ -58,7 +58,7 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cache
+from functools import cache, wraps
 from typing import Any, ClassVar, Protocol, cast, get_type_hints, runtime_checkable
 
 import numpy as np
@@ -541,6 +541,11 @@ class MethodBase(Called):
     order = cast("int | None", None)  # without an annotation, with which it would be an option
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "compile" in vars(cls):
+            setattr(cls, "compile", _of_a_system(cls.compile))  # noqa: B010 -- its type stays as written
+
     def __post_init__(self) -> None:
         for name, annotation in _annotations(type(self)).items():
             value = checked(type(self).__name__, name, getattr(self, name), annotation)
@@ -586,13 +591,42 @@ def _annotations(method: type[MethodBase]) -> dict[str, Any]:
     return {option.name: found[option.name] for option in dataclasses.fields(method)}
 
 
-def check_problem(problem: Problem, method: MethodBase) -> None:
-    """Raise `problems.errors.InputError` unless ``method`` can integrate ``problem``."""
+def _of_a_system(compile_: Callable[[Any, System], Program]) -> Callable[[Any, System], Program]:
+    """Return a method's ``compile`` that refuses what is no system."""
+
+    @wraps(compile_)
+    def checking(method: Any, system: System) -> Program:
+        check_system(method, system)
+        return compile_(method, system)
+
+    return checking
+
+
+def check_system(method: MethodBase, system: System) -> None:
+    """Raise `problems.errors.InputError` unless ``system`` is one, which ``method`` is to be compiled for."""
+    if not isinstance(system, System):
+        raise InputError(
+            f"{type(method).__name__}.compile takes a system, such as problem.system, not {shown(system)}."
+        )
+
+
+def check_is_problem(problem: Problem) -> None:
+    """Raise `problems.errors.InputError` for what is no problem, such as a system without a start."""
+    if isinstance(problem, System):
+        raise InputError(
+            f"problem must be a Problem, not {shown(problem)}, a system without a start; "
+            "give problems.Problem(system, y0=..., t_end=...)."
+        )
     if not isinstance(problem, Problem):
         raise InputError(
             f"problem must be a Problem, not {shown(problem)}; "
             "make one with problems.load or problems.Problem."
         )
+
+
+def check_problem(problem: Problem, method: MethodBase) -> None:
+    """Raise `problems.errors.InputError` unless ``method`` can integrate ``problem``."""
+    check_is_problem(problem)
     if not isinstance(method, MethodBase):
         raise InputError(f"method must be a method such as HBVM(k=8, s=4, h=0.1), not {shown(method)}.")
     reason = method.accepts(problem)

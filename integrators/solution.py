@@ -26,6 +26,7 @@ from integrators.plain import (
 )
 from integrators.protocol import Array, MethodBase, Program, Stats, Status
 from integrators.refusals import as_numbers
+from problems import checks
 from problems.calls import readable
 from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
@@ -344,7 +345,7 @@ class Solution:
         words |= {key: getattr(self, key) for key in _AS_THEY_ARE}
         arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
         write_whole(
-            Path(path),
+            checks.path("save", "path", path),
             lambda file: np.savez(file, **arrays),  # pyright: ignore[reportArgumentType]
         )
 
@@ -377,8 +378,11 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
     >>> load(path).method
     Gauss(s=2, h=0.1)
     """
+    place = checks.path("load", "path", path)
+    if not isinstance(problem, Problem | None):
+        raise InputError(f"problem={shown(problem)} of load must be the Problem that was integrated.")
     try:
-        with Path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
+        with place.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         words = json.loads(arrays["words"].tobytes())
         if words["format"] != FORMAT:
@@ -407,10 +411,11 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
     except (InputError, FileNotFoundError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"there is no file {path}; give one that Solution.save wrote.") from None
+        raise InputError(f"there is no file {shown(str(path))}; give one that Solution.save wrote.") from None
     except Exception as error:  # whatever reading a file of any content raises
+        why = f"{type(error).__name__}: {shown(str(error))}"
         raise InputError(
-            f"{path} is not a solution, or is damaged ({type(error).__name__}: {shown(str(error))}); "
+            f"{shown(str(path))} is not a solution, or is damaged ({why}); "
             "give a file that Solution.save wrote."
         ) from None
 
@@ -461,7 +466,8 @@ def write_whole(path: Path, write: Any) -> None:
             write(file)
         Path(temporary).replace(path)
     except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror}; give another path.") from None
+        where = shown(str(path))
+        raise InputError(f"{where} cannot be written: {error.strerror}; give another path.") from None
     finally:
         if temporary is not None:
             with suppress(OSError):

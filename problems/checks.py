@@ -13,6 +13,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -118,6 +119,23 @@ def numbers(value: Any) -> tuple[float, ...] | None:
     listed = value.tolist() if hasattr(value, "tolist") else value
     found = [number(each) for each in listed] if isinstance(listed, list | tuple | range) else [None]
     return None if None in found else tuple(found)  # type: ignore[return-value]
+
+
+def path(owner: str, name: str, value: Any) -> Path:
+    """Return a path from text or something path-like, or refuse it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else, and for text that no file can be called.
+    """
+    try:
+        found = Path(value)
+    except TypeError:
+        found = None
+    if found is None or "\0" in str(found):
+        raise refusal(owner, name, value, "a path of a file, such as 'pendulum.npz'")
+    return found
 
 
 def whole(value: Any) -> int | None:

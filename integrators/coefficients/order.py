@@ -32,7 +32,7 @@ from integrators.coefficients.legendre import legendre, legendre_integrals
 from integrators.coefficients.tableau import Tableau, tableau
 from integrators.protocol import Array, AsHBVM, MethodBase, offers
 from problems.calls import readable
-from problems.errors import InputError
+from problems.errors import InputError, shown
 
 HOLDS = 1e-11  # for k <= 60, what holds does so to 3e-15, and what does not misses by 1e-4 at least
 HIGHEST = 10  # order up to which the trees are gone through: 719 of order 10
@@ -185,7 +185,7 @@ def _tableau(method: Any) -> Tableau:
     k, s = options.get("k"), options.get("s")
     if k is None or s is None:
         raise InputError(
-            f"{method!r} is no Runge-Kutta method whose coefficients are known; "
+            f"{shown(method)} is no Runge-Kutta method whose coefficients are known; "
             "give HBVM or Gauss with k and s, or a Tableau."
         )
     return tableau(k, s)

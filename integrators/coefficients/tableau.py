@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from integrators.coefficients.legendre import tables
 from integrators.protocol import Array
+from problems.errors import InputError, shown
 
 # Measured for all s <= k <= 40: the rows' sums are within 3.4e-16 of c, the weights' sum within 2.3e-16 of 1.
 CONSISTENT = 1e-13
@@ -65,7 +66,10 @@ class Tableau:
         -------
         ndarray of complex, shape of ``z``
         """
-        points = np.asarray(z, dtype=np.complex128)
+        try:
+            points = np.asarray(z, dtype=np.complex128)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(f"z={shown(z)} of stability must be complex numbers.") from None
         k = self.b.size
         systems = np.eye(k) - points[..., None, None] * self.A
         ones = np.ones((*points.shape, k, 1), dtype=np.complex128)

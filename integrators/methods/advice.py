@@ -18,9 +18,9 @@ import numpy as np
 
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM, TOLERANCE
-from integrators.protocol import Array, MethodBase, Status
+from integrators.protocol import Array, MethodBase, Status, check_is_problem
 from problems.calls import readable
-from problems.errors import InputError
+from problems.errors import InputError, shown
 from problems.problem import Problem
 
 PIECE = 200  # steps of HBVM() that a piece is long
@@ -157,9 +157,10 @@ def advise(problem: Problem, accuracy: float = 1e-10) -> Advice:
     >>> advice.reached
     True
     """
+    check_is_problem(problem)
     if not isinstance(accuracy, (int, float)) or not 0.0 < accuracy < 1.0:
         raise InputError(
-            f"the accuracy is a relative error between 0 and 1, not {accuracy!r}; 1e-10 is usual."
+            f"the accuracy is a relative error between 0 and 1, not {shown(accuracy)}; 1e-10 is usual."
         )
     piece = _Piece(problem)
     goal = SAFETY * accuracy

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -30,7 +29,7 @@ from integrators.protocol import (
 from integrators.refusals import as_numbers, check_times
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
-from problems import limits
+from problems import checks, limits
 from problems.calls import readable
 from problems.checks import Must, checked
 from problems.errors import InputError, shown, unknown
@@ -69,9 +68,9 @@ def integrate(
     method : MethodBase, optional
         How: ``HBVM(k=8, s=4, h=0.1)``, ``Taylor(tol=1e-15)``, ... Default: ``HBVM()``, which
         chooses everything itself.
-    times : array_like, shape (n,), optional
-        Strictly monotone times, from the problem's ``t0`` on (or back). Default:
-        the problem's own grid, or else 1001 equidistant times to ``t_end``.
+    times : array_like, shape (n,), or float, optional
+        Strictly monotone times, from the problem's ``t0`` on (or back). One number is the end: 1001
+        equidistant times to it. Default: the problem's own grid, or else such times to ``t_end``.
     sample : {"side", "steps", "land", "dense"}, optional
         How states between the method's steps are made; see `Stepper.advance`.
     events : Event or callable, or a sequence of them, optional
@@ -137,9 +136,10 @@ def integrate(
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
         belongs = identity(problem, method, grid, sample, wanted)
-        path = None if checkpoint is None else Path(checkpoint)
-        if resume is not None and (Path(resume) != path or Path(resume).exists()):
-            kept = read(resume, belongs)
+        path = None if checkpoint is None else checks.path("integrate", "checkpoint", checkpoint)
+        earlier = None if resume is None else checks.path("integrate", "resume", resume)
+        if earlier is not None and (earlier != path or earlier.exists()):
+            kept = read(earlier, belongs)
         watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)
 
     stepper = _start(program, method, problem, wanted, end)
@@ -301,9 +301,13 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
     """Return the times to sample at: the user's, the problem's, or the default."""
     if times is None:
         times = problem.times
-    if times is None:
-        times = np.linspace(problem.t0, problem.t_end, DEFAULT_SAMPLES)
-    grid = as_numbers("times", times)
+    grid = as_numbers("times", problem.t_end if times is None else times)
+    if grid.ndim == 0:
+        if not np.isfinite(grid) or grid == problem.t0:
+            raise InputError(
+                f"times={shown(times)} is no end for a start at t0={problem.t0!r}; give a later time."
+            )
+        grid = np.linspace(problem.t0, float(grid), DEFAULT_SAMPLES)
     gib = 8 * grid.size * problem.system.dim / 2**30
     limits.check(f"a solution of {grid.size} times and {problem.system.dim} components", "GIB", gib)
     return grid

@@ -217,7 +217,7 @@ def integrate_many(
 def _program(system: System, method: MethodBase, backend: str | None) -> Program:
     if backend is None:
         return method.compile(system)
-    if backend != "jax":
+    if not isinstance(backend, str) or backend != "jax":
         raise unknown("backend", backend, ["jax"])
     from integrators.plugins.diffrax.many import JaxProgram  # an optional library, and seconds to import
 

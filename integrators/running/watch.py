@@ -156,21 +156,22 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
     problems.errors.InputError
         If there is no such file, it is damaged, or it is another integration's.
     """
+    where = shown(str(path))
     try:
         magic, head, digest, kept = Path(path).read_bytes().split(b"\n", 3)
         whole = magic == MAGIC and hashlib.sha256(kept).hexdigest().encode() == digest
         found = json.loads(head) if whole else {}
     except FileNotFoundError:
-        raise InputError(f"there is no checkpoint {path} to resume; leave out resume=.") from None
+        raise InputError(f"there is no checkpoint {where} to resume; leave out resume=.") from None
     except (OSError, ValueError):
         whole, found, kept = False, {}, b""
     if not whole:
-        raise InputError(f"{path} is not a checkpoint of integrate, or is damaged; leave out resume=.")
+        raise InputError(f"{where} is not a checkpoint of integrate, or is damaged; leave out resume=.")
     for what, value in wanted.items():
         if found.get(what) != value:
             other = f"{found.get('method')} on {found.get('problem')}"
             raise InputError(
-                f"{path} is a checkpoint of {other}, with other {what} than here ({shown(value)}); "
+                f"{where} is a checkpoint of {other}, with other {what} than here ({shown(value)}); "
                 "resume that integration, or leave out resume=."
             )
     return pickle.loads(kept)

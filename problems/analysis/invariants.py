@@ -181,7 +181,6 @@ def errors(
     from problems.analysis import wide  # which loads mpmath
 
     states = _states(system, y)
-    times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states))
     found: dict[str, Array] = {}
     for name in system.invariant_names:
         what = f"invariant:{name}"
@@ -199,6 +198,7 @@ def errors(
         lost = any(value != 0 and not _SMALLEST <= abs(value) <= _LARGEST for value in before)
         again = np.isfinite(states).all(axis=1) & (lost | ~np.isfinite(errors))
         if again.any():
+            times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states))
             before = before or wide.evaluate(function, *start, par)
             for i in np.flatnonzero(again):
                 errors[i] = wide.relative(wide.evaluate(function, float(times[i]), states[i], par), before)
