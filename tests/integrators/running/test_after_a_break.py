@@ -8,7 +8,7 @@ import pytest
 
 import problems
 from integrators import HBVM, Gauss, Radau, Status, Taylor, integrate, registry
-from integrators.running import integrate as running
+from integrators.running import watch as running
 from problems import InputError, Problem, VectorField
 
 
