@@ -359,3 +359,15 @@ def test_the_error_is_estimated_in_any_unit(scale):
 def test_a_wrong_option_is_an_input_error():
     with pytest.raises(InputError, match="did you mean 'max_step'"):
         integrators.registry.create("HBVM", max_stp=1.0)
+
+
+def test_times_one_ulp_apart_lose_nothing():
+    # An ulp of t was lost for each pair: 5.7e-6 here.
+    t0 = 1e9
+    first = t0 + np.linspace(0.5, 25.0, 50)
+    times = np.sort(np.concatenate([first, np.nextafter(first, np.inf)]))
+    solution = integrators.integrate(
+        Problem(OSCILLATOR, y0=[1.0, 0.0], t0=t0, t_end=t0 + 30.0), HBVM(), times, sample="land"
+    )
+    exact = np.column_stack([np.cos(times - t0), -np.sin(times - t0)])
+    assert np.abs(solution.y - exact).max() < 4e-7  # measured 1.2e-7, an ulp of t: such times count as one

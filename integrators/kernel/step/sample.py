@@ -162,7 +162,9 @@ def sample(ctx, side, between, t, part, out):
     if part == 0.0:
         write(ctx, ctx.state, out)
         if between == LAND:
+            low = (ctx.t0 - t) + ctx.time_low if ctx.varying else 0.0
             set_time(ctx, t)
+            ctx.time_low = low  # the state is where it was: what is between the two times is not lost
         return DONE
     if between in (DENSE, SIDE):
         # A part starts from the step ahead. Where that fails, nothing in it is reached: near a
