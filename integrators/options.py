@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 from problems import limits
-from problems.checks import Must, at_least, checked, numbers, refusal
+from problems.checks import Must, at_least, checked, number, numbers, refusal
 from problems.errors import shown
 
 SMALLEST = 2.0**-52
@@ -35,6 +35,23 @@ Tolerance = Annotated[
 
 NotNegative = Annotated[float, Must("a finite number of at least 0", lambda x: x >= 0)]
 """A finite number, 0 or above."""
+
+
+class _Absolute:
+    def __repr__(self) -> str:
+        return "an absolute tolerance"
+
+    def checked(self, owner: str, name: str, value: Any) -> float | tuple[float, ...]:
+        alone = number(value)
+        each = numbers(value) if alone is None else (alone,)
+        if not each or min(each) < 0.0:
+            wanted = "a finite number of at least 0, or a list of them, one for each component"
+            raise refusal(owner, name, value, wanted)
+        return each if alone is None else alone
+
+
+Absolute = Annotated[float | Sequence[float], _Absolute()]
+"""Absolute tolerance, of all components or of each."""
 
 Share = Annotated[float, Must("a number between 0 and 1", lambda x: 0 < x < 1)]
 """A number between 0 and 1, such as a relative tolerance."""

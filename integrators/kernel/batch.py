@@ -61,6 +61,7 @@ class BatchProgram(Protocol):
     def start(self, y0: ArrayLike, par: ArrayLike | None = None, t0: float = 0.0) -> HBVMStepper: ...
     def in_lanes(self) -> Lanes | None: ...
     def contexts(self) -> tuple[Context, Context]: ...
+    def limit(self, context: Context, interval: float) -> None: ...
 
 
 def prepare_batch(
@@ -257,6 +258,8 @@ class _Own(_InLanes):
         contexts = [self.work.program.contexts()[0] for _ in range(self.lanes.width)]
         for one in contexts:
             one.strategy = self.work.program.solver.strategy
+            one.interval = float(abs(self.work.result.t[-1] - self.work.t0))
+            self.work.program.limit(one, one.interval)
         group, _ = self.lanes.groups(self.work.t0, self.h, self.numbers, self.arrays)
         group.point({"contexts": np.array([one.address for one in contexts])})
         group.first_length = self.work.program.first or 0.0

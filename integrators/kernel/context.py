@@ -25,7 +25,10 @@ Integers = NDArray[np.int64]
 # How a step, or an advance, ended.
 # SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
 # integral is to keep is no invariant. HALTED: a search for events has to be attended to before the next step.
+# UNSCALED: the step ahead does not become good enough however short it is, and the sizes that the blocks
+# will reach may say that it is. UNSEEN: a partial step sees what the step ahead has not.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
+UNSCALED, UNSEEN = 9, 10
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -239,6 +242,15 @@ class Context(Memory):
     unseen = Array("block_count")  # that of the defect,
     abrupt = Array("block_count")  # and the largest that does not fall off as a smooth field's do
     steepest = Array("block_count")  # slope in each group
+    absolute = Array("block_count")  # the absolute tolerance of blocks, divided by the relative one
+    expected = Array("block_count")  # the largest size that blocks will reach, as far as is known
+    rescaled = Integer()  # > 0: errors are relative to that where it is larger than a block's own size
+    borrowed = Integer()  # 1: by their own sizes alone the step that was estimated is not good enough
+    asks = (
+        Integer()
+    )  # 1: what blocks will reach can be asked for, by UNSCALED; -n: after n steps again; 0: never
+    blind = Integer()  # 1: the field has the same value at all nodes of the step that was estimated
+    restful = Integer()  # 1: the field at the start tells no time scale
     next_length = Real()  # of the next step to be tried
     length_after = Real()  # of the one after the step that is solved
     length_behind = Real()  # of the last step; 0: unknown
@@ -253,7 +265,9 @@ class Context(Memory):
     least_slope = Real()  # of a block's field beside the largest in its group, where errors are estimated
     rejected = Integer()  # 1: `values` are those of a rejected step of `length`, from the present state
     length_limit = Real()  # no step is longer, for what the iteration allows
-    longest = Real()  # no step is longer, for what the user allows
+    longest = Real()  # no step is longer, for what the user allows and the interval
+    longest_blind = Real()  # the same where the field has the same value at all nodes of a step
+    interval = Real()  # length of all that is integrated, from the trajectory's start; 0: unknown
     busy_implicit = Real()  # corrections of a step by the implicit solver to aim at, at most
     stop = Real()  # no step passes this time; infinite: none
     attempts = Integer()  # at the step ahead that were rejected,

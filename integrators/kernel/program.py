@@ -25,12 +25,13 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, TOLERANCE
+from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, LONGEST, TOLERANCE
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled
 from integrators.refusals import check_parameters, check_start, check_state
 from problems import emit
+from problems.analysis.structure import depends_on_time
 from problems.analysis.switches import Switches
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -270,6 +271,9 @@ class HBVMProgram(Compiled):
         """Return the tables for steps of h, which may be negative."""
         return tables.scaled(self.constants, h, squared=self.second and self.shape.unit)
 
+    def limit(self, context: Context, interval: float) -> None:
+        """Set what an interval of a certain length says of the steps: nothing where all have one length."""
+
     def contexts(self) -> tuple[Context, Context]:
         """Return fresh memory for a trajectory, and for its partial steps."""
         own, side = self._context(side=False), self._context(side=True)
@@ -332,6 +336,8 @@ class AdaptiveProgram(HBVMProgram):
         Times that steps end at, besides those at which the formulas switch.
     max_steps : int, optional
         Steps of a trajectory, at most.
+    atol : float or sequence of float, optional
+        Local error per step that is always allowed, of all components or of each.
     keep : sequence of str, optional
         What to keep by line integrals; see `HBVMProgram`.
     """
@@ -353,6 +359,7 @@ class AdaptiveProgram(HBVMProgram):
         breakpoints: Sequence[float] = (),
         max_steps: int | None = None,
         keep: Sequence[str] | None = None,
+        atol: float | Sequence[float] | None = None,
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver, keep=keep)
         started = binary.clock()
@@ -361,7 +368,9 @@ class AdaptiveProgram(HBVMProgram):
         )
 
         self.tol, self.defect, self.first = tol, defect, h
-        self.max_step, self.max_steps = max_step, max_steps
+        self.max_step, self.max_steps, self.atol = max_step, max_steps, atol
+        self._timed = not system.traced or depends_on_time(system)
+        self._absolute = self._sizes(atol)
         self._given, self._switches = np.array(sorted(set(breakpoints)), float), Switches(system)
         c = self.constants
         if c.route != tables.THROUGH:
@@ -389,9 +398,31 @@ class AdaptiveProgram(HBVMProgram):
         return (
             self.max_step is None
             and self.max_steps is None
+            and self.atol is None
             and not self._given.size
             and not self._switches.any
         )
+
+    def _sizes(self, atol: float | Sequence[float] | None) -> Array:
+        """Return an absolute tolerance as sizes that ``tol`` is relative to, one for each block."""
+        shape = self.shape
+        sizes = np.full(shape.group.size, 0.0 if atol is None else math.inf)
+        if atol is not None:
+            if np.ndim(atol) and np.shape(atol) != (self.system.dim,):
+                raise InputError(
+                    f"atol has {np.size(atol)} numbers, and {self.system.name} {self.system.dim} components; "
+                    "give one, or as many."
+                )
+            each = np.broadcast_to(np.asarray(atol, float), self.system.dim)[-shape.rows :]
+            np.minimum.at(sizes, shape.block, each / self.tol)
+        return sizes
+
+    def limit(self, context: Context, interval: float) -> None:
+        """Set the longest steps of a trajectory over an interval of a certain length; 0: unknown."""
+        most = math.inf if self.max_step is None else self.max_step
+        part = LONGEST * interval if interval > 0.0 else math.inf
+        context.longest_blind = min(most, part)
+        context.longest = context.longest_blind if self._timed else most
 
     def breakpoints(self, par: Array) -> Array:
         """Return the times that steps end at, ascending: those given, and those of the formulas."""
@@ -404,7 +435,7 @@ class AdaptiveProgram(HBVMProgram):
         return (
             f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
             f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self._given.tolist()!r}, "
-            f"max_steps={self.max_steps!r}{kept})"
+            f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept})"
         )
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
@@ -431,7 +462,9 @@ class AdaptiveProgram(HBVMProgram):
             context.defect_decay = self.defect ** (0.5 / last)
         context.doubt, context.slowest_decay = self._doubt, self._slowest
         context.negligible = self._negligible
-        context.longest = math.inf if self.max_step is None else self.max_step
+        context.absolute[:] = self._absolute
+        context.asks = int(self.atol is None)
+        self.limit(context, 0.0)
         context.stop = context.length_limit = math.inf
         return context
 

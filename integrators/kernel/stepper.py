@@ -111,10 +111,12 @@ class HBVMStepper(ABC):
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
         "length_limit", "kinks", "kink_end", "doubt_end",
         "border", "border_ahead", "behind_time", "behind_low",
+        "interval", "restful", "blind", "rescaled", "borrowed", "asks",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",
         "kink_places", "borders", "borders_behind", "lasts", "lasts_behind", "behind_state", "behind_error",
+        "expected",
     )  # fmt: skip
     error: Exception | None = None
     """What a function of the user raised, where the status is ``USER_ERROR``."""
@@ -376,7 +378,7 @@ class HBVMStepper(ABC):
 
     def _call(
         self, what: int, between: int, times: Array, out: Array, made: int, budget: int,
-        targets: int = 0, parts: int = 0,
+        targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
         if self._wants_solver:

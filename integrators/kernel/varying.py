@@ -7,14 +7,29 @@ from typing import Protocol
 
 import numpy as np
 
-from integrators.kernel.context import BUDGET, DENSE, DONE, KINKS_KEPT, LAND, NOTHING, SIDE, START, UNDERFLOW
+from integrators.kernel.context import (
+    BUDGET,
+    DENSE,
+    DONE,
+    KINKS_KEPT,
+    LAND,
+    NOTHING,
+    SIDE,
+    START,
+    UNDERFLOW,
+    UNSCALED,
+    Context,
+)
 from integrators.kernel.native import engine
+from integrators.kernel.step.rule import FIRST_AT_REST, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST
 from integrators.protocol import Array, Samples, Stats, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
 
+LOOK_AHEAD = 2000  # steps of the look ahead, at most
+LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
 
@@ -26,6 +41,8 @@ class VaryingProgram(Program, Protocol):
     max_steps: int | None
 
     def breakpoints(self, par: Array) -> Array: ...
+    def limit(self, context: Context, interval: float) -> None: ...
+    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> "AdaptiveStepper": ...
 
 
 class AdaptiveStepper(HBVMStepper):
@@ -41,6 +58,8 @@ class AdaptiveStepper(HBVMStepper):
 
     def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
         self._breakpoints = program.breakpoints(par)
+        self._origin = self._goal = t0
+        self._reached, self._in_vain = np.empty((0, 1 + y.size)), 1
         super().__init__(program, y, par, t0)
         if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.border = START
@@ -109,6 +128,10 @@ class AdaptiveStepper(HBVMStepper):
     def _face(self, end: float) -> None:
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         ctx = self._context
+        if abs(end) < sys.float_info.max:
+            self._goal = getattr(self, "destination", end)
+            ctx.interval = max(ctx.interval, abs(self._goal - self._origin), abs(end - self._origin))
+            self._program.limit(ctx, ctx.interval)
         if not np.sign(end - self.t) * ctx.next_length < 0.0:
             return
         ctx.next_length *= -1.0
@@ -137,6 +160,51 @@ class AdaptiveStepper(HBVMStepper):
             if meets and outcome == DONE and why is None:
                 self._restart(stop)
         return self._samples(times[:made], out[:made], outcome, why)
+
+    def _call(self, what: int, between: int, times: Array, out: Array, *more: int) -> int:
+        outcome = super()._call(what, between, times, out, *more)
+        if outcome != UNSCALED:
+            return outcome
+        self._look_ahead()
+        return BUDGET
+
+    def _look_ahead(self) -> None:
+        """Let errors be relative to what the blocks will reach, or to their own sizes if that is no more.
+
+        A second trajectory tells it, whose steps only the iteration, the interval and the breakpoints limit.
+        """
+        ctx = self._context
+        ahead = math.copysign(1.0, ctx.next_length)
+        known = self._reached[ahead * (self._reached[:, 0] - self.t) >= 0.0]
+        if not len(known) and ahead * (self._goal - self.t) > 0.0:
+            scout = self._program.start(self.y, ctx.par.copy(), self.t)
+            scout.only_looks()
+            pieces = [scout.walk(self._goal, limit=LOOK_AHEAD)]
+            if not scout.status.failed and scout.stats.steps < LOOK_AHEAD:
+                pieces.append(scout.advance([self._goal]))
+            known = np.concatenate([np.column_stack([made.t, np.abs(made.y)]) for made in pieces])
+            self._reached = known
+            ctx.evaluations += scout.stats.evaluations or 0
+            ctx.iterations += scout.stats.iterations or 0
+        sizes = known[:, 1:].max(axis=0, initial=0.0)
+        shape = ctx.shape
+        ctx.expected[:] = 0.0
+        np.maximum.at(ctx.expected, shape.block, sizes[-shape.rows :])
+        if not (ctx.expected > LARGER * ctx.extent).any():
+            self._in_vain *= 2
+            ctx.asks = -self._in_vain
+            return
+        ctx.rescaled, ctx.age = SCALE_LASTS, 0
+        ctx.next_length = ahead * max(FIRST_AT_REST * ctx.interval, abs(ctx.next_length))
+        places = ctx.kink_places.reshape(-1, 2)[: min(ctx.kinks, KINKS_KEPT), 0]
+        if len(places) and ahead * (places[-1] - self.t) > -FIRST_AT_REST * ctx.interval:
+            ctx.kinks -= 1  # by a block's own size; if it is one by this size, it is found again
+
+    def only_looks(self) -> None:
+        """Take steps whatever their errors are."""
+        ctx = self._context
+        ctx.allowed_error = ctx.allowed_defect = ctx.error_aim = ctx.doubt = math.inf
+        ctx.asks = 0
 
     def _budget(self, most: int | None = None) -> int:
         """Return how many of ``most`` steps the kernel may take at a time, and of those left."""

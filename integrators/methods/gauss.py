@@ -6,7 +6,7 @@ from typing import Any
 
 from integrators.caveats import blind, unseen
 from integrators.methods.hbvm import HBVM, Solver
-from integrators.options import Count, Landings, Stages, Step, Tolerance
+from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -52,7 +52,7 @@ class Gauss(MethodBase):
         keeps no energy over long times (`test_adaptive`): it is there to be compared with.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved; see `HBVM`.
-    max_step, breakpoints, max_steps
+    max_step, breakpoints, max_steps, atol
         With ``tol``; see `HBVM`.
 
     Raises
@@ -76,6 +76,7 @@ class Gauss(MethodBase):
     max_step: Step | None = None
     breakpoints: Landings = ()
     max_steps: Count | None = None
+    atol: Absolute | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -100,6 +101,7 @@ class Gauss(MethodBase):
         return HBVM(
             k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver,
             max_step=self.max_step, breakpoints=self.breakpoints, max_steps=self.max_steps,
+            atol=self.atol,
         )  # fmt: skip
 
     def caveat(self, problem: Problem) -> str | None:

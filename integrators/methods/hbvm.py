@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.caveats import blind, unseen
-from integrators.options import Count, Landings, Stages, Step, Tolerance
+from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -122,6 +122,13 @@ class HBVM(MethodBase):
     max_steps : int, optional
         Steps of a trajectory from its start, at most; with ``tol``. A run that needs more ends
         with the status ``max_steps``. By default any number.
+    atol : float or sequence of float, optional
+        With ``tol``: local error per step, in the state's units, that is allowed whatever the size of the
+        block; one for all components, or one for each (of a block, and of one body, the smallest counts; of
+        q'' = a(q) those of the momenta). So a step is good enough where its error is at most
+        ``max(tol * size, atol)``. 0: errors are relative, always. By default the same, but where a step does
+        not become good enough by cutting it, as from rest, errors may there be relative to the
+        largest size that a block will reach in the interval; a second, coarse trajectory tells it.
 
     Raises
     ------
@@ -156,6 +163,7 @@ class HBVM(MethodBase):
     max_step: Step | None = None
     breakpoints: Landings = ()
     max_steps: Count | None = None
+    atol: Absolute | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -214,8 +222,8 @@ class HBVM(MethodBase):
         return self
 
     def control(self) -> dict[str, Any]:
-        """Return those of the options ``max_step``, ``breakpoints`` and ``max_steps`` that are given."""
-        names = ("max_step", "breakpoints", "max_steps")
+        """Return those of ``max_step``, ``breakpoints``, ``max_steps`` and ``atol`` that are given."""
+        names = ("max_step", "breakpoints", "max_steps", "atol")
         return {name: value for name, value in self.options().items() if name in names}
 
     def _refusal(self, system: System) -> str | None:

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from integrators.caveats import unseen
 from integrators.methods.hbvm import CITATION as BOOK
-from integrators.options import Stages, Step, Tolerance
+from integrators.options import Absolute, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.checks import refusal
 from problems.errors import InputError
@@ -88,6 +88,8 @@ class LineIntegral(MethodBase):
         Local error per step, relative to the size of each block of the state (the
         positions or the momenta of one body, else each component), as estimated by
         ``h |gamma_s|^2 / max_j |gamma_j|``. The steps then vary.
+    atol : float or sequence of float, optional
+        With ``tol``: local error per step that is always allowed; see `HBVM`.
     invariants : sequence of str
         What to keep: names of the problem's invariants, such as ``"energy"``; of a
         vector all components, or ``"lenz[1]"``, one.
@@ -121,6 +123,7 @@ class LineIntegral(MethodBase):
     s: Stages
     h: Step | None = None
     tol: Tolerance | None = None
+    atol: Absolute | None = None
     invariants: Annotated[Sequence[str], _Names()]
 
     library = "hbvm-bench"
@@ -136,6 +139,10 @@ class LineIntegral(MethodBase):
             )
         if self.h is None and self.tol is None:
             raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
+        if self.tol is None and self.atol is not None:
+            raise InputError(
+                f"LineIntegral takes atol with a tolerance only, not with h={self.h!r} alone; give tol."
+            )
 
     @property
     def order(self) -> int:
@@ -178,7 +185,9 @@ class LineIntegral(MethodBase):
 
         made: HBVMProgram | AdaptiveProgram
         if self.tol is not None:
-            made = AdaptiveProgram(system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants)
+            made = AdaptiveProgram(
+                system, k=self.k, s=self.s, tol=self.tol, h=self.h, keep=self.invariants, atol=self.atol
+            )
         else:
             assert self.h is not None
             made = HBVMProgram(system, k=self.k, s=self.s, h=self.h, keep=self.invariants)

@@ -50,12 +50,12 @@ class Control:
 
     def judge(self) -> None:
         """Set `error`, `defect`, whether blocks are `certain` and `visible`: see `estimate` and `watch`."""
-        from integrators.kernel.step.estimate import UNSEEN
+        from integrators.kernel.step.estimate import ALIKE, UNSEEN
 
         w, b = self.w, self.w.b
         error, defect = (w.variable(w.kind, w.zero.value) for _ in range(2))
         none = w.zero.compare("!=", 0.0)
-        doubtful, visible = (w.variable(w.bits, none) for _ in range(2))
+        doubtful, visible, changes = (w.variable(w.bits, none) for _ in range(3))
         unseen_for = (self.h + self.row("length_behind").absolute()) * self.number("outermost")
 
         def raise_to(variable: Any, value: Value) -> None:
@@ -76,7 +76,9 @@ class Control:
                     d = w.at(start, 1, i)
                     f = self.coefficients(d)
                     low = f[1].larger(f[2]).larger(f[3])
-                    note(doubtful, f[6].larger(f[7]).compare(">", self.number("doubt") * low))
+                    high = f[6].larger(f[7])
+                    note(doubtful, high.compare(">", self.number("doubt") * low))
+                    note(changes, low.larger(high).compare(">", f[0] * ALIKE))
                     own = f[0].larger(low)
                     changing = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
                     extent, slope = extent.larger(changing + self.h * own), slope.larger(own)
@@ -109,7 +111,8 @@ class Control:
 
             w.each(blocks, compare)
         self.error, self.defect = (Value(b, b.load(worst)) for worst in (error, defect))
-        self.certain, self.visible = b.not_(b.load(doubtful)), b.load(visible)
+        self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changes))
+        self.visible = b.load(visible)
 
     def coefficients(self, d: Any, which: range = range(COEFFICIENTS)) -> list[Value]:
         """Return the sizes of the Legendre coefficients of row d of the field by which steps are judged.
@@ -211,6 +214,7 @@ class Control:
             self.free,
             (rest * length).compare(">", 0.0),
             rest.absolute().compare(">", length.absolute()),
+            length.absolute().compare("<=", self.number("longest")),
             length.absolute().compare(">", t.absolute() * SHORTEST),
             since.compare("<", self.row("unwatched")),
         )

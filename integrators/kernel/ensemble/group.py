@@ -80,6 +80,7 @@ class Group(Memory):
     ends_ahead = Array("rows", "lanes")
     lasts_ahead = Array("rows", "lanes")
     gaps = Array("rows", "lanes")  # between blocks of the field as two steps have it where they meet
+    longest = Real()  # no step is longer
     busy = Real()  # sweeps to aim at, at most
     worth = Real()  # how much longer steps the errors must allow for the implicit solver (logarithm)
     length_behind = Array("lanes")

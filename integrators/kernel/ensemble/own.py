@@ -21,6 +21,7 @@ from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import SMALLEST
 from integrators.kernel.step.vary import (
     BUSY,
+    FUTILE,
     HELD_BACK_STEPS,
     accepts,
     begin_attempts,
@@ -189,7 +190,7 @@ def settle(group, lane):
         clear(group, lane)
     if accepts(ctx, outcome, int(group.sweeps[lane] - group.before[lane]), 0):
         step(group, lane, ctx)
-    elif ctx.kinks:
+    elif ctx.kinks or ctx.attempts >= FUTILE:
         unload(group, lane, 0)
 
 
@@ -245,6 +246,7 @@ def share(group, ctx):
     group.least_slope, group.doubt, group.busy = ctx.least_slope, ctx.doubt, BUSY
     group.negligible = ctx.negligible if ctx.doubt < INFINITY else INFINITY
     group.outermost = ctx.nodes[0]
+    group.longest = ctx.longest
     group.worth = INFINITY
     if ctx.strategy != FIXED_POINT:
         group.worth = log_worth(ctx)

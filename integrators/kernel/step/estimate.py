@@ -7,7 +7,7 @@ from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
-from integrators.kernel.step.rule import NOTHING
+from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, SMALLEST
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 
@@ -17,6 +17,7 @@ SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is neg
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
 BESIDE_NOTHING = 1e3
+ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
 
 
 @compiled
@@ -62,9 +63,16 @@ def momentum(ctx, d):
 
 
 @compiled
+def own_size(ctx, b):
+    """Return the size of a block in the step that is estimated, unless that is next to nothing."""
+    return max(max(ctx.extent[b], NOTHING * ctx.largest[ctx.group[b]]), SMALLEST)
+
+
+@compiled
 def block_size(ctx, b):
-    """Return the size that a block's errors are relative to, its own unless that is next to nothing."""
-    return max(ctx.extent[b], NOTHING * ctx.largest[ctx.group[b]])
+    """Return the size that a block's errors are relative to: its own, or one that is known from elsewhere."""
+    size = max(own_size(ctx, b), ctx.absolute[b])
+    return max(size, ctx.expected[b]) if ctx.rescaled else size
 
 
 @compiled
@@ -92,6 +100,11 @@ def estimate(ctx):
     quadrature is of the size of h |gamma_{k-1}| itself. `Context.kinked` says whether there is more
     of that than rounding and tolerance account for. If there is less, nothing is gained
     by cutting the step further, whatever the squares are.
+
+    From rest the size is what the field makes of a block in this very step. If it begins like a power of t,
+    the squares are the same at all lengths of the step; if it begins in the field's rounding or with a
+    jump, they are about 1. No step is good enough then by the block's own size, and `Context.expected`, that
+    which it will reach, takes its place until `Context.borrowed` is 0 again.
     """
     rows, h = ctx.rows, abs(ctx.h)
     found = ctx.estimates
@@ -110,11 +123,11 @@ def estimate(ctx):
     allowed, allowed_defect, negligible = ctx.allowed_error, ctx.allowed_defect, ctx.negligible
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
-    ctx.kinked = 0
+    ctx.kinked = ctx.borrowed = 0
     for b in range(ctx.block_count):
         slope = max(ctx.slope[b], ctx.least_slope * steepest[group[b]])
         if slope > 0.0:
-            size = block_size(ctx, b)
+            own, size = own_size(ctx, b), block_size(ctx, b)
             missing, unseen, high = ctx.missing[b], ctx.unseen[b], ctx.abrupt[b]
             if slope > ctx.slope[b] and high <= UNSEEN * steepest[group[b]]:
                 high = 0.0
@@ -126,8 +139,18 @@ def estimate(ctx):
                 elif h * high > negligible * size and not narrow:
                     ctx.kinked = 1
             part = h / slope / size
-            error = max(error, min(most, squared(h, missing, slope, size, part)))
-            defect = max(defect, min(most_unseen, squared(h, unseen, slope, size, part)))
+            block_error = min(most, squared(h, missing, slope, size, part))
+            error = max(error, block_error)
+            if ctx.absolute[b] > own:
+                size = max(own, ctx.expected[b]) if ctx.rescaled else own
+                part = h / slope / size
+            block_defect = min(most_unseen, squared(h, unseen, slope, size, part))
+            defect = max(defect, block_defect)
+            if ctx.rescaled:
+                times = size / own
+                fits = block_error * times <= allowed and block_defect * times <= allowed_defect
+                if not fits or (doubtful and h * high > negligible * own):
+                    ctx.borrowed = 1
     return error, defect
 
 
@@ -141,16 +164,19 @@ def measure_blocks(ctx):
         extent[b] = slopes[b] = missed[b] = unseen[b] = ctx.abrupt[b] = 0.0
     for g in range(ctx.group_count):
         ctx.largest[g] = ctx.steepest[g] = 0.0
-    doubtful = False
+    doubtful, changes = False, False
     for d in range(ctx.rows):
         b, i = ctx.block[d], 8 * d
         low = max(max(found[i + 1], found[i + 2]), found[i + 3])
         slope = max(found[i], low)
-        doubtful |= max(found[i + 6], found[i + 7]) > doubt * low
+        high = max(found[i + 6], found[i + 7])
+        doubtful |= high > doubt * low
+        changes |= max(low, high) > ALIKE * found[i]
         extent[b] = max(extent[b], abs(momentum(ctx, d)) + h * slope)
         slopes[b] = max(slopes[b], slope)
         missed[b] = max(missed[b], max(found[i + 5], error_decay * found[i + 4]))
         unseen[b] = max(unseen[b], max(found[i + 7], defect_decay * found[i + 6]))
+    ctx.blind = 0 if changes else 1
     return doubtful
 
 
@@ -196,7 +222,11 @@ def estimate_implicit(ctx):
 
 @compiled
 def first_length(ctx):
-    """Return a first step from the field at the state: short, the following grow."""
+    """Return a first step from the field at the state: short, the following grow.
+
+    Where the state is 0, or the field is 0 or infinite, there is no time scale: `Context.restful` is 1 then,
+    and the step the shorter one of what it would be with a unit for the state and a part of the interval.
+    """
     set_step(ctx, 0.0)
     prepare(ctx)
     start_plain(ctx)
@@ -216,4 +246,13 @@ def first_length(ctx):
     if position > 0.0:
         rate = max(speed / position, (pull / position) ** 0.5)
     length = ctx.allowed_error ** (1.0 / (2.0 * ctx.error_degree + 1.0))
+    ctx.restful = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
     return length / rate if 0.0 < rate < INFINITY else length
+
+
+@compiled
+def shorten_first(ctx):
+    """Let the first step be a part of the interval at most where nothing else tells how long it may be."""
+    most = FIRST_AT_REST * ctx.interval
+    if ctx.restful and 0.0 < most < abs(ctx.next_length):
+        ctx.next_length = most if ctx.next_length > 0.0 else -most

@@ -1,12 +1,12 @@
 """Whole trajectories: own steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, NOTHING, UNSOLVED, Context
+from integrators.kernel.context import BUDGET, DONE, NOTHING, UNSEEN, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
 from integrators.kernel.step.advance import looked, step
 from integrators.kernel.step.begin import set_factors
-from integrators.kernel.step.estimate import first_length
+from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
@@ -82,16 +82,20 @@ def advance(ctx, side, between, count, times, targets, parts, first, out, budget
         The outcome; `Context.made` tells how many samples are made.
     """
     dim = dimension(ctx)
+    if ctx.varying:
+        shorten_first(ctx)
     for i in range(first, count):
         ctx.made = i
-        if ctx.varying:
-            outcome, budget = approach(ctx, times[i], budget)
-            part = remaining(ctx, times[i])
-        else:
-            outcome, budget = repeat(ctx, targets[i], budget)
-            part = parts[i]
-        if outcome == DONE:
-            outcome = sample(ctx, side, between, times[i], part, out + dim * i)
+        outcome = UNSEEN
+        while outcome == UNSEEN:
+            if ctx.varying:
+                outcome, budget = approach(ctx, times[i], budget)
+                part = remaining(ctx, times[i])
+            else:
+                outcome, budget = repeat(ctx, targets[i], budget)
+                part = parts[i]
+            if outcome == DONE:
+                outcome = sample(ctx, side, between, times[i], part, out + dim * i)
         if outcome != DONE:
             return outcome
     ctx.made = count
@@ -106,6 +110,7 @@ def walk(ctx, times, out, budget):
     """
     dim, end = dimension(ctx), times[0]
     made = 0
+    shorten_first(ctx)
     while True:
         ctx.made = made
         taken = ctx.steps
@@ -151,4 +156,5 @@ def reset(ctx, start):
     arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)
+        shorten_first(ctx)
         ctx.age = 0

@@ -36,4 +36,17 @@ FLOOR = 1e-3  # of the largest size in its group: where rounding of the field ma
 # Of the same, where steps vary: a smaller block is judged as if it had this size, as its errors are. A block
 # that is 0 at first grows by one power of t in each iteration, far from the others by many.
 NOTHING = 1e-6
-SMALLEST, LARGE = 1e-200, 1e200  # a block smaller than that has no size to divide by
+SMALLEST, LARGE = 1e-280, 1e280  # a block smaller than that has no size to divide by, and counts as so large
+
+# --- parts of the interval, from a trajectory's start to the farthest time asked for -----------------
+
+# The longest step of a field that depends on the time, and of any field that has the same value at all nodes
+# of a step: what is to come cannot be seen from what has been. Sixteen nodes are then a 168th of the interval
+# apart at most, eight an 87th.
+LONGEST = 2.0**-4
+# The first step where the field at the start tells no time scale. Some six steps, each at most twice as long
+# as the one before, lead from it to the longest one.
+FIRST_AT_REST = 2.0**-10
+# A step that is cut to less than this may be one from rest, which no cutting makes good enough.
+FUTILE_PART = 1e-10
+SCALE_LASTS = 8  # steps that are good enough without it after which a block's expected size is forgotten

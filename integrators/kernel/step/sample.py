@@ -1,10 +1,11 @@
 """States between steps, and where a state is in memory."""
 
-from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSOLVED
+from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSEEN, UNSOLVED
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
+from integrators.kernel.step.estimate import ALIKE
 from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.handover import settle_part
 from integrators.kernel.step.kinks import keep_end_of_part
@@ -119,10 +120,26 @@ def part_step(ctx, side, part, known):
         predict(side, ctx, ctx.h, 0.0)
     else:
         predict(side, ctx, ctx.length, 1.0)
+    side.rescaled = ctx.rescaled
+    if ctx.rescaled:
+        for b in range(ctx.block_count):
+            side.expected[b] = ctx.expected[b]
     take_sizes(side)
     side.rate = ctx.rate  # not that of another partial step: states depend on nothing but where they are
     outcome = settle_part(ctx, side)
     return finish(side) if outcome == DONE else outcome
+
+
+@compiled
+def changes(ctx):
+    """Whether the field has not the same value at all nodes of the solved step."""
+    for d in range(ctx.rows):
+        first = ctx.values[ctx.lanes * d]
+        for i in range(1, ctx.k):
+            value = ctx.values[ctx.lanes * ((i // ctx.lanes) * ctx.padded + d) + i % ctx.lanes]
+            if abs(value - first) > ALIKE * abs(first):
+                return True
+    return False
 
 
 @compiled
@@ -177,6 +194,11 @@ def sample(ctx, side, between, t, part, out):
         return DONE
     outcome = part_step(ctx, side, part, 0.0)
     add_counters(ctx, side)
+    if outcome == DONE and ctx.varying and ctx.blind and changes(side):
+        # The step ahead was judged by nodes that see nothing of this: it is solved again, and no longer.
+        ctx.solved, ctx.length, ctx.next_length = UNSOLVED, 0.0, part
+        ctx.rejections += 1
+        return UNSEEN
     if outcome == DONE:
         write(side, side.next_state, out)
         if between == LAND:

@@ -69,7 +69,9 @@ def invert_sizes(ctx, strict, floored):
         b = ctx.block[d]
         largest = ctx.largest[ctx.group[b]]
         own = max(ctx.size[b], nothing * largest)
-        floor = max(own, FLOOR * largest)
+        if ctx.rescaled:
+            own = max(own, ctx.expected[b])
+        floor = max(max(own, FLOOR * largest), ctx.absolute[b])
         known = known and ctx.size[b] > SMALLEST
         # Whatever moves a block of no size is a large change; and then it has a size: look again.
         strict[d] = 1.0 / own if own > SMALLEST else LARGE

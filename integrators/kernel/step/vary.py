@@ -15,6 +15,7 @@ from integrators.kernel.context import (
     RUNNING,
     SCATTERED,
     UNDERFLOW,
+    UNSCALED,
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
@@ -38,7 +39,7 @@ from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import keep_end, kink, undo
-from integrators.kernel.step.rule import ROUNDING
+from integrators.kernel.step.rule import FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -65,6 +66,8 @@ MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothin
 # find it.
 SURE = 3
 STAY = 16  # steps for which it then stays
+# Attempts at a step after which its errors do not become small enough by cutting it; at a kink they do.
+FUTILE = 24
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
 
@@ -220,7 +223,13 @@ def ready(ctx):
     failure = UNDERFLOW
     while True:
         h = within(ctx, ctx.next_length)
-        if not abs(h) > SHORTEST * abs(ctx.t0):
+        too_short = not abs(h) > SHORTEST * abs(ctx.t0)
+        futile = too_short or ctx.attempts >= FUTILE
+        futile |= ctx.attempts > 0 and abs(h) < FUTILE_PART * ctx.interval
+        if futile and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
+            ctx.length = 0.0
+            return UNSCALED
+        if too_short:
             return failure
         before = ctx.iterations
         implicit = ctx.implicit
@@ -268,7 +277,12 @@ def accepts(ctx, outcome, iterations, implicit):
         else:
             ctx.border_ahead = NOTHING
     factor = longer(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
-    if error <= allowed and defect <= allowed_defect:
+    unseen = outcome == DONE and ctx.blind and abs(h) > ctx.longest_blind
+    if unseen:
+        factor = ctx.longest_blind / abs(h)
+    elif error <= allowed and defect <= allowed_defect:
+        if ctx.rescaled:
+            ctx.rescaled = SCALE_LASTS if ctx.borrowed else ctx.rescaled - 1
         if ctx.doubts >= SURE and ctx.kinks:
             ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
         limit = ctx.length_limit * APPROACH
@@ -280,7 +294,10 @@ def accepts(ctx, outcome, iterations, implicit):
             factor = 1.0
         elif implicit == 0 and ctx.strategy != FIXED_POINT:
             watch(ctx, factor)
-        ctx.length_after = h * (factor if implicit else on_table(ctx, factor))
+        length = h * (factor if implicit else on_table(ctx, factor))
+        if ctx.blind and abs(length) > ctx.longest_blind:
+            length = ctx.longest_blind if h > 0.0 else -ctx.longest_blind
+        ctx.length_after = length
         return True
     if implicit:
         ctx.implicit_steps -= 1
@@ -306,7 +323,9 @@ def take(ctx):
     commit(ctx)
     ctx.next_state, ctx.behind_state = ctx.behind_state, ctx.next_state
     ctx.next_error, ctx.behind_error = ctx.behind_error, ctx.next_error
-    ctx.n = 0
+    ctx.n = ctx.restful = 0
+    if ctx.asks < 0:
+        ctx.asks = ctx.asks + 1 if ctx.asks < -1 else 1
     t, low = two_sum(t, low + ctx.time_low)
     ctx.t0 = t
     ctx.time_low = low
