@@ -129,7 +129,7 @@ class AdaptiveStepper(HBVMStepper):
         """Turn towards a time; what lay ahead is forgotten where it lies behind then."""
         ctx = self._context
         if abs(end) < sys.float_info.max:
-            self._goal = getattr(self, "destination", end)
+            self._goal = end if self.destination is None else self.destination
             ctx.interval = max(ctx.interval, abs(self._goal - self._origin), abs(end - self._origin))
             self._program.limit(ctx, ctx.interval)
         if not np.sign(end - self.t) * ctx.next_length < 0.0:

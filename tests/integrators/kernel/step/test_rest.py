@@ -1,0 +1,58 @@
+"""Starts at rest: what happens later is seen, and errors have a size to be relative to."""
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from integrators import HBVM, Gauss, LineIntegral, integrate, integrate_many
+from problems import Problem, VectorField
+from problems.errors import InputError
+
+METHODS = [HBVM(), HBVM(k=8, s=7, tol=1e-12), Gauss(s=8, tol=1e-12)]
+PULSE = np.sqrt(np.pi)
+CASES = {
+    "oscillator": (lambda t, y, m: [y[1], -y[0] + m.exp(-((t - 5) ** 2))], [0.0, 0.0], 15.0,
+                   [-0.7509604564200418, -1.1582446449788493]),
+    "pulse": (lambda t, y, m: [m.exp(-((t - 5) ** 2))], [0.0], 15.0, [PULSE / 2 * (erf(10) + erf(5))]),
+    "late pulse": (lambda t, y, m: [m.exp(-((t - 50) ** 2))], [0.0], 100.0, [PULSE]),
+    "growth": (lambda t, y, m: [y[0] / m.cosh(t - 15) ** 2], [1.0], 30.0, [np.exp(2 * np.tanh(15.0))]),
+    "power": (lambda t, y, m: [21 * t**20], [0.0], 1.0, [1.0]),
+    "ramp": (lambda t, y, m: [(t / 3) ** 15], [0.0], 3.0, [3 / 16]),
+    "switch": (lambda t, y, m: [-y[0] + m.tanh(4 * (t - 5)) + 1], [0.0], 10.0, [1.986171412]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+@pytest.mark.parametrize("name", CASES)
+def test_what_begins_after_a_start_at_rest_is_seen(name, method):
+    f, start, end, exact = CASES[name]
+    problem = Problem(VectorField(f, dim=len(start)), y0=start, t_end=end)
+    for times in ([end], np.linspace(0.0, end, 101)):
+        solution = integrate(problem, method, times)
+        assert solution.status.name == "FINISHED"
+        assert np.abs(solution.y[-1] - exact).max() < 2e-9  # 6e-10, of the numbers written here
+    many = integrate_many(problem, method, starts=[start] * 2, times=[end])
+    assert np.abs(many.y[:, -1] - exact).max() < 2e-9
+
+
+def test_an_equilibrium_takes_few_steps():
+    system = VectorField(lambda t, y, m: [y[1], -m.sin(y[0])], dim=2)
+    solution = integrate(Problem(system, y0=[0.0, 0.0], t_end=1e6), HBVM(), [1e6])
+    assert not solution.y.any()
+    assert solution.stats.steps < 40  # 21
+
+
+def test_an_absolute_tolerance_bounds_the_steps_and_is_checked():
+    problem = Problem(VectorField(lambda y: [y[1], -y[0]], dim=2), y0=[1e-9, 0.0], t_end=20.0)
+    steps = [
+        integrate(problem, HBVM(k=8, s=6, tol=1e-12, atol=a), [20.0]).stats.steps
+        for a in (0.0, 1e-13, [1e-13] * 2)
+    ]
+    assert steps[0] > steps[1] == steps[2]
+    for wrong in (-1.0, "x", [], [1.0, -1.0], float("nan")):
+        with pytest.raises(InputError, match="atol"):
+            HBVM(tol=1e-8, atol=wrong)
+    with pytest.raises(InputError, match="atol has 3 numbers"):
+        integrate(problem, HBVM(tol=1e-8, atol=[1.0] * 3), [1.0])
+    with pytest.raises(InputError, match="atol with a tolerance only"):
+        LineIntegral(k=4, s=2, h=0.1, atol=1e-8, invariants=["energy"])
