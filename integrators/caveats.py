@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from problems.analysis.invariants import evaluate
 from problems.analysis.structure import has_kinks
+from problems.calculus.function import Function
 from problems.double_double import DD
 from problems.problem import Problem, System
 from problems.trace.graph import T
@@ -78,16 +79,16 @@ def lost_invariants(
     """
     said: list[tuple[str, ...]] = [()] * len(par)
     for name, per_step in conserved.items():
-        function = system.function(f"invariant:{name}")
-        if any(node.flags & T for node in function.roots):
+        invariant = system.invariants[name]
+        if any(node.flags & T for node in invariant.roots):
             continue
 
-        def values(what: str, at: tuple[float, Array], which: Any = slice(None)) -> list[DD]:
+        def values(function: Function, at: tuple[float, Array], which: Any = slice(None)) -> list[DD]:
             columns = np.ascontiguousarray(at[1][which].T)
-            return evaluate(system.function(what), at[0], columns, np.ascontiguousarray(par[which].T))
+            return evaluate(function, at[0], columns, np.ascontiguousarray(par[which].T))
 
         with np.errstate(all="ignore"):
-            first, last = (values(f"invariant:{name}", at) for at in (start, end))
+            first, last = (values(invariant, at) for at in (start, end))
             change = np.linalg.norm([(b - a).rounded() for a, b in zip(first, last, strict=True)], axis=0)
             size = np.linalg.norm([a.rounded() for a in first], axis=0)
             limit = np.maximum(LOST, PER_STEP * per_step * steps)
@@ -95,7 +96,7 @@ def lost_invariants(
             if lost.size and name == "energy":
                 # Terms that cancel are rounded at their own size.
                 for at in (start, end):
-                    slopes = values("gradient:energy", at, lost)
+                    slopes = values(system.gradient(invariant), at, lost)
                     terms = np.abs([slope.rounded() for slope in slopes] * at[1][lost].T).sum(axis=0)
                     size[lost] = np.fmax(size[lost], terms)
                 lost = lost[change[lost] > limit[lost] * size[lost]]

@@ -69,7 +69,7 @@ def _problems() -> Table:
         (
             _call(name, one.arguments),
             str(one.system.dim),
-            ", ".join(one.system.invariant_names),
+            ", ".join(one.system.invariants),
             one.title or "",
         )
         for name, one in loaded

@@ -90,7 +90,7 @@ def _seconds(action: Callable[[], Any]) -> tuple[float, Any]:
 
 def _traced(text: str) -> Problem:
     problem = make_problem(text)
-    problem.system.function("field")
+    assert problem.system.field is not None
     return problem
 
 

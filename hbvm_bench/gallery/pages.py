@@ -77,7 +77,7 @@ def _overview(loaded: dict[str, Problem]) -> str:
         lines.append(
             f"| [{name}](#{name}) | {system.dim} | {'yes' if system.separable else 'no'} | "
             f"{'no' if degree is None else f'degree {degree}'} | "
-            f"{', '.join(system.invariant_names).replace('_', ' ')} | {problem.notes} |"
+            f"{', '.join(system.invariants).replace('_', ' ')} | {problem.notes} |"
         )
     return "\n".join(lines) + "\n\n"
 
@@ -86,7 +86,7 @@ def _section(name: str, problem: Problem) -> str:
     sections = _numpydoc(inspect.getdoc(registry.factory(name)) or "")
     summary = _flowed(sections.get("Summary", "")).removeprefix("Return ")
     arguments, returns = (_entries(sections.get(key, "")) for key in ("Parameters", "Returns"))
-    guards = ", ".join(problem.system.guard_names).replace("_", " ")
+    guards = ", ".join(problem.system.guards).replace("_", " ")
     lines = [
         f"## {name}\n",
         f"![{problem.title}](problems/{name}.svg)\n",

@@ -123,7 +123,7 @@ def with_laws(measured: Measured, asked: Checks) -> Measured:
         return measured
     if not measured.complete:
         law = Law(why=f"the trajectory ends at t = {measured.t_stop:.4g}", starts=1)
-        return replace(measured, laws=dict.fromkeys(measured.problem.system.invariant_names, law))
+        return replace(measured, laws=dict.fromkeys(measured.problem.system.invariants, law))
     rows = {name: values for name, values in measured.drift.items() if name != "t"}
     found = {
         name: drift.fit(measured.drift["t"], values, signed=name == "energy")
@@ -162,8 +162,7 @@ def _signed(problem: Problem, start: Array, t: Array, y: Array) -> Series:
     found: Series = {}
     states = np.ascontiguousarray(np.vstack([start[None], y]).T)
     times = np.concatenate([[problem.t0], t])
-    for name in problem.system.invariant_names:
-        function = problem.system.function(f"invariant:{name}")
+    for name, function in problem.system.invariants.items():
         values = invariants.evaluate(function, times, states, problem.par)
         gaps = np.stack([(v.hi[1:] - v.hi[0]) + (v.lo[1:] - v.lo[0]) for v in values])
         size = float(np.linalg.norm([v.hi[0] for v in values])) or 1.0
@@ -175,8 +174,7 @@ def _of_ensemble(problem: Problem, ensemble: Ensemble, series: Series) -> dict[s
     """Return what differs of an ensemble: each trajectory's errors are against its own start."""
     starts, par = members(problem, ensemble)
     errors: Series = {}
-    for name in problem.system.invariant_names:
-        function = problem.system.function(f"invariant:{name}")
+    for name, function in problem.system.invariants.items():
         before = invariants.evaluate(function, problem.t0, np.ascontiguousarray(starts.T), par.T)
         after = invariants.evaluate(function, problem.t_end, np.ascontiguousarray(series["y"].T), par.T)
         gaps = np.stack([(a - b).rounded() for a, b in zip(after, before, strict=True)])

@@ -130,7 +130,7 @@ def _measure(request: Request, directory: Path) -> Result:
         (resolved,) = _resolved(request)
         if reason := resolved.method.accepts(resolved.problem):
             return Result(outcome="refused", reason=reason)
-        names = resolved.problem.system.invariant_names
+        names = list(resolved.problem.system.invariants)
         if bad := [name for name in names if not NAME.fullmatch(name)]:
             return Result(outcome="refused", reason=f"the invariant's name {bad[0]!r} can be no file name")
         grid = resolved.case.grid.times(resolved.problem, fixed_step(resolved.method))

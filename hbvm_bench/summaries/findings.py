@@ -94,7 +94,7 @@ def _problem(text: str) -> Problem | None:
 
 def _describe(name: str, problem: Problem) -> Findings:
     system = problem.system
-    energy = "hamiltonian" in system.offered()
+    energy = system.energy is not None
     degree = structure.degree(system, problem.par) if energy else None
     try:
         formula = latex(system) if energy else ""
@@ -112,8 +112,8 @@ def _describe(name: str, problem: Problem) -> Findings:
         exact=() if degree is None else tuple((s, structure.exact_k(degree, s)) for s in DEGREES),
         cyclic=tuple("q" if system.dof == 1 else f"q{place + 1}" for place in cyclic),
         depends_on_time=structure.depends_on_time(system),
-        invariants=system.invariant_names,
-        guards=system.guard_names,
+        invariants=tuple(system.invariants),
+        guards=tuple(system.guards),
         parameters={key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()},
         engines=reasons(problem),
     )

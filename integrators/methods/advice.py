@@ -277,7 +277,7 @@ class _Piece:
 
 
 def _has_energy(problem: Problem) -> bool:
-    return problem.system.kind != "poisson" and "hamiltonian" in problem.system.offered()
+    return problem.system.kind != "poisson" and problem.system.energy is not None
 
 
 def _candidates(piece: _Piece, goal: float) -> Iterator[_Trial]:

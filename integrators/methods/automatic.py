@@ -45,7 +45,7 @@ def choose(system: System, tol: float) -> tuple[int, int, float | None]:
         energy to keep.
     """
     s = max(2, min(HIGHEST, math.ceil(HIGHEST * math.log(tol) / math.log(DEFECT))))
-    if "hamiltonian" not in system.offered():
+    if system.energy is None:
         return MANY, s, None
     nu = degree(system)
     if nu is not None:

@@ -170,7 +170,7 @@ class LineIntegral(MethodBase):
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the invariants that are kept, with a tolerance."""
-        tol, names = self.tol, system.invariant_names
+        tol, names = self.tol, system.invariants
         return {} if tol is None else {name: tol for name in self.invariants if name in names}
 
     def compile(self, system: System) -> Program:

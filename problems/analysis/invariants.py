@@ -149,11 +149,12 @@ def _states(system: System, y: ArrayLike) -> Array:
     return np.atleast_2d(states)
 
 
-def _along(system: System, par: Array, what: str, states: Array, t: ArrayLike | None) -> list[DD]:
-    function = system.function(what)
+def _along(function: Function, par: Array, states: Array, t: ArrayLike | None) -> list[DD]:
     if t is None:
         if any(node.flags & T for node in function.roots):
-            raise InputError(f"{what.split(':')[-1]} depends on time; give the times of the states as t=.")
+            raise InputError(
+                f"{function.name.split(':')[-1]} depends on time; give the times of the states as t=."
+            )
         t = 0.0
     try:
         times = np.asarray(t, dtype=np.float64)
@@ -168,8 +169,8 @@ def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) ->
     """Return the invariants along states, see `problems.problem.Problem.invariants`."""
     states = _states(system, y)
     found: dict[str, Array] = {}
-    for name in system.invariant_names:
-        values = [value.rounded() for value in _along(system, par, f"invariant:{name}", states, t)]
+    for name, function in system.invariants.items():
+        values = [value.rounded() for value in _along(function, par, states, t)]
         found[name] = np.stack(values, axis=1) if system.is_vector(name) else values[0]
     return found
 
@@ -182,11 +183,9 @@ def errors(
 
     states = _states(system, y)
     found: dict[str, Array] = {}
-    for name in system.invariant_names:
-        what = f"invariant:{name}"
-        function = system.function(what)
-        first = _along(system, par, what, np.atleast_2d(start[1]), start[0])
-        values = _along(system, par, what, states, t)
+    for name, function in system.invariants.items():
+        first = _along(function, par, np.atleast_2d(start[1]), start[0])
+        values = _along(function, par, states, t)
         gaps = np.stack([(now - before).rounded() for now, before in zip(values, first, strict=True)])
         size = np.array([value.rounded()[0] for value in first])
         largest = np.abs(size).max()
@@ -210,8 +209,8 @@ def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dic
     """Return the guards along states, see `problems.problem.Problem.guards`."""
     states = _states(system, y)
     return {
-        name: np.abs(_along(system, par, f"guard:{name}", states, t)[0].rounded())
-        for name in system.guard_names
+        name: np.abs(_along(function, par, states, t)[0].rounded())
+        for name, function in system.guards.items()
     }
 
 
@@ -223,7 +222,7 @@ def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> A
     """Return the velocities at states, see `problems.problem.Problem.velocity`."""
     states = _states(system, y)
     if isinstance(system, Lagrangian):
-        return np.stack([value.rounded() for value in _along(system, par, "velocity", states, t)], axis=1)
+        return np.stack([value.rounded() for value in _along(system.velocity, par, states, t)], axis=1)
     if not system.separable or system.dof is None:
         return None
     momenta = states[:, system.dof :]
@@ -234,7 +233,7 @@ def momentum(system: System, par: Array, t: float, q: Array, v: Array) -> Array:
     """Return the momenta p = v/c of a separable system, or dL/dv of a Lagrangian, each rounded once."""
     if isinstance(system, Lagrangian):
         state = np.concatenate([q, v])[:, np.newaxis]
-        found = evaluate(system.function("momentum"), t, state, par)
+        found = evaluate(system.momentum, t, state, par)
         return np.array([float(p.rounded()[0]) for p in found])
     if not system.separable:
         raise InputError(f"v0= needs constant masses, which {system.name} does not have; give p0=.")

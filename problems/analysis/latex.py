@@ -2,6 +2,7 @@
 
 import re
 
+from problems.calculus.function import Function
 from problems.errors import InputError
 from problems.systems.base import System
 from problems.trace.functions import FUNCTIONS
@@ -16,16 +17,15 @@ _GREEK = frozenset(
 _LETTERS = "ijklm"
 
 
-def latex(system: System, what: str = "hamiltonian") -> str:
+def latex(system: System, function: Function | None = None) -> str:
     """Return a scalar function of a system as LaTeX.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str
-        ``"hamiltonian"``, ``"invariant:<name>"`` or ``"guard:<name>"``; of a vector
-        the components, separated by commas.
+    function : Function, optional
+        One of its functions, the energy by default; of several outputs each, separated by commas.
 
     Returns
     -------
@@ -40,9 +40,11 @@ def latex(system: System, what: str = "hamiltonian") -> str:
         If the system has no such function, or the formula is longer than `LONGEST`.
     """
     printer = _Printer(system)
-    function = system.function(what)
+    function = function or system.function("hamiltonian")
     if function.loops:
-        raise InputError(f"{what} of {system.name} is not one formula; print the Hamiltonian instead.")
+        raise InputError(
+            f"{function.name} of {system.name} is not one formula; print the Hamiltonian instead."
+        )
     texts = [printer.text(term.node) for terms in function.outputs for term in terms]
     return ",\\ ".join(texts)
 

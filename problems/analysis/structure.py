@@ -93,8 +93,8 @@ def exact_k(nu: int, s: int) -> int:
 
 def depends_on_time(system: System) -> bool:
     """Whether the energy, or the vector field where there is none, contains the time itself."""
-    what = "hamiltonian" if _has_energy(system) else "field"
-    return any(node.flags & T for node in system.function(what).roots)
+    function = system.energy or system.function("field")
+    return any(node.flags & T for node in function.roots)
 
 
 def has_kinks(system: System) -> bool:
@@ -128,11 +128,7 @@ def cyclic(system: System) -> list[int]:
     return [place for place in range(system.dof) if place not in seen]
 
 
-def _has_energy(system: System) -> bool:
-    return "hamiltonian" in system.offered()
-
-
 def _energy(system: System) -> Node:
-    if not _has_energy(system):
+    if system.energy is None:
         raise InputError(f"{system.name} has no energy; give it as a Hamiltonian or a Poisson system.")
-    return system.function("hamiltonian").roots[0]
+    return system.energy.roots[0]

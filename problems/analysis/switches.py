@@ -36,7 +36,7 @@ class Switches:
     """
 
     def __init__(self, system: System):
-        nodes = reachable(system.function("field").roots) if system.traced else []
+        nodes = reachable(system.field.roots) if system.field is not None else []
         self._nodes = [
             node
             for node in nodes

@@ -38,7 +38,7 @@ Loops = tuple[tuple[Loop, tuple[LoopTerm, ...]], ...]
 
 @dataclass(frozen=True, eq=False)
 class Function:
-    """Outputs, each a chain of summands that are added left to right.
+    """Outputs, each a chain of summands that are added left to right; equal to itself only.
 
     Attributes
     ----------
@@ -48,11 +48,14 @@ class Function:
         The summands of each output, in order; none: the output is 0.
     loops : tuple of (Loop, tuple of LoopTerm)
         Summands in loops, by place of the output; they come before the others.
+    name : str
+        What generated code and messages call it, such as ``"field"`` or ``"invariant:energy"``.
     """
 
     graph: Graph
     outputs: tuple[tuple[Term, ...], ...]
     loops: Loops = ()
+    name: str = ""
 
     @property
     def roots(self) -> list[Node]:
@@ -60,6 +63,10 @@ class Function:
         return [term.node for terms in self.outputs for term in terms] + [
             entry.node for _, entries in self.loops for entry in entries
         ]
+
+    def named(self, name: str) -> "Function":
+        """Return the same function under a name."""
+        return Function(self.graph, self.outputs, self.loops, name)
 
     def part(self, low: int, high: int) -> "Function":
         """Return the outputs low to high - 1; no summand in a loop may belong to others as well."""
@@ -85,7 +92,7 @@ class Function:
         ]
 
     @classmethod
-    def of_plain(cls, graph: Graph, plain: Sequence[Any]) -> "Function":
+    def of_plain(cls, graph: Graph, plain: Sequence[Any], name: str) -> "Function":
         """Return the function that `plain` was returned by, on the same graph or one like it."""
         nodes, loops = graph.nodes, graph.loops
         outputs = tuple(tuple(Term(nodes[i], key) for i, key in terms) for terms in plain[0])
@@ -96,6 +103,7 @@ class Function:
                 (loops[i], tuple(LoopTerm(Affine(tuple(c), offset), nodes[n]) for c, offset, n in entries))
                 for i, entries in plain[1]
             ),
+            name,
         )
 
     def __neg__(self) -> "Function":
@@ -107,19 +115,23 @@ class Function:
         return Function(self.graph, outputs, loops)
 
 
-def function_of(graph: Graph, nodes: Iterable[Node]) -> Function:
+def function_of(graph: Graph, nodes: Iterable[Node], name: str = "") -> Function:
     """Return the function whose outputs are ``nodes``."""
-    return Function(graph, tuple((Term(node, node.id),) for node in nodes))
+    return Function(graph, tuple((Term(node, node.id),) for node in nodes), name=name)
 
 
-def stacked(functions: Sequence[Function]) -> Function:
-    """Return one function with the outputs of all, in order; what they share is computed once."""
+def stacked(functions: Sequence[Function], name: str = "") -> Function:
+    """Return one function with the outputs of all, in order; what they share is computed once.
+
+    Its name is ``name``, or that of all of them.
+    """
     outputs: list[tuple[Term, ...]] = []
     moved: list[tuple[int, Loops]] = []
     for function in functions:
         moved.append((len(outputs), function.loops))
         outputs.extend(function.outputs)
-    return Function(functions[0].graph, tuple(outputs), joined(moved))
+    name = name or ", ".join(function.name for function in functions)
+    return Function(functions[0].graph, tuple(outputs), joined(moved), name)
 
 
 def joined(parts: Iterable[tuple[int, Loops]]) -> Loops:

@@ -33,8 +33,6 @@ class Jacobian:
 
     Attributes
     ----------
-    name : str
-        What generated code and messages call it.
     function : Function
         One output per entry, for the emitters.
     rows, columns : ndarray of int64, shape (n,)
@@ -43,7 +41,6 @@ class Jacobian:
         The matrix is size by size.
     """
 
-    name: str
     function: Function
     rows: Integers
     columns: Integers
@@ -63,7 +60,7 @@ def jacobian(function: Function, name: str) -> Jacobian | None:
     function : Function
         A field, or the force of a separable system, which depends on the positions alone.
     name : str
-        See `Jacobian`.
+        What generated code and messages call it.
 
     Returns
     -------
@@ -183,8 +180,8 @@ class _Entries:
                 place = tuple(int(j == i) for j in range(longer.width))
                 terms.append(LoopTerm(Affine(place, 0), _moved(self.graph, node, loop, longer, 0)))
             loops.append((longer, tuple(terms)))
-        function = Function(self.graph, tuple(outputs), tuple(loops))
-        return Jacobian(name, function, places // size, places % size, size)
+        function = Function(self.graph, tuple(outputs), tuple(loops), name)
+        return Jacobian(function, places // size, places % size, size)
 
 
 def _constant(loop: Loop, place: int) -> Affine:

@@ -64,24 +64,24 @@ class Source:
     sha256: str
 
 
-_texts: WeakKeyDictionary[System, dict[tuple[str | Jacobian, str, int | None], Source]] = WeakKeyDictionary()
+What = str | Function | Jacobian
+"""One of a system's functions, a Jacobian, or one of the names that `System.function` knows."""
+
+_texts: WeakKeyDictionary[System, dict[tuple[Function, str, int | None], Source]] = WeakKeyDictionary()
 _fingerprints: WeakKeyDictionary[System, str] = WeakKeyDictionary()
 _compiled: dict[tuple[str, str], Any] = {}
 
 
-def source(system: System, what: str | Jacobian, backend: str, *, limit: int | None = SMALL) -> Source:
+def source(system: System, what: What, backend: str, *, limit: int | None = SMALL) -> Source:
     """Return the source of one of a system's functions.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str or Jacobian
-        A name that `System.function` knows: ``"field"`` (dim outputs: q' then p'),
-        ``"force"`` (dof outputs -dH/dq from positions alone; separable systems),
-        ``"velocity_scale"`` (dof outputs c with q'_i = c_i p_i; separable systems),
-        ``"hamiltonian"``, ``"invariant:<name>"``, ``"guard:<name>"``, ``"domain"``.
-        Or what `System.jacobian` returns.
+    what : str, Function or Jacobian
+        A function of the system, such as ``system.invariants["energy"]``, or what `System.jacobian`
+        returns; ``"field"``, ``"force"``, ``"velocity_scale"`` and ``"hamiltonian"`` by name.
     backend : {"numpy", "numba", "jax", "heyoka"}
         numba: ``def name(t, y, par, out)`` on scalars, with the functions of
         `math` as globals; works unchanged on lanes. numpy: the same signature
@@ -101,21 +101,22 @@ def source(system: System, what: str | Jacobian, backend: str, *, limit: int | N
         limit = None
     function = _function(system, what)
     texts = _texts.setdefault(system, {})
-    key = (what, backend, limit)
+    key = (function, backend, limit)
     if key not in texts:
-        name = re.sub(r"\W+", "_", f"{system.name}_{_name(what)}")
+        name = re.sub(r"\W+", "_", f"{system.name}_{function.name}")
         texts[key] = _written(function, name if name.isidentifier() else f"_{name}", backend, limit)
     return texts[key]
 
 
-def _function(system: System, what: str | Jacobian) -> Function:
+def _function(system: System, what: What) -> Function:
     if not isinstance(system, System):
         raise InputError(f"a system is needed, such as problem.system, not {shown(system)}.")
-    return what.function if isinstance(what, Jacobian) else system.function(what)
-
-
-def _name(what: str | Jacobian) -> str:
-    return what.name if isinstance(what, Jacobian) else what
+    match what:
+        case Function():
+            return what
+        case Jacobian():
+            return what.function
+    return system.function(what)
 
 
 def _written(function: Function, name: str, backend: str, limit: int | None) -> Source:
@@ -146,7 +147,7 @@ def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
     return namespace[made.name]
 
 
-def numpy(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
+def numpy(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
 
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
@@ -154,8 +155,8 @@ def numpy(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
     """
     if isinstance(system, Foreign) and what == "field":
         return partial(_foreign_on_arrays, system)
-    made = source(system, what, "numpy", limit=limit)
-    return _on_arrays(made, len(_function(system, what).outputs))
+    function = _function(system, what)
+    return _on_arrays(source(system, function, "numpy", limit=limit), len(function.outputs))
 
 
 def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
@@ -213,7 +214,7 @@ def _special(name: str) -> Callable[[Any], Any]:
 _SPECIAL = {f.numpy: _special(f.numpy) for f in FUNCTIONS.values() if "." not in f.numpy}
 
 
-def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Any:
+def numba(system: System, what: What, *, limit: int | None = SMALL) -> Any:
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
@@ -222,13 +223,14 @@ def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
     """
     if isinstance(system, Foreign) and what == "field":
         return system.evaluate
-    cost = compilable(system, what)
-    made = source(system, what, "numba", limit=limit)
+    function = _function(system, what)
+    cost = compilable(system, function)
+    made = source(system, function, "numba", limit=limit)
     key = ("numba", made.sha256)
     if key not in _compiled:
         if cost >= LONG:
             warnings.warn(
-                f"the {_name(what)} of {system.name} is {cost:,} operations written out, compiled "
+                f"the {function.name} of {system.name} is {cost:,} operations written out, compiled "
                 f"for about {cost / PER_SECOND:.0f} s; write sums as m.sum(lambda i: q[i]**2, range(n)), "
                 "which takes about one.",
                 stacklevel=2,
@@ -240,7 +242,7 @@ def numba(system: System, what: str | Jacobian, *, limit: int | None = SMALL) ->
     return _compiled[key]
 
 
-def compilable(system: System, what: str | Jacobian) -> int:
+def compilable(system: System, what: What) -> int:
     """Return the operations of a function; refuse one that would be compiled for minutes.
 
     See `problems.limits`. Operations in a loop count once; a sine or an exponential as `SLOW`.
@@ -250,9 +252,10 @@ def compilable(system: System, what: str | Jacobian) -> int:
     problems.errors.InputError
         For too many operations, or too many that wait for one another.
     """
-    nodes = reachable(_function(system, what).roots)
+    function = _function(system, what)
+    nodes = reachable(function.roots)
     cost = sum(_COST.get(node.op, 1) for node in nodes)
-    name = f"the {_name(what)} of {system.name}"
+    name = f"the {function.name} of {system.name}"
     limits.check(f"{name}, with each sine or exponential as {SLOW},", "OPERATIONS", cost, limits.WRITTEN_OUT)
     depth: dict[int, int] = {}
     for node in nodes:  # arguments come first
@@ -261,7 +264,7 @@ def compilable(system: System, what: str | Jacobian) -> int:
     return cost
 
 
-def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> Callable[..., Any]:
+def jax(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..., Any]:
     """Return ``f(t, y, par)`` on JAX arrays; y is (dim,); switches JAX to double precision.
 
     ``limit`` as in `source`.
@@ -285,7 +288,7 @@ def jax(system: System, what: str | Jacobian, *, limit: int | None = SMALL) -> C
     return _compiled[key]
 
 
-def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
+def heyoka(system: System, what: What = "field") -> list[Any]:
     """Return heyoka expressions: pairs of variable and right-hand side for ``"field"``.
 
     Variables are ``q0.., p0..`` (``y0..`` for a vector field), parameters
@@ -298,7 +301,8 @@ def heyoka(system: System, what: str | Jacobian = "field") -> list[Any]:
         If heyoka is not installed.
     """
     variables, expressions = _for_heyoka(system, source(system, what, "heyoka"))
-    return list(zip(variables, expressions, strict=True)) if what == "field" else expressions
+    right_hand_side = what == "field" or what is system.field
+    return list(zip(variables, expressions, strict=True)) if right_hand_side else expressions
 
 
 def heyoka_of(system: System, function: Function) -> Any:
@@ -332,6 +336,7 @@ __all__ = [
     "BACKENDS",
     "SMALL",
     "Source",
+    "What",
     "compilable",
     "fingerprint",
     "heyoka",

@@ -1,10 +1,10 @@
 """What all systems have in common: a traced graph, parameters, invariants, guards."""
 
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,7 @@ from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
 
 Value = float | Sequence[float]
-
-_DECLARED = ("hamiltonian", "momentum", "domain")  # functions that users write, with invariants and guards
-
-_COMPONENT = re.compile(r"(?P<kind>invariant|gradient):(?P<name>.*)\[(?P<place>\d+)\]")
+_NAMED = ("field", "hamiltonian", "force", "velocity_scale")
 
 
 @dataclass(frozen=True)
@@ -70,13 +67,19 @@ class System:
         Names and default values; the values are run-time arguments.
     bodies : Bodies or None
         What makes it an N-body system.
+    invariants : mapping of str to Function
+        The conserved quantities by name, the energy first; a list of numbers is one function.
+    guards : mapping of str to Function
+        Quantities that a symmetry keeps at 0.
 
     Examples
     --------
     >>> import problems
     >>> system = problems.load("kepler").system
-    >>> system.kind, system.dof, system.invariant_names
+    >>> system.kind, system.dof, tuple(system.invariants)
     ('hamiltonian', 2, ('energy', 'angular_momentum', 'lenz'))
+    >>> system.force.name, problems.load("rigid_body").system.force
+    ('force', None)
     """
 
     kind: ClassVar[str]
@@ -106,33 +109,29 @@ class System:
         )
         self._layout, self.n_par = _layout(self.parameters)
         self._graph = Graph(dof)
-        self._functions: dict[str, Function | None] = {}  # None: it has none of this name
-        self._jacobians: dict[str, Jacobian | None] = {}
+        self._written: dict[str, Function] = {}  # what the user wrote and is not derived
         self._vectors: set[str] = set()  # invariants that are lists
-        self.invariant_names: tuple[str, ...] = tuple(invariants)
-        self.guard_names: tuple[str, ...] = tuple(guards)
+        self._start_memories()
+
+    def _start_memories(self) -> None:
+        self._jacobians: dict[str, Jacobian | None] = {}
+        self._gradients: dict[Function, Function] = {}
+        self._together: dict[tuple[Function, ...], Function] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what was traced, without the functions that it was traced from, as JSON can keep it."""
-        own = {*_DECLARED, *(f"invariant:{n}" for n in self.invariant_names)}
-        own |= {f"guard:{n}" for n in self.guard_names}
-        declared = {
-            name: function.plain()
-            for name, function in self._functions.items()
-            if function is not None and (name in own or self._writes(name))
-        }
         bodies = self.bodies and [self.bodies.masses, self.bodies.G, self.bodies.dimension]
         return {
             "name": self.name,
             "dim": self.dim,
             "dof": self.dof,
             "parameters": {key: np.array(value).tolist() for key, value in self.parameters.items()},
-            "invariants": list(self.invariant_names),
-            "guards": list(self.guard_names),
+            "invariants": list(self.invariants),
+            "guards": list(self.guards),
             "vectors": sorted(self._vectors),
             "bodies": bodies,
             "graph": self._graph.__getstate__(),
-            "functions": declared,
+            "functions": {name: function.plain() for name, function in self._written.items()},
         }
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -145,20 +144,29 @@ class System:
         self._layout, self.n_par = _layout(self.parameters)
         self._graph = Graph.__new__(Graph)
         self._graph.__setstate__(state["graph"])
-        self._functions = {name: Function.of_plain(self._graph, plain) for name, plain in functions.items()}
-        self._jacobians = {}
+        self._written = {
+            name: Function.of_plain(self._graph, plain, name) for name, plain in functions.items()
+        }
         self._vectors = set(state["vectors"])
-        self.invariant_names, self.guard_names = tuple(state["invariants"]), tuple(state["guards"])
+        self._start_memories()
+        self._list(state["invariants"], state["guards"])
 
-    def _writes(self, name: str) -> bool:
-        """Whether a function is written by the user and not derived, besides those that all systems have."""
-        return name in ("field", "gradient", "structure")
+    def _write(self, name: str, nodes: Iterable[Node]) -> None:
+        self._written[name] = function_of(self._graph, nodes, name)
 
-    def _set_energy(self, energy: Node) -> None:
-        self._functions["hamiltonian"] = function_of(self._graph, [energy])
-        if not energy.flags & T:  # with explicit time it is not kept
-            self._functions["invariant:energy"] = self._functions["hamiltonian"]
-            self.invariant_names = ("energy", *self.invariant_names)
+    def _list(self, invariants: Iterable[str], guards: Iterable[str]) -> None:
+        """List the invariants and guards that have been written, under their names."""
+        self.invariants: Mapping[str, Function] = MappingProxyType(
+            {name: self._written[f"invariant:{name}"] for name in invariants}
+        )
+        self.guards: Mapping[str, Function] = MappingProxyType(
+            {name: self._written[f"guard:{name}"] for name in guards}
+        )
+
+    def _write_energy(self, energy: Node) -> None:
+        self._write("hamiltonian", [energy])
+        if not energy.flags & T:  # with explicit time it is not conserved
+            self._write("invariant:energy", [energy])
 
     def _trace_declared(
         self, invariants: Mapping[str, Callable[..., Any]], guards: Mapping[str, Callable[..., Any]]
@@ -173,11 +181,11 @@ class System:
             nodes = [self._node(v, function, what) for v in value]
             if not nodes:
                 raise InputError(f"{what} returns an empty list; return a number or a list of numbers.")
-            self._functions[f"invariant:{key}"] = function_of(self._graph, nodes)
+            self._write(f"invariant:{key}", nodes)
         for key, function in guards.items():
-            self._functions[f"guard:{key}"] = function_of(
-                self._graph, [self._scalar(function, f"guard {key!r}")]
-            )
+            self._write(f"guard:{key}", [self._scalar(function, f"guard {key!r}")])
+        energy = ["energy"] if self.kind != "vector_field" and "invariant:energy" in self._written else []
+        self._list([*energy, *invariants], guards)
 
     def _call(self, function: Callable[..., Any], what: str) -> Any:
         return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, what=what)
@@ -210,62 +218,114 @@ class System:
     @property
     def separable(self) -> bool:
         """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""
-        return False
+        return self.velocity_scale is not None
 
-    def function(self, what: str) -> Function:
-        """Return a function of the system as a graph, for the emitters.
+    @property
+    def energy(self) -> Function | None:
+        """H, one output; ``None`` where there is none."""
+        return self._written.get("hamiltonian")
 
-        Parameters
-        ----------
-        what : str
-            ``"field"``, ``"force"``, ``"velocity_scale"``, ``"hamiltonian"``,
-            ``"invariant:<name>"``, ``"guard:<name>"``; ``"gradient:<invariant>"`` (dim
-            outputs for each component of the invariant); ``"invariant:<name>[i]"`` and
-            ``"gradient:<name>[i]"`` for one component; for Poisson systems ``"gradient"``
-            (of H) and ``"structure"`` (B row by row). Several, separated by ``", "``, are
-            one function with all their outputs: what they share is computed once.
+    @cached_property
+    def field(self) -> Function | None:
+        """The right-hand side, dim outputs: q' then p' where there are both; ``None`` if it is not traced."""
+        return self._written.get("field")
+
+    @cached_property
+    def force(self) -> Function | None:
+        """-dH/dq from positions alone, dof outputs; ``None`` where the system is not separable."""
+        return None
+
+    @cached_property
+    def velocity_scale(self) -> Function | None:
+        """C with q'_i = c_i p_i, dof outputs; ``None`` where the system is not separable."""
+        return None
+
+    @property
+    def functions(self) -> tuple[Function, ...]:
+        """All of them: field, energy, force, velocity scale, invariants, guards; without those it has not."""
+        first = (self.field, self.energy, self.force, self.velocity_scale)
+        known = (function for function in first if function is not None)
+        return (*known, *self.invariants.values(), *self.guards.values())
+
+    def function(self, name: str) -> Function:
+        """Return one of ``field``, ``hamiltonian``, ``force`` and ``velocity_scale`` by its name.
 
         Raises
         ------
         problems.errors.InputError
             If the system has no such function.
         """
-        if not self._has(what):
-            raise unknown(f"function of {self.name}", what, self.offered())
-        found = self._functions[what]
-        assert found is not None
+        attribute = "energy" if name == "hamiltonian" else name
+        found = getattr(self, attribute) if name in _NAMED else None
+        if found is None:
+            raise unknown(f"function of {self.name}", name, [function.name for function in self.functions])
         return found
 
-    def _has(self, what: str) -> bool:
-        if not isinstance(what, str):
-            return False
-        if what not in self._functions:
-            self._functions[what] = self._derived(what)
-        return self._functions[what] is not None
+    @cached_property
+    def _components(self) -> Mapping[str, Mapping[str, Function]]:
+        found: dict[str, Mapping[str, Function]] = {}
+        for name, whole in self.invariants.items():
+            n = len(whole.outputs)
+            parts = {f"{name}[{i}]": whole.part(i, i + 1).named(f"{whole.name}[{i}]") for i in range(n)}
+            found |= {part: {part: function} for part, function in parts.items()}
+            found[name] = parts if n > 1 else {name: whole}
+        return found
 
-    def _derived(self, what: str) -> Function | None:
-        """Return a function made of others: several as one, a gradient, a single component."""
-        if ", " in what:
-            return stacked([self.function(part) for part in what.split(", ")])
-        if (part := _COMPONENT.fullmatch(what)) is not None:
-            place, whole = int(part["place"]), self._functions.get(f"invariant:{part['name']}")
-            if whole is None or place >= len(whole.outputs):
-                return None
-            one = whole.part(place, place + 1)
-            return one if part["kind"] == "invariant" else self._gradients(one)
-        kind, _, name = what.partition(":")
-        whole = self._functions.get(f"invariant:{name}") if kind == "gradient" else None
-        return None if whole is None else self._gradients(whole)
+    def components(self, invariant: str) -> Mapping[str, Function]:
+        """Return the scalars that an invariant consists of.
 
-    def _gradients(self, scalars: Function) -> Function:
-        """Return the gradients of scalars with respect to the state, one after another."""
-        return stacked([gradient(node, self.dim) for node in scalars.roots])
+        Parameters
+        ----------
+        invariant : str
+            Its name, or ``name[i]`` for one component of a list.
 
-    def offered(self) -> list[str]:
-        """Return the names that `function` knows, but for gradients and components."""
-        known = [name for name in ("field", "hamiltonian", "force", "velocity_scale") if self._has(name)]
-        invariants = [f"invariant:{name}" for name in self.invariant_names]
-        return known + invariants + [f"guard:{name}" for name in self.guard_names]
+        Returns
+        -------
+        mapping of str to Function
+            The invariant itself, or ``name[0]``, ``name[1]``, ...
+
+        Raises
+        ------
+        problems.errors.InputError
+            If the system has no such invariant.
+        """
+        if invariant not in self._components:
+            raise unknown(f"invariant of {self.name}", invariant, self.invariants)
+        return self._components[invariant]
+
+    @overload
+    def gradient(self, invariant: Function) -> Function: ...
+    @overload
+    def gradient(self, invariant: str) -> Function | None: ...
+    def gradient(self, invariant: str | Function) -> Function | None:
+        """Return the derivatives of an invariant with respect to the state.
+
+        Parameters
+        ----------
+        invariant : str or Function
+            The name of an invariant, or one of `components`.
+
+        Returns
+        -------
+        Function or None
+            dim outputs for each output of the invariant; ``None`` where there is none of this name.
+        """
+        scalar = invariant if isinstance(invariant, Function) else self.invariants.get(invariant)
+        if scalar is None:
+            return None
+        if scalar not in self._gradients:
+            name = scalar.name.replace("invariant:", "gradient:", 1)
+            self._gradients[scalar] = self._derivatives(scalar, name)
+        return self._gradients[scalar]
+
+    def _derivatives(self, scalar: Function, name: str) -> Function:
+        return stacked([gradient(node, self.dim) for node in scalar.roots], name)
+
+    def together(self, *functions: Function) -> Function:
+        """Return functions as one with all their outputs: what they share is computed once."""
+        if functions not in self._together:
+            self._together[functions] = stacked(functions)
+        return self._together[functions]
 
     def jacobian(self, what: str = "field") -> Jacobian | None:
         """Return the Jacobian of the field, or of the force, or ``None`` where none is written down.

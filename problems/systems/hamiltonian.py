@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Annotated, Any
 
-from problems.calculus.function import Function, LoopTerm, Term, function_of, joined, stacked
+from problems.calculus.function import Function, LoopTerm, Term, joined, stacked
 from problems.calculus.gradient import gradient
 from problems.calls import checked_arguments
 from problems.checks import NOTHING, Named, at_least
@@ -64,47 +64,47 @@ class Hamiltonian(System):
         if bodies is not None:
             bodies = _checked_bodies(bodies, self.parameters, dof)
         self.bodies = bodies
-        self._energy = self._scalar(H, "H")
-        self._set_energy(self._energy)
+        self._write_energy(self._scalar(H, "H"))
         self._trace_declared(invariants, guards)
         if domain is not None:
-            self._functions["domain"] = function_of(self._graph, [self._scalar(domain, "domain")])
+            self._write("domain", [self._scalar(domain, "domain")])
 
     def __repr__(self) -> str:
         return f"Hamiltonian({self.name}, dof={self.dof})"
 
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        super().__setstate__(state)
-        [self._energy] = self.function("hamiltonian").roots
-
-    def _writes(self, name: str) -> bool:
-        return False
-
-    @property
-    def separable(self) -> bool:
-        """Whether H = sum of c_i(par) p_i^2/2 + V(q, t), found from the traced graph."""
-        return self._has("velocity_scale")
+    @cached_property
+    def _slope(self) -> Function:
+        """dH/dq, then dH/dp."""
+        [energy] = self._written["hamiltonian"].roots
+        return gradient(energy, self.dim)
 
     @cached_property
-    def _gradient(self) -> Function:
-        return gradient(self._energy, self.dim)
-
-    def _derived(self, what: str) -> Function | None:
+    def velocity_scale(self) -> Function | None:
+        """C with q'_i = c_i p_i, dof outputs; ``None`` where the system is not separable."""
         dof = self.dim // 2
-        match what:
-            case "velocity_scale":
-                return _velocity_scale(self._gradient.part(dof, 2 * dof), dof)
-            case "force":
-                return -self._gradient.part(0, dof) if self.separable else None
-            case "field":
-                scale = self._functions["velocity_scale"] if self.separable else None
-                force = -self._gradient.part(0, dof)
-                if scale is None:
-                    return stacked([self._gradient.part(dof, 2 * dof), force])
-                return stacked([_times_momentum(scale, dof), force])
-            case "gradient:energy":
-                return _energy_gradient(self.function("field"), dof)
-        return super()._derived(what)
+        return _velocity_scale(self._slope.part(dof, 2 * dof), dof)
+
+    @cached_property
+    def _push(self) -> Function:
+        """-dH/dq, whatever it depends on."""
+        return -self._slope.part(0, self.dim // 2)
+
+    @cached_property
+    def force(self) -> Function | None:
+        """-dH/dq from positions alone, dof outputs; ``None`` where the system is not separable."""
+        return self._push.named("force") if self.separable else None
+
+    @cached_property
+    def field(self) -> Function:
+        """The right-hand side: q' = dH/dp, then p' = -dH/dq."""
+        dof, scale, push = self.dim // 2, self.velocity_scale, self._push
+        velocity = self._slope.part(dof, 2 * dof) if scale is None else _times_momentum(scale, dof)
+        return stacked([velocity, push], "field")
+
+    def _derivatives(self, scalar: Function, name: str) -> Function:
+        if scalar is self.invariants.get("energy"):
+            return _energy_gradient(self.field, self.dim // 2).named(name)
+        return super()._derivatives(scalar, name)
 
 
 def _velocity_scale(velocity: Function, dof: int) -> Function | None:
@@ -131,7 +131,7 @@ def _velocity_scale(velocity: Function, dof: int) -> Function | None:
                 return None
             scaled.append(LoopTerm(entry.index, scale))
         loops.append((loop, tuple(scaled)))
-    return Function(velocity.graph, tuple(outputs), tuple(loops))
+    return Function(velocity.graph, tuple(outputs), tuple(loops), "velocity_scale")
 
 
 def _coefficient(node: Node, momentum: tuple[str, object]) -> Node | None:

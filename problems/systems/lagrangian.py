@@ -1,9 +1,10 @@
 """Mechanical systems from their Lagrangian: the momenta and the Hamiltonian are found from it."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Annotated, Any
 
-from problems.calculus.function import Function, function_of
+from problems.calculus.function import Function
 from problems.calculus.gradient import gradient
 from problems.calls import checked_arguments
 from problems.checks import NOTHING, Named, at_least
@@ -69,18 +70,22 @@ class Lagrangian(Hamiltonian):
         value = arguments.call(L, graph=self._graph, dim=self.dim, layout=self._layout, what="L", second="v")
         lagrangian = self._node(value, L, "L")
         momenta = self._slopes(lagrangian)
-        self._functions["momentum"] = function_of(self._graph, momenta)
-        self._energy = self._eliminated(lagrangian, momenta)
-        self._set_energy(self._energy)
+        self._write("momentum", momenta)
+        self._write_energy(self._eliminated(lagrangian, momenta))
         self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:
         return f"Lagrangian({self.name}, dof={self.dof})"
 
-    def _derived(self, what: str) -> Function | None:
-        if what == "velocity":
-            return self.function("field").part(0, self.dim // 2)
-        return super()._derived(what)
+    @property
+    def momentum(self) -> Function:
+        """dL/dv, dof outputs; the velocities stand in the places of the momenta."""
+        return self._written["momentum"]
+
+    @cached_property
+    def velocity(self) -> Function:
+        """The velocities q' from positions and momenta, dof outputs."""
+        return self.field.part(0, self.dim // 2).named("velocity")
 
     def _slopes(self, node: Node) -> list[Node]:
         """Return the derivatives with respect to the velocities."""

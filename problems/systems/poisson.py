@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from problems.calculus.function import function_of
+from problems.calculus.function import Function
 from problems.calculus.gradient import gradient
 from problems.calls import checked_arguments
 from problems.checks import NOTHING, Named, at_least
@@ -67,18 +67,28 @@ class Poisson(System):
     ) -> None:
         super().__init__(H, dim, None, parameters, invariants, guards, name)
         energy = self._scalar(H, "H")
-        self._set_energy(energy)
-        slope = self._gradient(energy, H)
+        self._write_energy(energy)
+        slope = self._energy_slope(energy, H)
         matrix = self._matrix(B)
-        self._functions["gradient"] = function_of(self._graph, slope)
-        self._functions["structure"] = function_of(self._graph, [b for row in matrix for b in row])
-        self._functions["field"] = function_of(self._graph, [_product(row, slope) for row in matrix])
+        self._write("gradient", slope)
+        self._write("structure", [b for row in matrix for b in row])
+        self._write("field", [_product(row, slope) for row in matrix])
         self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:
         return f"Poisson({self.name}, dim={self.dim})"
 
-    def _gradient(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
+    @property
+    def slope(self) -> Function:
+        """Grad H, dim outputs."""
+        return self._written["gradient"]
+
+    @property
+    def structure(self) -> Function:
+        """B row by row, dim*dim outputs."""
+        return self._written["structure"]
+
+    def _energy_slope(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
         found = gradient(energy, self.dim)
         if found.loops:
             raise InputError(

@@ -102,15 +102,15 @@ class Foreign(System):
         """What the field is, for statistics."""
         return "numba function" if self.numba else "Python function, slow"
 
-    def function(self, what: str) -> Function:
+    def function(self, name: str) -> Function:
         """Return a traced function as `System.function` does; the field is none."""
-        if what == "field":
+        if name == "field":
             kind = self.written.partition(",")[0]
             raise InputError(
                 f"{self.name} is not traced: its field is a {kind}, which HBVM, Gauss, DOP853 and Radau "
                 "integrate; write it as a VectorField or Hamiltonian for the others."
             )
-        return super().function(what)
+        return super().function(name)
 
     def evaluate(self, t: float, y: Array, par: Array, out: Array) -> None:
         """Put the derivative at one state into ``out``; NaN where it is not defined.

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from problems.calculus.function import function_of
 from problems.calls import checked_arguments
 from problems.checks import NOTHING, Named, at_least
 from problems.errors import InputError
@@ -56,7 +55,7 @@ class VectorField(System):
                 "return one derivative for each component of y."
             )
         nodes = [self._node(v, f, f"f's component {i}") for i, v in enumerate(value)]
-        self._functions["field"] = function_of(self._graph, nodes)
+        self._write("field", nodes)
         self._trace_declared(invariants, guards)
 
     def __repr__(self) -> str:

@@ -156,7 +156,7 @@ def guarded(system: System, what: Any, par: np.ndarray) -> None:
         made = emit.source(system, what, "numba", limit=limit)
         namespace: dict[str, Any] = {"np": _Numpy, **{name: getattr(math, name) for name in dir(math)}}
         exec(made.text, namespace)  # noqa: S102 -- the text under test
-        n = len((system.function(what) if isinstance(what, str) else what.function).outputs)
+        n = len(getattr(what, "function", what).outputs)
         with (
             np.errstate(all="ignore"),
             suppress(ArithmeticError, ValueError),
@@ -170,7 +170,7 @@ def used(solution: Solution, *, compile_it: bool) -> None:
     assert solution.problem.y0.dtype == par.dtype == solution.y.dtype == np.float64
     assert solution.problem.y0.shape == (system.dim,) == solution.y.shape[1:]
     assert par.shape == (system.n_par,)
-    for what in [*system.offered(), "field", system.jacobian()]:
+    for what in [*system.functions, system.jacobian()]:
         if what is not None:
             guarded(system, what, par)
     assert "\x1b" not in repr(solution) + str(solution)

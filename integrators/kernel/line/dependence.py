@@ -15,7 +15,7 @@ NEARLY = 0.1  # the first of the invariants is taken whose rest is no smaller th
 
 
 def independent(
-    system: System, what: str, metric: Array, y: Array, par: Array, t: float
+    system: System, what: emit.What, metric: Array, y: Array, par: Array, t: float
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 
@@ -29,7 +29,7 @@ def independent(
     ----------
     system : System
         Whose invariants they are.
-    what : str
+    what : Function
         The field and the gradients of n scalar invariants, for the emitters.
     metric : ndarray, shape (dim,)
         Diagonal of the metric in which gradients are compared.

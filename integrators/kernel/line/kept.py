@@ -1,6 +1,6 @@
 """What a line integral keeps: the functions and the memory that a program needs for it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,10 @@ from integrators.kernel.native.field import compile_field
 from integrators.kernel.tables import Constants, packed
 from integrators.protocol import Array
 from problems import emit
+from problems.calculus.function import Function
 from problems.errors import InputError
 from problems.problem import System
+from problems.systems.poisson import Poisson
 from problems.trace.graph import T
 
 
@@ -44,14 +46,19 @@ class Kept:
         )
 
         self.system = system
-        self.names = [part for name in invariants for part in components(system, name)]
+        scalars = {part: scalar for name in invariants for part, scalar in components(system, name).items()}
+        self.names = list(scalars)
         n, dim = len(self.names), system.dim
-        gradients = [f"gradient:{name}" for name in self.names]
-        self.values = ", ".join(["field", *gradients]) if n else "gradient, structure"
-        self._measure = ", ".join([*gradients, *(f"invariant:{name}" for name in self.names)])
         self.code = [line.code()]
         if n:
-            self.code.append(compile_field(system, self._measure, constants.lanes))
+            assert system.field is not None  # LineIntegral refuses code
+            gradients = [system.gradient(scalar) for scalar in scalars.values()]
+            self.values = system.together(system.field, *gradients)
+            measure = system.together(*gradients, *scalars.values())
+            self.code.append(compile_field(system, measure, constants.lanes))
+        else:
+            assert isinstance(system, Poisson)
+            self.values = system.together(system.slope, system.structure)
         basis = legendre(constants.arrays["nodes"].reshape(-1), constants.s)
         order, ends = order_of_sums(system)
         self._tables: dict[str, NDArray[Any]] = {
@@ -110,20 +117,18 @@ class Kept:
             own.active[:] = independent(self.system, self.values, own.metric, y, par, t0)
 
 
-def components(system: System, name: str) -> list[str]:
-    """Return the scalars that an invariant consists of, as ``name`` or ``name[0]``, ``name[1]``, ...
+def components(system: System, name: str) -> Mapping[str, Function]:
+    """Return the scalars that an invariant consists of, as `System.components` does.
 
     Raises
     ------
     problems.errors.InputError
         If there is none of this name, or it depends on time.
     """
-    function = system.function(f"invariant:{name}")
-    if any(term.node.flags & T for terms in function.outputs for term in terms):
+    found = system.components(name)
+    if any(node.flags & T for function in found.values() for node in function.roots):
         raise InputError(f"the invariant {name!r} of {system.name} depends on time; leave it out.")
-    if len(function.outputs) == 1:
-        return [name]
-    return [f"{name}[{i}]" for i in range(len(function.outputs))]
+    return found
 
 
 def metric_of(system: System, par: Array) -> Array:

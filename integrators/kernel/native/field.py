@@ -18,15 +18,15 @@ Arguments = list[tuple[Any, str]]
 SOURCES = ("simd", "native")
 
 
-def compile_field(system: System, what: str, lanes: int) -> binary.Native:
+def compile_field(system: System, what: emit.What, lanes: int) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str
-        ``"field"``, or ``"force"`` for the second-order form.
+    what : str or Function
+        ``"field"``, or ``"force"`` for the second-order form, or another function of the system.
     lanes : int
         Stages per call.
 
@@ -56,7 +56,7 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
         return ONE_BY_ONE, build_one_by_one(function, lanes)
 
 
-def assembly(system: System, what: str, lanes: int) -> str:
+def assembly(system: System, what: emit.What, lanes: int) -> str:
     """Return the machine code of a field, as text; the arguments are those of `compile_field`.
 
     Raises

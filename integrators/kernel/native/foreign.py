@@ -13,11 +13,12 @@ import numpy as np
 
 from integrators.kernel.native import binary, raised
 from integrators.kernel.native.field import ONE_BY_ONE, compile_field
+from problems import emit
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
 
 
-def field_of(system: System, what: str, lanes: int) -> binary.Native:
+def field_of(system: System, what: emit.What, lanes: int) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises

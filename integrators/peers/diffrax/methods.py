@@ -48,9 +48,7 @@ class DiffraxMethod(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Say that XLA's contractions break a symmetry that rounding would keep."""
-        if not problem.system.guard_names or any(
-            isa in f"{os.environ.get('XLA_FLAGS', '')} " for isa in NO_FMA
-        ):
+        if not problem.system.guards or any(isa in f"{os.environ.get('XLA_FLAGS', '')} " for isa in NO_FMA):
             return None
         return (
             "JAX's compiler fuses multiplications with additions, which rounds mirror images differently and "

@@ -216,7 +216,7 @@ def nodes(system: System, s: int) -> tuple[int, float | None]:
     k = max(FEWEST, -(-2 * s // LANES) * LANES)
     if not system.traced:
         return k, DEFECT
-    if system.kind == "poisson" or "hamiltonian" not in system.offered():
+    if system.kind == "poisson" or system.energy is None:
         return k, None
     nu = degree(system)
     return k, None if nu is not None and exact_k(nu, s) <= k else DEFECT

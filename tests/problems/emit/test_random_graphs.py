@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from problems import Hamiltonian, System, VectorField, emit
 from problems.analysis.invariants import evaluate
+from problems.calculus.function import Function
 from problems.calculus.jacobian import Jacobian
 from problems.emit import printer
 
@@ -120,16 +121,14 @@ def random_system(r: Random, *, tables: bool) -> System:
     return VectorField(field, dim=DIM, parameters=PARAMETERS, name="random")
 
 
-def functions(system: System) -> list[str | Jacobian]:
+def functions(system: System) -> list[Function | Jacobian]:
     """Return everything of a system that is emitted."""
-    known = ("field", "force", "velocity_scale", "hamiltonian", "gradient:other", "field, hamiltonian")
-    names = [name for name in known if all(part in system.offered() for part in name.split(", "))]
-    names += ["gradient:other"] if "other" in system.invariant_names else []
-    jacobian = system.jacobian()
-    return [*names, *([] if jacobian is None else [jacobian])]
+    stacked = [] if system.energy is None else [system.together(system.field, system.energy)]
+    derived = (system.gradient("other"), system.jacobian())
+    return [*system.functions, *stacked, *(function for function in derived if function is not None)]
 
 
-def on_python(system: System, what: str | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
+def on_python(system: System, what: Function | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
     """Return the text for numba as a Python function: what numba would compile."""
     made = emit.source(system, what, "numba", limit=limit)
     namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in dir(math)}}
@@ -144,15 +143,15 @@ def on_python(system: System, what: str | Jacobian, limit: int | None) -> Callab
     return evaluate
 
 
-def graph_of(system: System, what: str | Jacobian) -> Any:
-    return what.function if isinstance(what, Jacobian) else system.function(what)
+def graph_of(system: System, what: Function | Jacobian) -> Any:
+    return what.function if isinstance(what, Jacobian) else what
 
 
-def n_outputs(system: System, what: str | Jacobian) -> int:
+def n_outputs(system: System, what: Function | Jacobian) -> int:
     return len(graph_of(system, what).outputs)
 
 
-def on_numba(system: System, what: str | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
+def on_numba(system: System, what: Function | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
     inner, n = emit.numba(system, what, limit=limit), n_outputs(system, what)
 
     def evaluate(t: float, y: np.ndarray, par: np.ndarray) -> np.ndarray:
@@ -163,7 +162,7 @@ def on_numba(system: System, what: str | Jacobian, limit: int | None) -> Callabl
     return evaluate
 
 
-def on_heyoka(system: System, what: str | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
+def on_heyoka(system: System, what: Function | Jacobian, limit: int | None) -> Callable[..., np.ndarray]:
     hy = pytest.importorskip("heyoka")
     assert limit is None
     found = emit.heyoka(system, "field")
@@ -235,7 +234,7 @@ def test_a_table_in_a_sum_reads_its_own_component():
     system = VectorField(field, dim=40, name="tables")
     y = rng.normal(size=40)
     (exact, *_) = evaluate(system.function("field"), 0.0, y[:, np.newaxis], np.empty(0))
-    assert on_python(system, "field", emit.SMALL)(0.0, y, np.empty(0))[0] == pytest.approx(
+    assert on_python(system, system.field, emit.SMALL)(0.0, y, np.empty(0))[0] == pytest.approx(
         float(exact.rounded()[0]), rel=1e-13
     )
 
@@ -257,7 +256,7 @@ def test_the_rows_of_a_list_in_two_pieces_each_add_their_own_term(digits):
     system = VectorField(field, dim=6, name="pieces")
     y = np.linspace(-1.0, 1.2, 6)
     (exact, *_) = evaluate(system.function("field"), 0.0, y[:, np.newaxis], np.empty(0))
-    found = on_python(system, "field", 0)(0.0, y, np.empty(0))[0]
+    found = on_python(system, system.field, 0)(0.0, y, np.empty(0))[0]
     assert found == pytest.approx(float(exact.rounded()[0]), rel=1e-13)
 
 

@@ -20,14 +20,14 @@ def cross(y):
 def test_the_field_is_the_structure_times_the_gradient():
     system = Poisson(energy, cross, dim=3)
     y = np.array([0.3, -1.2, 0.7])
-    slope = emit.numpy(system, "gradient")(0.0, y, system.pack())
-    matrix = emit.numpy(system, "structure")(0.0, y, system.pack()).reshape(3, 3)
+    slope = emit.numpy(system, system.slope)(0.0, y, system.pack())
+    matrix = emit.numpy(system, system.structure)(0.0, y, system.pack()).reshape(3, 3)
     assert slope == pytest.approx([y[0], y[1] / 2, 4 * y[2] ** 3], rel=1e-15)
     assert (matrix == -matrix.T).all()
     field = emit.numpy(system, "field")(0.0, y, system.pack())
     assert field == pytest.approx(matrix @ slope, rel=1e-14)
     assert (system.kind, system.dof, system.separable) == ("poisson", None, False)
-    assert system.invariant_names == ("energy",)
+    assert tuple(system.invariants) == ("energy",)
     assert repr(system) == "Poisson(energy, dim=3)"
 
 
@@ -45,7 +45,7 @@ def test_a_canonical_system_is_a_poisson_system():
 
 def test_an_energy_with_time_is_no_invariant():
     system = Poisson(lambda t, y: y[0] ** 2 + t * y[1] + y[2], cross, dim=3)
-    assert system.invariant_names == ()
+    assert not system.invariants
 
 
 @pytest.mark.parametrize(
