@@ -303,14 +303,17 @@ class System:
         Parameters
         ----------
         invariant : str or Function
-            The name of an invariant, or one of `components`.
+            An invariant or one of its `components`, or the name of one.
 
         Returns
         -------
         Function or None
             dim outputs for each output of the invariant; ``None`` where there is none of this name.
         """
-        scalar = invariant if isinstance(invariant, Function) else self.invariants.get(invariant)
+        if isinstance(invariant, Function):
+            scalar = invariant
+        else:
+            scalar = self.invariants.get(invariant) or self._components.get(invariant, {}).get(invariant)
         if scalar is None:
             return None
         if scalar not in self._gradients:

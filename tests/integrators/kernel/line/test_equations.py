@@ -79,9 +79,9 @@ def test_hbvm_on_a_poisson_system_solves_its_own_equations():
 
 def test_a_vector_invariant_stands_for_its_components():
     system = problems.load("kepler").system
-    assert components(system, "lenz") == ["lenz[0]", "lenz[1]"]
-    assert components(system, "lenz[1]") == ["lenz[1]"]
-    assert components(system, "energy") == ["energy"]
+    assert list(components(system, "lenz")) == ["lenz[0]", "lenz[1]"]
+    assert list(components(system, "lenz[1]")) == ["lenz[1]"]
+    assert list(components(system, "energy")) == ["energy"]
 
 
 def test_parameters_are_run_time_values():
