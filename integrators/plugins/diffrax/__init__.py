@@ -38,10 +38,8 @@ import optimistix as optx  # noqa: E402
 from integrators.plugins.diffrax.arithmetic import add, apply, real  # noqa: E402
 from integrators.plugins.diffrax.fixed_point import FixedPoint  # noqa: E402
 from integrators.plugins.diffrax.interpolation import LegendreInterpolation  # noqa: E402
+from integrators.plugins.rule import FARTHEST, FLOOR, MODES  # noqa: E402
 
-MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
-FARTHEST = 2.0  # no extrapolation farther than this many previous steps
-FLOOR = 1e-3  # of the largest size in a leaf: smaller components do not lead the estimate
 DENSE = 48  # unknowns up to which derivatives solve by LU; GMRES beyond
 
 

@@ -12,12 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-# In units of the precision's epsilon, so that the rule is the same in single and in double precision.
-CONVERGED = 0.45  # 1e-16 in double
-STAGNATION = 450.0  # 1e-13 in double: above it, a change that stops decreasing is a failure
-PATIENCE = 2  # changes that are no new smallest one, to end the iteration below STAGNATION
-HOPELESS = 8  # the same above STAGNATION: the iteration does not contract
-FLOOR = 1e-3  # of the largest size in a leaf: where rounding of the field may hide a small component
+from integrators.plugins.rule import CONVERGED, FLOOR, PATIENCE, ROUNDING, STAGNATION
+
+HOPELESS = 8  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
+EPSILON = float(np.finfo(np.float64).eps)  # changes are in units of the precision's: single has the same rule
 
 
 class _State(eqx.Module):
@@ -37,7 +35,8 @@ class FixedPoint(optx.AbstractRootFinder):
     The change is measured relative to the size of each component: that of
     ``options["state"]`` (structure of x without its leading axis) plus the
     largest along x's leading axis. The iteration ends when the change is at most
-    0.45 epsilon, or has stopped decreasing while already below 450 epsilon.
+    0.45 epsilon, or has stopped decreasing: once while below 4.5 epsilon, or
+    `integrators.plugins.rule.PATIENCE` times while below 450 epsilon.
     Where it does not contract it fails with ``nonlinear_divergence``; but if
     ``options["guessed"]`` says that the first x was a guess, it is first tried from 0.
 
@@ -65,7 +64,7 @@ class FixedPoint(optx.AbstractRootFinder):
         better = floored < state.best
         stalled = jnp.where(better, 0, state.stalled + 1)
         best = jnp.minimum(state.best, floored)
-        hopeless = ~jnp.isfinite(strict) | ((stalled >= HOPELESS) & (best >= STAGNATION))
+        hopeless = ~jnp.isfinite(strict) | ((stalled >= HOPELESS) & (best >= STAGNATION / EPSILON))
         again = hopeless & ~state.restarted
         new = jax.tree.map(lambda x: jnp.where(again, jnp.zeros_like(x), x), new)
         state = _State(
@@ -82,8 +81,9 @@ class FixedPoint(optx.AbstractRootFinder):
         self, fn: Any, y: Any, args: Any, options: dict[str, Any], state: _State, tags: Any
     ) -> tuple[jax.Array, Any]:
         """Return whether to stop, and how it went."""
-        patience = PATIENCE + state.steps // 16
-        done = (state.strict <= CONVERGED) | ((state.stalled >= patience) & (state.best < STAGNATION))
+        patience = jnp.where(state.best < ROUNDING / EPSILON, 1, PATIENCE)
+        stagnates = (state.stalled >= patience) & (state.best < STAGNATION / EPSILON)
+        done = (state.strict <= CONVERGED / EPSILON) | stagnates
         result = optx.RESULTS.where(state.lost, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
         return done | state.lost, result
 

@@ -26,6 +26,7 @@ from integrators.kernel.native import store
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM, TOLERANCE
 from integrators.plugins.rebound import layout
+from integrators.plugins.rule import MODES
 from problems.errors import InputError
 
 rebound = layout.rebound
@@ -147,7 +148,7 @@ def _fail(simulation: int, code: int) -> None:
 def _make_table(k: int, s: int) -> np.ndarray:
     t = tables(k, s)
     vectors = (t.nodes, t.weights, t.position_weights)
-    into_modes = (legendre(t.nodes.hi, min(k, layout.MODES)) * t.weights.hi[:, None]).T
+    into_modes = (legendre(t.nodes.hi, min(k, MODES)) * t.weights.hi[:, None]).T
     return np.ascontiguousarray(
         np.vstack(
             [
@@ -203,7 +204,8 @@ def _native(callback: str) -> int:
 
         return " ", step.build(callback)
 
-    files = native.sources(*(f"../plugins/rebound/{part}" for part in ("layout", "memory", "step")))
+    plugin = ("rule", "rebound/layout", "rebound/memory", "rebound/step")
+    files = native.sources("step/rule", *(f"../plugins/{part}" for part in plugin))
     return native.obtain(store.key("rebound", callback, files, layout.IDENTITY), make).address
 
 

@@ -29,8 +29,6 @@ SIMULATION = ctypes.sizeof(rebound.Simulation) // 8
 STRIDE = ctypes.sizeof(rebound.Particle) // 8
 TREE = 3  # of REBOUND's kinds of gravity
 
-MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
-
 LARGEST = 1e-3  # by default, the local error that a step may have, relative to the bodies' velocity
 
 # Why a step fails.

@@ -30,19 +30,32 @@ from integrators.plugins.rebound.memory import (
     small,
     words,
 )  # fmt: skip
+from integrators.plugins.rule import (
+    CONVERGED,
+    FARTHEST,
+    FLOOR,
+    MAX_ITERATIONS,
+    MODES,
+    PATIENCE,
+    ROUNDING,
+    STAGNATION,
+)
 
-FARTHEST = 2.0  # no extrapolation farther than this many previous steps
-MAX_ITERATIONS = 200
-CONVERGED = 1e-16
-STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
-ROUNDING = 1e-15  # below it, the first change that does not decrease ends the iteration
-PATIENCE = 2  # changes that do not decrease, to end it between ROUNDING and STAGNATION
-FLOOR = 1e-3  # of the largest size of all bodies: where rounding of the forces may hide a small one
 SECOND_ORDER = 30.0  # times the error allowed: of 20 steps a circle, each has one of 3e-3 of the velocity
 SAFETY = 0.8  # of the length that would just meet the tolerance
 SHORTER, HALF, LONGER = 0.1, 0.5, 2.0  # factors from one step to the next; where a step cannot be solved
 TINY = 1e-300
 HALF_UNIT = 2.3e-16  # what an addition rounds off is no more than half of this, relative
+
+# Rows of the table of a method, shape (6 + 2 k + modes, k): six vectors, and after them the matrices of
+# `for_positions`, `for_velocities` and `into_modes`.
+NODES, NODES_LOW, WEIGHTS, WEIGHTS_LOW, POSITION_WEIGHTS, POSITION_WEIGHTS_LOW = range(6)
+VECTORS = 6
+
+# Blocks of k rows of the working memory: displacements without forces, the positions at the stages, those of
+# the iteration before, velocities at the stages. After them single rows: a sum, the positions and velocities.
+BASE, NEW, OLD, FAST = range(4)
+SUM, Q, V = range(3)
 
 # Functions of REBOUND, and one of ours, that compiled code calls.
 _update = types.ExternalFunction("hbvm_rebound_update_acceleration", types.void(types.int64))
@@ -51,6 +64,44 @@ _add_growth = types.ExternalFunction(
     "hbvm_rebound_megno_update", types.void(types.int64, types.float64, types.float64)
 )
 _fail = types.ExternalFunction("hbvm_rebound_fail", types.void(types.int64, types.int64))
+
+
+@compiled
+def table_at(address, k):
+    """Return the table of a method with k nodes."""
+    return matrix(address, VECTORS + 2 * k + min(k, MODES), k)
+
+
+@compiled
+def for_positions(table):
+    """Return A2, shape (k, k)."""
+    k = table.shape[1]
+    return table[VECTORS : VECTORS + k]
+
+
+@compiled
+def for_velocities(table):
+    """Return A, shape (k, k)."""
+    k = table.shape[1]
+    return table[VECTORS + k : VECTORS + 2 * k]
+
+
+@compiled
+def into_modes(table):
+    """Return what gives Legendre coefficients from values at the nodes, shape (modes, k)."""
+    return table[VECTORS + 2 * table.shape[1] :]
+
+
+@compiled
+def block(work, which, k):
+    """Return k rows of the working memory, shape (k, n)."""
+    return work[which * k : (which + 1) * k]
+
+
+@compiled
+def row(work, which, k):
+    """Return a single row of the working memory, shape (n,)."""
+    return work[4 * k + which]
 
 
 @compiled
@@ -139,10 +190,15 @@ def change(old, new, count):
 
 @compiled
 def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
-    """Iterate until the stages are solved, work[k:2k] being first values; return whether they are."""
+    """Iterate until the stages are solved, the block NEW being first values; return whether they are."""
     k = forces.shape[0]
     number, clock = words(state, at.WORDS), reals(simulation, at.SIMULATION)
-    base, new, old, fast = work[:k], work[k : 2 * k], work[2 * k : 3 * k], work[3 * k : 4 * k]
+    base, new, old, fast = (
+        block(work, BASE, k),
+        block(work, NEW, k),
+        block(work, OLD, k),
+        block(work, FAST, k),
+    )
     flags = small(simulation, 2 * at.SIMULATION)
     megno = flags[at.CALCULATE_MEGNO] != 0
     depends = megno or flags[at.VELOCITY_DEPENDENT] != 0
@@ -150,22 +206,23 @@ def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
     best, stalled = np.inf, 0
     for _ in range(MAX_ITERATIONS):
         if depends:
-            velocities(table[6 + k : 6 + 2 * k], h, v, rest[1], forces, fast)
+            velocities(for_velocities(table), h, v, rest[1], forces, fast)
         growth = 0.0
         for i in range(k):
-            clock[at.TIME] = t + table[0, i] * h
+            clock[at.TIME] = t + table[NODES, i] * h
             scatter(simulation, 0, new[i])
             if depends:
                 scatter(simulation, 3, fast[i])
             _update(simulation)
             gather(simulation, 6, forces[i])
             if megno:
-                growth += 2.0 * table[2, i] * (clock[at.TIME] - clock[at.MEGNO_START]) * _growth(simulation)
+                since = clock[at.TIME] - clock[at.MEGNO_START]
+                growth += 2.0 * table[WEIGHTS, i] * since * _growth(simulation)
         reals(state, at.WORDS)[at.MEGNO] = h * growth
         number[at.ITERATIONS] += 1
         number[at.EVALUATIONS] += k
         copy(new, old)
-        stages(table[6 : 6 + k], h, q, base, forces, new, work[4 * k])
+        stages(for_positions(table), h, q, base, forces, new, row(work, SUM, k))
         strict, floored = change(old, new, bodies)
         if not strict < np.inf:
             return False
@@ -184,17 +241,18 @@ def iterate(simulation, state, table, t, h, q, v, rest, forces, work):
 def solve(simulation, state, table, t, h, q, v, rest, forces, work, weights):
     """Solve the stage equations: from the previous step's polynomial, and if that fails without it."""
     k = forces.shape[0]
-    base, new, old = work[:k], work[k : 2 * k], work[2 * k : 3 * k]
+    base, new, old = block(work, BASE, k), block(work, NEW, k), block(work, OLD, k)
     for i in range(k):
         for d in range(q.size):
             drift = h * v[d]
             low = fma(h, v[d], -drift) + h * rest[1, d]
-            base[i, d] = fma(table[0, i], drift, fma(table[0, i], low, fma(table[1, i], drift, rest[0, d])))
+            least = fma(table[NODES_LOW, i], drift, rest[0, d])
+            base[i, d] = fma(table[NODES, i], drift, fma(table[NODES, i], low, least))
     length = reals(state, at.WORDS)[at.LENGTH]
     if length != 0.0 and 0.0 < h / length <= FARTHEST:
         copy(forces, old)
-        extrapolate(h / length, table[0], table[6 + 2 * k :], old, forces, weights)
-        stages(table[6 : 6 + k], h, q, base, forces, new, work[4 * k])
+        extrapolate(h / length, table[NODES], into_modes(table), old, forces, weights)
+        stages(for_positions(table), h, q, base, forces, new, row(work, SUM, k))
         if iterate(simulation, state, table, t, h, q, v, rest, forces, work):
             return True
     forces[:] = 0.0
@@ -205,27 +263,27 @@ def solve(simulation, state, table, t, h, q, v, rest, forces, work, weights):
 
 
 @compiled
-def local_error(h, v, s, into_modes, forces, work, count):
+def local_error(h, v, s, projection, forces, means, lasts, count):
     """Return the largest estimate of a real body's error in velocity by this step, relative to velocities.
 
     For a body, ``h |gamma_s|^2 / max(|gamma_0|, |gamma_s|)``, which is of the order of the local error.
-    The k nodes do not show gamma_s where k = s (and the tables not beyond `at.MODES`): the
+    The k nodes do not show gamma_s where k = s (and the tables not beyond `MODES`): the
     last coefficient that they show, gamma_j, then goes on falling as it fell on average from the first
     one. One node shows nothing. It is measured by the largest velocity of a body relative to the first one.
     """
-    known = min(s, into_modes.shape[0] - 1)
+    known = min(s, projection.shape[0] - 1)
     if known == 0:
         return 0.0
-    combine(into_modes, 0, forces, work[0])
-    combine(into_modes, known, forces, work[1])
+    combine(projection, 0, forces, means)
+    combine(projection, known, forces, lasts)
     worst, size, fall = 0.0, 0.0, 1.0
     for b in range(count):
         mean, square, before, after = 0.0, 0.0, 0.0, 0.0
         for d in range(3):
             i = 3 * b + d
-            mean += work[0, i] * work[0, i]
-            square += work[1, i] * work[1, i]
-            apart, pulled = v[i] - v[d], work[0, i] - work[0, d]  # gamma_0 is the mean acceleration
+            mean += means[i] * means[i]
+            square += lasts[i] * lasts[i]
+            apart, pulled = v[i] - v[d], means[i] - means[d]  # gamma_0 is the mean acceleration
             before += apart * apart
             after += (apart + h * pulled) * (apart + h * pulled)
         size = max(size, before, after, h * h * mean)
@@ -245,8 +303,8 @@ def update(table, h, q, v, rest, forces):
         kick, shift = 0.0, 0.0
         for m in range(forces.shape[0]):
             a = forces[m, d]
-            kick += fma(table[2, m], a, table[3, m] * a)
-            shift += fma(table[4, m], a, table[5, m] * a)
+            kick += fma(table[WEIGHTS, m], a, table[WEIGHTS_LOW, m] * a)
+            shift += fma(table[POSITION_WEIGHTS, m], a, table[POSITION_WEIGHTS_LOW, m] * a)
         drift = h * v[d]
         low = fma(h, v[d], -drift) + h * rest[1, d]
         # q + drift exactly, then all that is smaller.
@@ -278,11 +336,11 @@ def step(simulation, state):
         _fail(simulation, at.UNKNOWN_METHOD)
         return
     flags[at.IGNORED_TERMS] = 0
-    table = matrix(number[at.TABLES], 6 + 2 * k + min(k, at.MODES), k)
+    table = table_at(number[at.TABLES], k)
     rest, forces = matrix(number[at.REST], 2, n), matrix(number[at.FORCES], k, n)
     work = matrix(number[at.WORK], 4 * k + 4, n)
     weights = matrix(number[at.WORK] + 8 * (4 * k + 4) * n, 1, k)
-    q, v = work[4 * k + 1], work[4 * k + 2]
+    q, v = row(work, Q, k), row(work, V, k)
     gather(simulation, 0, q)
     gather(simulation, 3, v)
     for d in range(n):
@@ -301,7 +359,8 @@ def step(simulation, state):
         problem, factor = at.DIVERGED, HALF
         solved = solve(simulation, state, table, t, h, q, v, rest, forces, work, weights)
         if solved and most < np.inf:
-            error = local_error(h, v, number[at.S], table[6 + 2 * k :], forces, work, bodies)
+            means, lasts = work[0], work[1]  # the displacements have been used
+            error = local_error(h, v, number[at.S], into_modes(table), forces, means, lasts, bodies)
             problem, solved = at.UNRESOLVED, error <= most
             wanted = SAFETY * (most / max(error, TINY)) ** (1.0 / (2 * number[at.S] + 1))
             factor = min(LONGER, max(SHORTER, wanted))

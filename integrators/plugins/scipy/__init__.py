@@ -27,7 +27,7 @@ from problems.errors import InputError, shown
 
 __all__ = ["HBVM", "Field", "Gauss", "field"]
 
-FLOOR = 100.0 * float(np.finfo(float).eps)
+SMALLEST_RTOL = 100.0 * float(np.finfo(float).eps)
 """The smallest ``rtol``, as of SciPy's own methods."""
 
 Array = NDArray[Any]
@@ -149,12 +149,12 @@ class HBVM(OdeSolver):
     def _tolerate(self, rtol: Any, atol: Any) -> None:
         """Keep the tolerances, each a number or an array, or refuse them."""
         relative, self.atol = as_numbers("rtol", rtol), as_numbers("atol", atol)
-        if np.any(relative < FLOOR):
+        if np.any(relative < SMALLEST_RTOL):
             warnings.warn(
-                f"At least one element of rtol={rtol!r} is too small: {FLOOR:.3g} takes its place.",
+                f"At least one element of rtol={rtol!r} is too small: {SMALLEST_RTOL:.3g} takes its place.",
                 stacklevel=3,
             )
-        self.rtol = np.maximum(relative, FLOOR)
+        self.rtol = np.maximum(relative, SMALLEST_RTOL)
         for which, values in (("rtol", self.rtol), ("atol", self.atol)):
             if values.ndim > 0 and values.shape != (self.n,):
                 raise InputError(

@@ -13,16 +13,19 @@ from numpy.typing import NDArray
 from scipy.integrate import OdeSolver
 
 from integrators.coefficients.legendre import legendre, tables
+from integrators.plugins.rule import (
+    CONVERGED,
+    FARTHEST,
+    FLOOR,
+    MAX_ITERATIONS,
+    MODES,
+    PATIENCE,
+    ROUNDING,
+    STAGNATION,
+)
 
-CONVERGED = 1e-16
-STAGNATION = 1e-13  # above it, a change that stops decreasing is a failure
-PATIENCE = 2  # changes that are no new smallest one, to end the iteration below STAGNATION
-HOPELESS = 4  # the same above STAGNATION
-MAX_ITERATIONS = 100
+HOPELESS = 4  # changes that are no new smallest one, above STAGNATION, after which the iteration has failed
 SURE = 10  # iterations after which their rate is believed
-FLOOR = 1e-3  # of the largest size: where rounding of the field may hide a small component
-MODES = 12  # P_j(2) grows like 5.8^j: beyond, extrapolation amplifies rounding more than it helps
-FARTHEST = 2.0  # no extrapolation farther than this many previous steps
 SQRT3 = float(np.sqrt(3.0))
 
 Array = NDArray[Any]
@@ -144,7 +147,7 @@ class Stages:
             else:
                 stalled += 1
             if best < STAGNATION:
-                if stalled >= PATIENCE + iteration // 16:
+                if stalled and (best < ROUNDING or stalled >= PATIENCE):
                     return Solved(G, values, True, rate)
             elif stalled >= HOPELESS or iteration + 1 == most:
                 return Solved(G, values, False, np.inf)

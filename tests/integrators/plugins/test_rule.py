@@ -1,0 +1,28 @@
+"""The stage solvers outside the kernel have one set of numbers, which are the kernel's."""
+
+import ast
+from pathlib import Path
+
+import integrators.plugins
+from integrators.kernel import tables
+from integrators.kernel.step import iterate
+from integrators.kernel.step import rule as kernel
+from integrators.plugins import rule
+
+FOLDER = Path(integrators.plugins.__path__[0])
+
+
+def test_they_are_the_kernel_s():
+    ours = (rule.CONVERGED, rule.ROUNDING, rule.STAGNATION, rule.PATIENCE, rule.FLOOR)
+    theirs = (kernel.TOLERANCE, kernel.ROUNDING, kernel.STAGNATION, kernel.PATIENCE, kernel.FLOOR)
+    assert ours == theirs
+    assert (rule.MAX_ITERATIONS, rule.MODES) == (iterate.MAX_ITERATIONS, tables.MODES)
+
+
+def test_no_plugin_has_one_of_its_own():
+    files = [path for path in FOLDER.rglob("*.py") if path.name != "rule.py"]
+    assert len(files) > 10
+    for path in files:
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [target.id for target in getattr(node, "targets", ()) if isinstance(target, ast.Name)]
+            assert not {*names} & {*rule.__all__}, path
