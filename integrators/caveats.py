@@ -1,6 +1,6 @@
 """What a method cannot see, as sentences for `Solution.warnings`: the same for every method."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from problems.problem import Problem, System
 from problems.trace.graph import T
 
 FEWEST = 4  # nodes whose coefficients can show a kink
+ENOUGH = 8  # nodes with which a smooth field is not taken for one with a kink
 
 LOST = 1e-8
 """Relative change of a conserved quantity that a warning tells.
@@ -133,7 +134,22 @@ def sees_kinks(k: int, system: System) -> bool:
     With few nodes a smooth field now and then looks like one with a kink. So with few nodes kinks are
     looked for only where the traced field is known to have some.
     """
-    return k >= 8 or (k >= FEWEST and system.traced and has_kinks(system))
+    return k >= ENOUGH or (k >= FEWEST and system.traced and has_kinks(system))
+
+
+def unknown_kinks(
+    problem: Problem, k: int | None, tol: float | None, breakpoints: Sequence[float]
+) -> str | None:
+    """Return the sentence on a field that is not traced and has too few nodes to look for kinks in it.
+
+    Nothing is said where the user gives breakpoints, or a fixed step.
+    """
+    if problem.system.traced or tol is None or k is None or k >= ENOUGH or breakpoints:
+        return None
+    return (
+        f"its field is a function that is not traced, in which k={k} nodes do not tell a jump or a kink from "
+        f"a smooth change: if it has some, give breakpoints or k >= {ENOUGH}."
+    )
 
 
 def blind(k: int | None, tol: float | None, solver: str) -> str | None:

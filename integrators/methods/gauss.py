@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from integrators.caveats import blind, unseen
+from integrators.caveats import blind, unknown_kinks, unseen
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -106,7 +106,8 @@ class Gauss(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks that these options do not look for; see `HBVM`."""
-        return unseen(problem, blind(self.s, self.tol, self.solver))
+        kinks = unseen(problem, blind(self.s, self.tol, self.solver))
+        return kinks or unknown_kinks(problem, self.s, self.tol, self.breakpoints)
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from integrators.caveats import blind, unseen
+from integrators.caveats import blind, unknown_kinks, unseen
 from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -205,7 +205,8 @@ class HBVM(MethodBase):
         """Name a field with kinks that these options do not look for; see the class."""
         poisson = problem.system.kind == "poisson"
         why = "the steps that keep a Poisson system's energy do not look for kinks" if poisson else None
-        return unseen(problem, why or blind(self.k, self.tol, self.solver))
+        kinks = unseen(problem, why or blind(self.k, self.tol, self.solver))
+        return kinks or unknown_kinks(problem, self.k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:
         """Return the energy, with a tolerance; only where k is chosen is the quadrature error at rounding."""

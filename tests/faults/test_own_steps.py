@@ -245,6 +245,19 @@ def test_who_does_not_look_for_kinks_says_so(method, why):
     assert method.caveat(problems.load("kepler")) is None
 
 
+@pytest.mark.parametrize("method", [Gauss(s=6, tol=1e-12), HBVM(k=7, s=4, tol=1e-12)], ids=repr)
+def test_few_nodes_on_a_field_that_is_not_traced_are_said(method):
+    # A jump of it cost 1.2e-3 with Gauss(6), and nothing was said.
+    jump = Problem(Foreign(lambda t, y: [-y[0] + (1.0 if t > 1.3 else -1.0)], dim=1), y0=[1.0], t_end=5.0)
+    (warning, *_) = integrators.integrate(jump, method, [5.0]).warnings
+    sentence(warning, r"not traced, in which k=\d nodes .* give breakpoints or k >= 8")
+    told = type(method)(**{**method.options(), "breakpoints": [1.3]})
+    solution = integrators.integrate(jump, told, [5.0])
+    exact = 1.0 + (2.0 * math.exp(-1.3) - 2.0) * math.exp(-3.7)
+    assert solution.warnings == ()
+    assert abs(solution.y[-1, 0] - exact) < 1e-10  # measured 1.6e-14
+
+
 def test_newton_steps_over_a_kink_are_said():
     # A stiff linear field with a kink far away: the implicit solver takes over, and does not look.
     def field(y, m):
