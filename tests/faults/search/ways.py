@@ -64,10 +64,8 @@ def outcomes(case: Case) -> Iterator[Outcome]:
 
 
 def _has_energy(case: Case) -> bool:
-    system = case.shape.system
-    if "hamiltonian" not in system.offered():
-        return False
-    return METHODS["LineIntegral"].accepts(case.members[0].problem) is None
+    problem = case.members[0].problem
+    return problem.system.energy is not None and METHODS["LineIntegral"].accepts(problem) is None
 
 
 def _alone(case: Case, name: str, method: Any) -> Iterator[Outcome]:
