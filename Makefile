@@ -7,7 +7,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
 
-.PHONY: bench reports test test-all docs lint format venv lock clean
+.PHONY: bench pages reports test test-all docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
@@ -15,13 +15,16 @@ bench: venv  ## run Sitnikov through every integrator: results and report in run
 reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
 	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done
 
+pages: venv  ## draw reports/*/index.html from the archives that lie there; nothing is run
+	$(BIN)/hbvm-bench report --pages reports
+
 test: venv  ## the test suite
 	$(BIN)/python -m pytest
 
 test-all: venv  ## with the slow tests: studies that are run whole, and killed in the middle
 	$(BIN)/python -m pytest -m ""
 
-docs: venv  ## the site: docs/_build/html/index.html
+docs: pages  ## the site: docs/_build/html/index.html
 	@lock="$$(sha256sum < requirements-docs.lock)"; \
 	if [ "$$(cat $(VENV)/.docs 2>/dev/null)" != "$$lock" ]; then \
 	  $(PIP) --require-hashes -r requirements-docs.lock && echo "$$lock" > $(VENV)/.docs; \

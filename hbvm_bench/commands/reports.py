@@ -9,8 +9,8 @@ import typer
 from hbvm_bench.gallery import compile_times, pages
 from hbvm_bench.measure import machine
 from hbvm_bench.report.markdown import plain, printed
+from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
-from hbvm_bench.store.store import Store
 from hbvm_bench.studies import automatic
 from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
@@ -29,22 +29,35 @@ def report(
         Path | None,
         typer.Option("--index", metavar="DIR", help="Write README.md, the list of the reports in DIR."),
     ] = None,
+    pages: Annotated[
+        Path | None,
+        typer.Option(
+            "--pages", metavar="DIR", help="Draw index.html of every report in DIR from its stored results."
+        ),
+    ] = None,
 ) -> None:
-    """Write the report of one or more runs: report.md, index.html, figures, data; nothing is run again."""
-    if not runs and index is None:
-        raise InputError("give at least one run, as in runs/sitnikov, or --index DIR.")
+    """Write the report of one or more runs: report.md, index.html, figures, archive; nothing is run again."""
+    if not runs and index is None and pages is None:
+        raise InputError("give at least one run, as in runs/sitnikov, or --index DIR, or --pages DIR.")
     if runs:
         from hbvm_bench.commands.publishing import publish
+        from hbvm_bench.report.archived import contents
         from hbvm_bench.report.campaign import document
 
-        stores = [Store(directory) for directory in runs]
+        stores = opened(runs)
         for store in stores:
             store.index()
         target = out or runs[0] / "report"
         ensure_writable(target, keep=False)
-        publish(document(stores), target, stderr=False)
+        made = document(stores)
+        publish(made, target, contents(made, stores), stderr=False)
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
+    if pages is not None:
+        from hbvm_bench.studies.pages import write
+
+        for path in write(pages):
+            print(path)
     if index is not None:
         from hbvm_bench.report.index import write_index
 

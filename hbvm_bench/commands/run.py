@@ -77,9 +77,11 @@ def run(
     show(campaign, store)
     if report_to is not None:
         from hbvm_bench.commands.publishing import publish
+        from hbvm_bench.report.archived import contents
         from hbvm_bench.report.campaign import document
 
-        publish(document(store), report_to, stderr=False)
+        made = document(store)
+        publish(made, report_to, contents(made, [store]), stderr=False)
 
 
 def opened(campaign: Campaign, name: str | None) -> Campaign:

@@ -14,12 +14,13 @@ from hbvm_bench.campaign.identity import digest_of, make_problem
 from hbvm_bench.measure import measured, metrics
 from hbvm_bench.measure.measured import Measured, Series
 from hbvm_bench.reference import solutions
+from hbvm_bench.store.archive import Archive
 from hbvm_bench.store.records import Reading, Record
 from hbvm_bench.store.store import Store, damage
 from problems.errors import InputError
 
 
-def records(store: Store) -> list[Record]:
+def records(store: Store | Archive) -> list[Record]:
     """Return the records of a run as `Store.records` does, with what is read off them.
 
     Raises
@@ -27,7 +28,8 @@ def records(store: Store) -> list[Record]:
     problems.errors.InputError
         If the directory holds no run.
     """
-    return [kept(store, record) for record in store.records()]
+    found = store.records()
+    return found if isinstance(store, Archive) else [kept(store, record) for record in found]
 
 
 def kept(store: Store, record: Record) -> Record:

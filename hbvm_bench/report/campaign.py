@@ -16,6 +16,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report import provenance, words
+from hbvm_bench.report.archived import PLACE, pictures
 from hbvm_bench.report.document import (
     Block,
     Commands,
@@ -31,10 +32,11 @@ from hbvm_bench.report.document import (
 from hbvm_bench.report.figures.profiles import profiles
 from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.report.problem import ProblemPart, part
-from hbvm_bench.store.files import json_of
+from hbvm_bench.store import archive
+from hbvm_bench.store.archive import Archive, Drawing
 from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Index, Store, again, damage, progress
-from hbvm_bench.summaries import export, goals, laws, needs, outcomes
+from hbvm_bench.summaries import goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, by, columns, tasks
 from hbvm_bench.summaries.table import Table
@@ -50,6 +52,10 @@ DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure 
 
 FEW = 3  # problems whose summaries all stand at the top
 LISTED = 12  # cases without a rank that are listed at once; more are folded away
+ALL = (
+    "Every case with every metric, every reason and every timing sample, as compressed JSON; "
+    "`hbvm-bench export` makes tables of it"
+)
 CITE = "`hbvm-bench cite` prints how the authors of the methods ask to be cited."
 KINDS = ("chosen", "default", "recommended", "as published", "outside its domain")
 
@@ -68,15 +74,16 @@ class Run:
 
 
 class Gathered(NamedTuple):
-    """What the stores of one or more runs hold: the runs, all cases, and the series of each by its id."""
+    """What the stores of one or more runs hold."""
 
     runs: list[Run]
-    records: list[Record]
-    series: dict[str, Series]
+    records: list[Record]  # of all cases
+    series: dict[str, Series]  # of each, by its id; empty where an archive has drawings instead
+    drawings: Sequence[Drawing]
 
 
-def gather(stores: Sequence[Store]) -> Gathered:
-    """Read the stores of one or more runs.
+def gather(stores: Sequence[Store] | Sequence[Archive]) -> Gathered:
+    """Read the stores of one or more runs, or the runs of an archive.
 
     A case that several runs have is taken from the one that got further with it
     (`hbvm_bench.store.store.progress`).
@@ -87,7 +94,7 @@ def gather(stores: Sequence[Store]) -> Gathered:
         If a directory holds no run, or no run has a finished case.
     """
     indices = [store.index() for store in stores]
-    furthest: dict[str, tuple[Record, Store]] = {}
+    furthest: dict[str, tuple[Record, Store | Archive]] = {}
     for store in stores:
         for record in reading.records(store):
             if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
@@ -100,17 +107,28 @@ def gather(stores: Sequence[Store]) -> Gathered:
     runs = [
         Run(index, [case for number, case in index.listed() if number not in furthest]) for index in indices
     ]
-    made = Gathered(runs, [], {})
+    made = Gathered(runs, [], {}, _drawings(stores))
+    last = None
     for number, (key, (record, store)) in enumerate(furthest.items()):
-        found, made.series[key] = _read(record, store) if number < DRAWN_CASES else (record, {})
+        if store is not last:
+            store.learn()  # of two runs each may have a reference of its own
+            last = store
+        found, made.series[key] = record, {}
+        if number < DRAWN_CASES and isinstance(store, Store):
+            found, made.series[key] = _read(record, store)
         made.records.append(found)
     return made
 
 
-def document(stores: Store | Sequence[Store]) -> Document:
+def _drawings(stores: Sequence[Store] | Sequence[Archive]) -> Sequence[Drawing]:
+    """Return the figures that an archive has in the place of series; its runs have them in common."""
+    return stores[0].drawings if isinstance(stores[0], Archive) else ()
+
+
+def document(stores: Store | Sequence[Store] | Sequence[Archive]) -> Document:
     """Return the report on one or more runs; raises what `gather` does."""
     stores = [stores] if isinstance(stores, Store) else stores
-    runs, records, series = gather(stores)
+    runs, records, series, drawings = gather(stores)
     look = looks(record.case.method for record in records)
     missing = [case for run in runs for case in run.missing]
     printed = {case.problem: repr(make_problem(case.problem)) for case in missing}  # as the records have it
@@ -126,13 +144,13 @@ def document(stores: Store | Sequence[Store]) -> Document:
             sampled=task.sampled(tables),
             brief=brief,
             summarized=len(tables) > FEW,
+            drawings=pictures(drawings, f"{PLACE}{number}"),
         )
         for number, (task, members) in enumerate(tables.items(), 1)
     ]
     one = len(runs) == 1
     title = runs[0].title if one else f"{len(runs)} runs together: {'; '.join(run.title for run in runs)}"
     overall = _overall(records, look, several=len(parts) > 1)
-    files = partial(_files, title, runs, records)
     references = [text for one in parts for text in one.problem.references]
     return Document(
         title,
@@ -144,7 +162,7 @@ def document(stores: Store | Sequence[Store]) -> Document:
             *(overall if len(parts) == 1 else []),
             *(one.section for one in parts),
             _fairness(runs, records),
-            Section("Raw data", attempt(("the results as files", files)), "data-files", nav="Data"),
+            Section("Raw data", [Files(ALL, [archive.NAME])], "data-files", nav="Data"),
             _again(runs, records),
             Section("Sources", [Items([*dict.fromkeys(references), CITE])], "sources"),
         ],
@@ -261,13 +279,4 @@ def _again(runs: Sequence[Run], records: Sequence[Record]) -> Section:
         ],
         "again",
         nav="Run it again",
-    )
-
-
-def _files(title: str, runs: Sequence[Run], records: Sequence[Record]) -> Files:
-    commands = [{"command": run.index.command, "version": run.index.version} for run in runs]
-    made = json_of({"title": title, "runs": commands} | export.as_json(records))
-    return Files(
-        "Every case with every metric, every reason and every timing sample",
-        {"data/results.csv": export.cases_csv(records), "data/results.json": made},
     )

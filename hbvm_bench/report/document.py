@@ -9,16 +9,16 @@ A report is a `Document`, a paragraph of it is a text, and everything else is on
 import re
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.report.figures.style import Look
-from hbvm_bench.store.files import csv_of
 from hbvm_bench.summaries.rows import Row
 from hbvm_bench.summaries.table import Table
 
+SHOWN = 4  # figures beside the markdown
 VERDICTS = {"holds": "confirmed", "partly": "confirmed in part", "no": "not found"}
 
 
@@ -101,10 +101,10 @@ class Results:
 
 @dataclass(frozen=True)
 class Files:
-    """Files to save, by their path beside the document; ``None`` for those that lie there already."""
+    """Files to save, by their path beside the document."""
 
     text: str
-    files: Mapping[str, bytes | None]
+    files: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -154,8 +154,6 @@ class Document:
     lead: Sequence[str]  # paragraphs before everything else
     blocks: Sequence[Block]
     looks: Sequence[Look] = ()  # of what has a colour in its figures; no two have one number
-    # what the legends of the page call a look by its number, where that is not what its curves are called
-    names: Mapping[int, str] = field(default_factory=dict)
     name: str = "README.md"  # of the file with the markdown
 
     def walk(self) -> Iterator[Block]:
@@ -173,22 +171,14 @@ class Document:
         return [block for block in self.walk() if isinstance(block, Picture)]
 
     @property
+    def shown(self) -> list[Picture]:
+        """The figures that the markdown shows; the page has all of them."""
+        return self.pictures[:SHOWN]
+
+    @property
     def failed(self) -> list[Failed]:
         """What could not be made."""
         return [block for block in self.walk() if isinstance(block, Failed)]
-
-    @property
-    def files(self) -> dict[str, bytes]:
-        """What lies beside the documents, by path: figures, their numbers, tables with a key, data."""
-        made: dict[str, bytes] = {}
-        for block in self.walk():
-            if isinstance(block, Picture):
-                made |= block.files
-            elif isinstance(block, Table) and block.key:
-                made[f"data/{block.key}.csv"] = csv_of([block.flat_head, *block.rows])
-            elif isinstance(block, Files):
-                made |= {path: data for path, data in block.files.items() if data is not None}
-        return made
 
 
 def attempt(*makers: Maker) -> list[Block]:

@@ -11,7 +11,6 @@ from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
-from plotly.offline import get_plotlyjs
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report import pack
@@ -21,8 +20,26 @@ from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"
-SCRIPTS = ("script.js", "table.js", "motion.js", "explore.js")
-INLINE = 1_000_000  # characters of drawings in a page; what is more would make it slow to open
+SCRIPTS = ("script.js", "table.js", "motion.js", "figures.js")
+INLINE = 150_000  # characters of drawings in the text of a page; a script unpacks the others
+# By matplotlib's name of a marker: its drawing in a box of 12 by 12 as the figures have it.
+MARKERS = {
+    "o": '<circle cx="6" cy="6" r="4.2"/>',
+    "d": '<path d="M6 1 9.2 6 6 11 2.8 6z"/>',
+    "8": '<path d="M4.1 1.4h3.8l2.7 2.7v3.8l-2.7 2.7H4.1L1.4 7.9V4.1z"/>',
+    "D": '<path d="M6 1 11 6 6 11 1 6z"/>',
+    "s": '<path d="M2 2h8v8H2z"/>',
+    "^": '<path d="M6 1.5 10.8 10H1.2z"/>',
+    "v": '<path d="M6 10.5 10.8 2H1.2z"/>',
+    "P": '<path d="M4.3 1h3.4v3.3H11v3.4H7.7V11H4.3V7.7H1V4.3h3.3z"/>',
+    "X": '<path d="M3.2 1 6 3.8 8.8 1 11 3.2 8.2 6 11 8.8 8.8 11 6 8.2 3.2 11 1 8.8 3.8 6 1 3.2z"/>',
+    "<": '<path d="M1.5 6 10 1.2v9.6z"/>',
+    ">": '<path d="M10.5 6 2 1.2v9.6z"/>',
+    "p": '<path d="M6 1 11 4.8 9 10.6H3L1 4.8z"/>',
+    "h": '<path d="M6 .8 10.5 3.4v5.2L6 11.2 1.5 8.6V3.4z"/>',
+    "H": '<path d="M3.4 1.5h5.2L11.2 6 8.6 10.5H3.4L.8 6z"/>',
+    "*": '<path d="M6 .8 7.4 4.4 11.2 4.6 8.2 7 9.3 10.8 6 8.6 2.7 10.8 3.8 7 .8 4.6 4.6 4.4z"/>',
+}
 FITTING = 9  # columns of metrics in a window of 1280 pixels; of more, these wait behind a switch
 MINOR = ("compile_seconds", "z_end")
 DIGITS = 16  # of a double: a bar of this many digits is full
@@ -39,7 +56,7 @@ class Place:
 
     level: int  # of the next heading
     colours: Mapping[str, str]  # from the colour of a case to the name of the page's variable
-    inlined: Collection[str]  # keys of the figures that stand in the page itself; the others are beside it
+    inlined: Collection[str]  # keys of the figures that stand in the text; the others are in its data
 
     @property
     def below(self) -> "Place":
@@ -53,17 +70,16 @@ def page(document: Document) -> str:
     script = "".join(text(name) for name in SCRIPTS)
     light = {f"--m{look.number}": look.light for look in looks}
     top = Place(2, {colour: name for name, colour in light.items()}, _within(document.pictures))
+    waiting = [picture for picture in document.pictures if picture.key not in top.inlined]
     made = {
         "nav": [block for block in document.walk() if isinstance(block, Section) and block.nav],
         "main": printed(document.blocks, top),
         "css": Markup(text("style.css")),
         "script": Markup(script),
-        "scripts": Markup(f"{_source(script)} {_source(get_plotlyjs())}"),
-        "data": Markup(pack.data(document)),
-        "library": Markup(pack.library()),
+        "scripts": Markup(_source(script)),
+        "data": Markup(pack.data(document, {one.key: str(drawing(one, top.colours)) for one in waiting})),
         "light": variables({name: colour for colour, name in NEUTRALS.items()} | light),
         "dark": variables(DARK_NEUTRALS | {f"--m{look.number}": look.dark for look in looks}),
-        "keys": [(look.number, key(look)) for look in looks],
         "symbols": symbols(looks),
     }
     return templates().get_template("base.html.j2").render(document=document, **made)
@@ -162,21 +178,11 @@ def chip(look: Look) -> Markup:
     return Markup(f'<svg class="chip k{look.number}" aria-hidden="true">{use}</svg>')
 
 
-def key(look: Look) -> Markup:
-    """Return the line and marker of a case, for the legend of an interactive figure."""
-    dashes = f' stroke-dasharray="{" ".join(f"{length:g}" for length in look.dash)}"' if look.dash else ""
-    return Markup(
-        f'<svg class="line k{look.number}" viewBox="0 0 40 12" width="40" height="12" aria-hidden="true">'
-        f'<path d="M0 6h40" fill="none" stroke="currentColor" stroke-width="2"{dashes}/>'
-        f'<use href="#k{_marker(look)}" x="14" width="12" height="12"/></svg>'
-    )
-
-
 def symbols(looks: Sequence[Look]) -> Markup:
     """Return the markers once, for all rows, and the colours of the cases."""
     shapes = "".join(
         f'<symbol id="k{number}" viewBox="0 0 12 12">{shape}</symbol>'
-        for number, (_, shape) in enumerate(pack.MARKERS.values())
+        for number, shape in enumerate(MARKERS.values())
     )
     colours = "".join(f".k{look.number}{{color:var(--m{look.number})}}" for look in looks)
     return Markup(f'<style>{colours}</style><svg class="symbols" aria-hidden="true">{shapes}</svg>')
@@ -198,7 +204,7 @@ def _source(script: str) -> str:
 
 
 def _within(pictures: Sequence[Picture]) -> set[str]:
-    """Return the keys of the figures that stand in the page itself; the others are beside it."""
+    """Return the keys of the figures that stand in the text of the page; the others are in its data."""
     room, kept = INLINE, set()
     for picture in pictures:
         if len(picture.svg) <= room:
@@ -208,4 +214,4 @@ def _within(pictures: Sequence[Picture]) -> set[str]:
 
 
 def _marker(look: Look) -> int:
-    return list(pack.MARKERS).index(look.marker)
+    return list(MARKERS).index(look.marker)

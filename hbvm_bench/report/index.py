@@ -9,7 +9,12 @@ from hbvm_bench.store.files import write_all
 from problems.errors import InputError
 
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from
-LEAD = "Every report is written by the command that it names; nothing in it is by hand."
+LEAD = (
+    "Every report is written by the command that it names; nothing in it is by hand. A text (`report.md` or "
+    "`README.md`) with its figures is committed beside the results that it is made from. The pages, with all "
+    "figures and all rows, are drawn from these results by `make pages`, without running anything; git "
+    "ignores them, but for sitnikov's."
+)
 WIDTH = 360  # pixels of a thumbnail
 LONGEST = 400  # characters of a description
 

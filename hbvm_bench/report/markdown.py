@@ -14,11 +14,15 @@ from hbvm_bench.summaries.table import Table
 def markdown(document: Document) -> str:
     """Return a document as markdown with relative links to its files."""
     parts = [f"# {words(document.title)}", *map(words, document.lead)]
-    return joined([*parts, *(printed(block) for block in document.blocks)]) + "\n"
+    shown = {picture.key for picture in document.shown}
+    return joined([*parts, *(printed(block, shown=shown) for block in document.blocks)]) + "\n"
 
 
-def printed(block: Block, level: int = 2) -> str:
-    """Return a block as markdown; ``level`` is that of the next heading in it."""
+def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
+    """Return a block as markdown.
+
+    ``level`` is that of the next heading in it; of the figures those whose keys are ``shown`` lie beside it.
+    """
     heading = "#" * level
     match block:
         case str():
@@ -42,22 +46,19 @@ def printed(block: Block, level: int = 2) -> str:
         case blocks.Failed():
             return f"**Not made: {words(block.title)}** ({words(block.reason)})"
         case blocks.Details():
-            inner = "\n\n".join(printed(one, level) for one in block.blocks)
+            inner = "\n\n".join(printed(one, level, shown) for one in block.blocks)
             return f"<details>\n<summary>{plain(block.summary)}</summary>\n\n{inner}\n\n</details>"
         case blocks.Section():
             title = words(block.title) + (f": {code(block.code)}" if block.code else "")
-            return joined([f"{heading} {title}", *(printed(one, level + 1) for one in block.blocks)])
+            return joined([f"{heading} {title}", *(printed(one, level + 1, shown) for one in block.blocks)])
         case Table():
-            note = words(block.note) + (f" [CSV](data/{block.key}.csv)" if block.key else "")
             rows = [[cell(text) for text in row] for row in block.rows]
             table = lined([words(head) for head in block.flat_head], rows, block.words)
-            return joined((f"**{words(block.title)}**" * bool(block.title), table, note))
+            return joined((f"**{words(block.title)}**" * bool(block.title), table, words(block.note)))
         case Picture():
-            title, links = words(block.title), f"[SVG](figures/{block.key}.svg)"
-            links += f", [its data](data/{block.key}.csv)" if block.plot is not None else ""
-            image = f"![{title}](figures/{block.key}.png)"
-            caption = f"{words(block.caption)} {links}"
-            return "\n\n".join((f"{heading} {title}", image, words(block.summary), caption))
+            title = words(block.title)
+            image = f"![{title}]({block.file})" if block.key in shown else ""
+            return joined((f"{heading} {title}", image, words(block.summary), words(block.caption)))
 
 
 def joined(parts: Iterable[str]) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure.metrics import PLANETOID_Z
+from hbvm_bench.measure.raw import WITNESSES
 from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
@@ -23,7 +24,8 @@ from hbvm_bench.report.figures.over_time import Drawn, OverTime
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of, number
+from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import number as number_of
 from hbvm_bench.summaries.rows import at_once, grouped, reached, rows
 from problems.problem import Problem
 
@@ -52,6 +54,7 @@ def part(
     brief: bool,
     summarized: bool,
     sampled: str = "",
+    drawings: Sequence[Picture] = (),
 ) -> ProblemPart:
     """Make what the report says about one problem, or about an ensemble of it.
 
@@ -59,6 +62,7 @@ def part(
     An ensemble's series are over its trajectories and not over time: it has rows and no figures. ``brief``
     draws only the main figures, of the most telling cases; ``summarized`` puts the summary into the section;
     ``sampled`` tells it from another part on the problem, by its samples.
+    ``drawings`` are its figures where they are drawn already.
     """
     problem = make_problem(text)
     records = [record for record, _ in found]
@@ -66,8 +70,9 @@ def part(
     ensemble = records[0].case.ensemble
     cases = [Drawn(record, look[record.case.method], series) for record, series in found if ensemble is None]
     drawn = [case for case in cases if "t" in case.series and case.series["t"].size]
-    ends = max((len(series.get("position_t", ())) for _, series in found), default=0)
-    witnesses = [words.WITNESSES.format(ends)] if ensemble is not None and ends else []
+    known_ends = ensemble is not None and any(number_of(record, "position_end") for record in records)
+    ends = min(ensemble.count, WITNESSES) if ensemble is not None and known_ends else 0
+    witnesses = [words.WITNESSES.format(ends)] if ends else []
     summary = attempt(
         (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
     )
@@ -78,7 +83,7 @@ def part(
         *(summary if summarized else []),
         *attempt((f"the reference of {text}", lambda: _truth(problem, known))),
         *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
-        *_figures(problem, drawn, known, number, brief=brief),
+        *(drawings or _figures(problem, drawn, known, number, brief=brief)),
         Section("What our own methods do wrong", wrong, f"wrong-{number}"),
     ]
     section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
@@ -144,7 +149,7 @@ def telling(cases: Sequence[Drawn]) -> list[Drawn]:
 
 
 def _rank(case: Drawn) -> tuple[bool, float]:
-    errors = [number(case.record, key) for key in ("position_end", "energy_max")]
+    errors = [number_of(case.record, key) for key in ("position_end", "energy_max")]
     return not reached(case.record), next((error for error in errors if error is not None), np.inf)
 
 

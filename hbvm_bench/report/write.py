@@ -11,11 +11,11 @@ from hbvm_bench.store.files import write_all
 def rendered(document: Document) -> dict[str, bytes]:
     """Return all files of a document by their path in its directory."""
     made = {document.name: markdown(document).encode(), "index.html": page(document).encode()}
-    return document.files | made
+    return {picture.file: picture.svg.encode() for picture in document.shown} | made
 
 
 def write(document: Document, directory: Path) -> list[Path]:
-    """Write the markdown, the page, ``figures/`` and ``data/``; return the paths of the first two.
+    """Write the markdown with its ``figures/``, and the page; return the paths of the first two.
 
     Raises
     ------

@@ -136,7 +136,7 @@ def document(results: Mapping[str, Sequence[Kept]]) -> Document:
             ),
             Section(
                 "Raw data",
-                [Files("With all timing samples", {f"{kind}.json": None for kind in results})],
+                [Files("With all timing samples", [f"{kind}.json" for kind in results])],
                 "data-files",
                 nav="Data",
             ),

@@ -319,5 +319,5 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         "Thick: root mean square over the starts; thin: every start. The grey line grows like the square "
         "root of time, as unbiased round-off does.",
         said,
-        Plot([Panel(title, Axis("years", log=True, both=True), vertical, traces)]),
+        Plot([Panel(title, Axis("years", log=True), vertical, traces)]),
     )

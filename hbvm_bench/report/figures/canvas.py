@@ -1,4 +1,4 @@
-"""Figures as files: deterministic SVG and PNG, and SVG that takes the colours of the page."""
+"""Figures as deterministic SVG, which takes the colours of a page: the one way in which pages are drawn."""
 
 import base64
 import io
@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from hbvm_bench.report.figures.plots import Plot, as_csv
+from hbvm_bench.report.figures.plots import Plot, numbers
 from hbvm_bench.report.figures.style import GRID, INK, MUTED, NEUTRALS, PAPER
+from hbvm_bench.summaries.table import Table
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -62,8 +63,7 @@ class Picture:
     caption: str
     summary: str  # what it shows, for those who do not see it
     svg: str
-    png: bytes  # the same picture
-    plot: Plot | None = None  # what it shows, as numbers
+    numbers: Table | None = None  # what it shows
     motion: dict[str, Any] | None = None  # what the page's moving view of it is made of
     values: bool = False  # whether its colours mean values, so that no theme may brighten them
 
@@ -72,10 +72,9 @@ class Picture:
             raise ValueError(f"{self.key!r} can be no anchor and no file name")
 
     @property
-    def files(self) -> dict[str, bytes]:
-        """Its drawing, its image and its numbers, by their path beside a report."""
-        made = {f"figures/{self.key}.svg": self.svg.encode(), f"figures/{self.key}.png": self.png}
-        return made if self.plot is None else made | {f"data/{self.key}.csv": as_csv(self.plot)}
+    def file(self) -> str:
+        """Its path beside a report."""
+        return f"figures/{self.key}.svg"
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:
@@ -100,16 +99,15 @@ def picture(
     values: bool = False,
 ) -> Picture:
     """Render a figure; the same figure gives the same bytes."""
-    svg, png = io.StringIO(), io.BytesIO()
+    svg = io.StringIO()
     with mpl.rc_context(SETTINGS | {"svg.hashsalt": f"hbvm-bench-{key}"}):
         figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
-        figure.savefig(png, format="png", dpi=160, metadata={"Software": None})
     text = svg.getvalue()
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Verdana is as wide as DejaVu Sans, so that labels keep their places where that is missing
     text = text.replace(f"'{FONT}'", f"'{FONT}', Verdana, sans-serif")
-    svg_, png_ = compact(with_small_images(text)), small(png.getvalue())
-    return Picture(key, title, caption, summary, svg_, png_, plot, values=values)
+    shown = None if plot is None else numbers(plot)
+    return Picture(key, title, caption, summary, compact(with_small_images(text)), shown, values=values)
 
 
 def compact(svg: str) -> str:
@@ -148,17 +146,17 @@ def with_small_images(svg: str) -> str:
 
     def smaller(found: re.Match[str]) -> str:
         before = base64.b64decode(found[0])
-        return base64.b64encode(min(before, small(before, "RGBA"), key=len)).decode("ascii")
+        return base64.b64encode(min(before, small(before), key=len)).decode("ascii")
 
     return re.sub(r"(?<=data:image/png;base64,)[^\"]+", smaller, svg)
 
 
-def small(png: bytes, mode: str = "RGB") -> bytes:
-    """Return a picture with a palette of its own: a third of the bytes, and no difference to the eye."""
+def small(png: bytes) -> bytes:
+    """Return an image with a palette of its own: a third of the bytes, and no difference to the eye."""
     from PIL import Image  # comes with matplotlib
 
-    method = Image.Quantize.MEDIANCUT if mode == "RGB" else Image.Quantize.FASTOCTREE  # with transparency
-    image, made = Image.open(io.BytesIO(png)).convert(mode), io.BytesIO()
+    method = Image.Quantize.FASTOCTREE  # which knows transparency
+    image, made = Image.open(io.BytesIO(png)).convert("RGBA"), io.BytesIO()
     image.quantize(COLOURS, method=method, dither=Image.Dither.NONE).save(made, "PNG", optimize=True)
     return made.getvalue()
 

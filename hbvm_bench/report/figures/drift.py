@@ -68,7 +68,7 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         "there is; a law is what these samples show, not a proof."
         + (f" {drift.told(starts)}." if starts > 1 else ""),
         "Law of each case. " + "; ".join(f"{c.record.case.method}: {said[c.record.id]}" for c in shown) + ".",
-        Plot([Panel("", Axis("time", log=True, both=True), Axis(label, log=True), traces)]),
+        Plot([Panel("", Axis("time", log=True), Axis(label, log=True), traces)]),
     )
 
 

@@ -100,8 +100,8 @@ def over_time(cases: Sequence[Drawn], what: OverTime) -> Picture | None:
             t, values = envelope(t, values, FINE_BINS)
         curves.append(trace(case, t, np.where(values > 0.0, values, 0.0 if what.zero else np.nan)))
     summary = f"{what.title}, largest values. {'; '.join(largest)}."
-    y = Axis(what.label, log=True, low=what.low, high=what.high)
-    plot = Plot([Panel("", Axis("time", both=True), y, curves)])
+    y = Axis(what.label, log=True)
+    plot = Plot([Panel("", Axis("time"), y, curves)])
     return picture(figure, what.key, what.title, what.caption, summary, plot)
 
 

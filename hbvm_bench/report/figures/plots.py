@@ -1,35 +1,27 @@
-"""What a figure shows, as numbers: for interaction in the page, for its table and for its CSV file."""
+"""What a figure shows, as numbers, for the table beside it."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.store.files import csv_of
 from hbvm_bench.summaries.table import Table
 
 Array = NDArray[np.float64]
 
-DIGITS = 4  # significant ones of what is drawn; the store has them all
 NEAR = 0.02  # of a curve's length before its first point: a bin of an envelope may begin so late
 TABLE_COLUMNS = 6  # places on the horizontal axis that the table of a curve shows
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: its label, whether it is logarithmic, and whether the page offers to change that.
-
-    What lies beyond ``low`` or ``high`` (powers of ten) is out of the first view.
-    """
+    """One axis: its label, and whether it is logarithmic."""
 
     label: str
     log: bool = False
-    both: bool = False
-    low: int | None = None
-    high: int | None = None
 
 
 @dataclass(frozen=True)
@@ -42,7 +34,6 @@ class Trace:
     y: Array
     role: Literal["case", "law", "truth"] = "case"  # a law is drawn thin over its case; the truth is neutral
     note: str = ""  # what the law says
-    joined: bool = True  # whether a line goes through the points
 
 
 @dataclass(frozen=True)
@@ -53,7 +44,6 @@ class Panel:
     x: Axis
     y: Axis
     traces: Sequence[Trace]
-    square: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,37 +53,6 @@ class Plot:
     panels: Sequence[Panel] = field(default_factory=list)  # side by side
     # curves over x, one point per case, paths in a plane, or many points per case
     kind: Literal["lines", "points", "paths", "dots"] = "lines"
-
-
-def as_json(plot: Plot) -> dict[str, Any]:
-    """Return a plot for the page; numbers have `DIGITS` digits, gaps are null."""
-    return {
-        "kind": plot.kind,
-        "panels": [
-            vars(panel)
-            | {
-                "x": vars(panel.x),
-                "y": vars(panel.y),
-                "traces": [
-                    vars(trace) | {"x": list(map(short, trace.x)), "y": list(map(short, trace.y))}
-                    for trace in panel.traces
-                    if trace.x.size
-                ],
-            }
-            for panel in plot.panels
-        ],
-    }
-
-
-def as_csv(plot: Plot) -> bytes:
-    """Return a plot as text: one line per point."""
-    rows: list[tuple[object, ...]] = [("panel", "case", "name", "kind", "x", "y")]
-    for panel in plot.panels:
-        for trace in panel.traces:
-            of = (panel.title, trace.case or "", trace.name, trace.role)
-            points = zip(map(short, trace.x.tolist()), map(short, trace.y.tolist()), strict=True)
-            rows += [(*of, *("" if v is None else repr(v) for v in point)) for point in points]
-    return csv_of(rows)
 
 
 def numbers(plot: Plot) -> Table:
@@ -120,11 +79,6 @@ def numbers(plot: Plot) -> Table:
         found = [[(str(trace.x.size), *_range(trace.x), *_range(trace.y))] for _, trace in cases]
     rows = [(*first, *one) for first, each in zip(firsts, found, strict=True) for one in each]
     return Table("", head, rows, words=range(3))
-
-
-def short(value: float) -> float | None:
-    """Return a number with `DIGITS` digits; ``None`` for what is not finite."""
-    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
 
 
 def _places(xs: Sequence[Array], *, log: bool) -> list[float]:

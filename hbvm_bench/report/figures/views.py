@@ -95,9 +95,7 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
         "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
         "for the direction of the apsides, whatever its energy says.",
-        Plot(
-            [Panel(f"primary {i + 1}", Axis("x"), Axis("y"), curves[i], square=True) for i in (0, 1)], "paths"
-        ),
+        Plot([Panel(f"primary {i + 1}", Axis("x"), Axis("y"), curves[i]) for i in (0, 1)], "paths"),
     )
 
 

@@ -50,7 +50,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         axes.set(xlabel=seconds_, title=METRICS[key].label)
         points = zip(shown, times, values, strict=True)
         clouds = [trace(case, np.array([seconds]), np.array([value])) for case, seconds, value in points]
-        x, y = Axis(seconds_, log=True), Axis(METRICS[key].label, log=True, low=-18, high=3)
+        x, y = Axis(seconds_, log=True), Axis(METRICS[key].label, log=True)
         plotted.append(Panel(METRICS[key].label, x, y, [*clouds, *_envelopes(axes, shown, spots)]))
     side.set_axis_off()
     handles = []

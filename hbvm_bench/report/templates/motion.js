@@ -162,22 +162,22 @@ document.addEventListener("data", ({ detail }) => {
 
     const controls = make("div", { class: "controls" }, button, scrub, time, rate);
     const place = make("div", { class: "moving", hidden: "" }, make("div", { class: "panes" }, ...panes.map((pane) => pane.pane)), controls);
-    figure.querySelector(".plot").before(place);
+    figure.querySelector(".picture").after(place);
 
     const views = figure.querySelector(".views");
+    views.hidden = false;
+    const rest = views.querySelector("[data-view=picture]");
     const move = make("button", { type: "button", "data-view": "move", "aria-pressed": "false" }, "Move");
     views.append(move);
     const open = (on) => {
       place.hidden = !on;
-      if (!on) return play(false);
-      figure.querySelector(".plot").hidden = true;
-      figure.querySelector(".picture").hidden = true;
-      for (const other of views.children) other.setAttribute("aria-pressed", String(other === move));
-      paint();
-      return undefined;
+      figure.querySelector(".picture").hidden = on;
+      rest.setAttribute("aria-pressed", String(!on));
+      move.setAttribute("aria-pressed", String(on));
+      if (on) paint();
+      else play(false);
     };
-    for (const other of views.querySelectorAll("[data-view]"))
-      if (other !== move) other.addEventListener("click", () => { open(false); move.setAttribute("aria-pressed", "false"); });
+    rest.addEventListener("click", () => open(false));
     move.addEventListener("click", () => { open(true); if (!still.matches) play(true); });
     document.addEventListener("theme", paint);
     new ResizeObserver(() => frame()).observe(place);

@@ -1,4 +1,4 @@
-"""What all figures on the paper share: colours, sizes, the numbers that a page reads off them."""
+"""What all figures on the paper share: colours, sizes, what their sheets have in common."""
 
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -11,14 +11,12 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
-from hbvm_bench.report.figures.read_off import read_off
 from hbvm_bench.report.figures.style import looks
 from integrators.protocol import Array
 
 # What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
 COLOURS: dict[str, str] = dict(zip(("gauss", "hbvm", "motion"), (look.light for look in LOOKS), strict=True))
-NAMES = {1: "Gauss", 2: "HBVM", 3: "the motion itself"}
 SEQUENTIAL = LinearSegmentedColormap.from_list(
     "dusk", ["#f2d9b8", "#d98f4e", "#ab4a3f", "#6b2f5e", "#3a2c66"]
 )
@@ -57,8 +55,7 @@ def drawn(
             figure = new(width, height)
             figure.set_layout_engine("constrained")
             caption, summary = draw(figure, *args, **kwargs)
-            plot = read_off(figure, {look.light: look.number for look in LOOKS}, NAMES)
-            return picture(figure, key, title, caption, summary, plot, values=values)
+            return picture(figure, key, title, caption, summary, values=values)
 
         return made
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from hbvm_bench.report.document import Claims, Commands, Document, Files, Section, attempt
-from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.paper import henon_heiles_part, period_annulus_part, properties_part, sitnikov_part
-from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
+from hbvm_bench.studies.paper.drawn import LOOKS
 from hbvm_bench.studies.paper.results import NAME, Kept, Part, Results, Task
 
 PARTS = (sitnikov_part.PART, henon_heiles_part.PART, period_annulus_part.PART, properties_part.PART)
@@ -26,8 +25,6 @@ def document(kept: Kept, keys: Sequence[str]) -> Document:
 
     made = attempt(*((f"the claims of {part.title}", partial(claims, part, found)) for part, found in parts))
     groups = [group for block in made if isinstance(block, Claims) for group in block.groups]
-    rows = [(title, c.words, c.paper, c.here, c.verdict) for title, _, found in groups for c in found]
-    table = csv_of([("part", "claim", "paper", "here", "verdict"), *rows])
     return Document(
         "The seed paper, run again",
         [
@@ -50,8 +47,7 @@ def document(kept: Kept, keys: Sequence[str]) -> Document:
             Section(
                 "Raw data",
                 [
-                    Files("All claims", {"data/claims.csv": table}),
-                    Files("What every computation returned (MessagePack)", {NAME: None}),
+                    Files("What every computation returned (MessagePack)", [NAME]),
                 ],
                 "data-files",
                 nav="Data",
@@ -70,6 +66,5 @@ def document(kept: Kept, keys: Sequence[str]) -> Document:
             ),
         ],
         LOOKS,
-        NAMES,
         name="report.md",
     )

@@ -98,7 +98,7 @@ def _panel(
     return Panel(
         title,
         Axis(SECONDS, log=True),
-        Axis(title, log=True, low=FLOOR, high=TOP),
+        Axis(title, log=True),
         [*marks, *lines, Trace(0, "what is asked for", *asked_for, "law")],
     )
 

@@ -11,7 +11,6 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Details, Document, Files, Items, Maker, Note, Section, attempt
 from hbvm_bench.report.figures.style import Look, looks
 from hbvm_bench.report.provenance import PEERS, again
-from hbvm_bench.store.files import csv_of
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
@@ -93,10 +92,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
             ),
             Section(
                 "Raw data",
-                [
-                    *attempt(("the settings as a file", partial(settings_csv, races))),
-                    Files("With all timing samples", {FILE: None}),
-                ],
+                [Files("With all timing samples", [FILE])],
                 "data-files",
                 nav="Data",
             ),
@@ -109,7 +105,6 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
             ),
         ],
         list(look.values()),
-        names={one.number: name for name, one in look.items()},
     )
 
 
@@ -180,11 +175,3 @@ def commands(races: Sequence[Race]) -> str:
     if len(alike) == 1 and {race.key for race in races} == {name_of(entry) for entry in DECLARED.entries()}:
         return alike.pop()
     return "\n".join(dict.fromkeys(race.run.command for race in races))
-
-
-def settings_csv(races: Sequence[Race]) -> Files:
-    """Return all settings of all contests as one table of text."""
-    found = [(race.key, tables.everything(race)) for race in races]
-    head = ("contest", *found[0][1].head)
-    text = csv_of([head, *((key, *row) for key, table in found for row in table.rows)])
-    return Files("Every setting of every contest", {"data/settings.csv": text})

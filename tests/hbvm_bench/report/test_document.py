@@ -1,5 +1,6 @@
 """Every block is printed as markdown and as HTML; one that fails loses no other; reports are redrawn."""
 
+import dataclasses
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,6 +16,7 @@ from hbvm_bench.commands.paper import PARTS
 from hbvm_bench.report import html, markdown
 from hbvm_bench.report.campaign import document
 from hbvm_bench.report.document import (
+    SHOWN,
     Block,
     Claim,
     Claims,
@@ -96,7 +98,7 @@ def examples(text: str, ranked: Results) -> list[Block]:
         Commands(f"hbvm-bench {text}"),
         Claims([(text, "there", [Claim(text, text, text, "partly")])]),
         ranked,
-        Files(text, {"data/all.csv": b"a,b\n", "kept.json": None}),
+        Files(text, ["kept.json"]),
         Failed(text, text),
         Details(text, [text]),
         Section(text, [text], "here", code="kepler()"),
@@ -144,15 +146,13 @@ def test_powers_of_ten_are_set_as_powers_and_code_is_left_alone():
     assert html.words("-0.015") == "−0.015"
 
 
-def test_what_a_page_saves_is_in_it_and_beside_it():
-    made = Document("t", ["l"], [Files("All", {"data/a.csv": b"1,2\n", "b.json": None}), drawn()])
-    files = rendered(made)
-    assert set(files) == {
-        *("README.md", "index.html", "data/a.csv"),
-        *("figures/drawn.svg", "figures/drawn.png", "data/drawn.csv"),
-    }
-    assert b'href="data/a.csv" download="a.csv" data-save="csv"' in files["index.html"]
-    assert b'href="b.json" download="b.json">' in files["index.html"]  # not in the page
+def test_the_markdown_shows_the_first_figures_and_the_page_all():
+    pictures = [dataclasses.replace(drawn(), key=f"drawn-{i}") for i in range(SHOWN + 1)]
+    files = rendered(Document("t", ["l"], [Files("All", ["b.json"]), *pictures]))
+    assert set(files) == {"README.md", "index.html", *(f"figures/drawn-{i}.svg" for i in range(SHOWN))}
+    assert files["README.md"].count(b"![") == SHOWN
+    assert files["index.html"].count(b"<figure ") == SHOWN + 1
+    assert b'href="b.json" download="b.json">' in files["index.html"]
 
 
 def test_a_figure_is_as_wide_as_it_was_drawn():
@@ -175,7 +175,7 @@ def test_a_part_that_fails_is_named_and_everything_else_is_written(tmp_path):
         text = path.read_text(encoding="utf-8")
         assert "the second" in text
         assert "ZeroDivisionError: no such thing" in text
-    assert (tmp_path / "figures" / "drawn.png").is_file()
+    assert (tmp_path / "figures" / "drawn.svg").is_file()
 
 
 def test_a_figure_of_a_campaign_that_fails_loses_no_other(tmp_path, monkeypatch, undrawn):

@@ -1,17 +1,13 @@
 """The pages of the race, of endurance and of the paper in a real browser: what all pages share works."""
 
-import re
-
 import pytest
 
 pytest.importorskip("playwright.sync_api")
 
-from playwright.sync_api import expect
-
 from hbvm_bench.report.document import Claim, Claims, Document, Section
 from hbvm_bench.report.write import write
 from hbvm_bench.studies import endure
-from hbvm_bench.studies.paper.drawn import LOOKS, NAMES
+from hbvm_bench.studies.paper.drawn import LOOKS
 from hbvm_bench.studies.paper.experiments.properties import Order
 from hbvm_bench.studies.paper.properties_part import order
 from hbvm_bench.studies.race import report as race
@@ -36,12 +32,11 @@ def made_up_document():
         ["A sentence."],
         [claims, Section("Made up", [order(rows), table], "made-up")],
         LOOKS,
-        NAMES,
     )
 
 
 @pytest.fixture(scope="module", params=["race", "endure", "paper"])
-def folder(request, tmp_path_factory, no_images):
+def folder(request, tmp_path_factory):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
         made = race.document([made_up_race()])
@@ -63,26 +58,15 @@ def test_no_page_is_wider_than_its_window(page):
     assert too_wide(page) == []
 
 
-def test_figures_are_explored_saved_and_read_as_a_table(page, folder):
-    assert (folder / "index.html").stat().st_size <= 3_000_000
-    figure = page.locator("figure[data-plot]").first
-    figure.locator("details.numbers summary").click()
-    expect(figure.locator("details.numbers tbody tr")).not_to_have_count(0)
-    figure.locator("[data-view=explore]").click()
-    expect(figure.locator(".area[data-drawn]")).to_be_visible()
-    curves = figure.locator(".scatterlayer .trace")
-    full = curves.count()
-    figure.locator("input[data-case]").first.uncheck()
-    expect(curves).not_to_have_count(full)
-    for ending, start in (("svg", b"<svg"), ("png", b"\x89PNG"), ("numbers", b"panel,case,name")):
-        with page.expect_download() as saved:
-            figure.locator(f"[data-save={ending}]").click()
-        assert saved.value.path().read_bytes().startswith(start)
+def test_a_page_is_small_and_its_figures_are_saved(page, folder):
+    assert (folder / "index.html").stat().st_size <= 300_000  # 35 to 100 kB measured
+    figure = page.locator("figure").first
+    with page.expect_download() as saved:
+        figure.locator("[data-save=svg]").click()
+    assert saved.value.path().read_bytes().startswith(b"<svg")
 
 
 def test_nothing_serious_is_found_by_axe(page):
-    page.locator("figure[data-plot] [data-view=explore]").first.click()
-    expect(page.locator(".area[data-drawn]").first).to_be_visible()
     assert serious(page) == []
 
 
@@ -91,10 +75,3 @@ def test_the_theme_changes(page):
     before = page.evaluate(ground)
     page.click("#theme")
     wait_for_change(page, ground, before)
-
-
-def test_the_files_that_the_page_names_are_there(folder):
-    text = (folder / "index.html").read_text(encoding="utf-8")
-    named = set(re.findall(r'href="((?:figures|data)/[^"]+)"', text))
-    assert len(named) >= 3
-    assert [name for name in named if not (folder / name).is_file()] == []

@@ -12,11 +12,13 @@ from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.report import words
 from hbvm_bench.report.campaign import document
+from hbvm_bench.report.document import SHOWN
 from hbvm_bench.report.figures.over_time import BINS, envelope
 from hbvm_bench.report.figures.style import looks, panels
 from hbvm_bench.report.markdown import code, plain
 from hbvm_bench.report.problem import part
 from hbvm_bench.report.write import write
+from hbvm_bench.store import archive
 from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
@@ -49,7 +51,7 @@ class Reader(HTMLParser):
         self.ids += [given["id"]] if "id" in given else []
         for name in ("src", "href", "xlink:href", "data", "srcset", "action"):
             target = given.get(name) or ""
-            relative = target.startswith(("#", "figures/", "data/"))
+            relative = target.startswith("#") or target == archive.NAME
             if name in given and not (relative and (tag in ("a", "use") or target.startswith("#"))):
                 self.requests.append((tag, target))
         assert not [name for name in given if name.startswith("on")]
@@ -65,7 +67,7 @@ def page(written):
 
 def test_hostile_names_cannot_break_the_page(page):
     text, reader = page
-    assert reader.tags.count("script") == 3  # the page's own, its data, the packed plotting library
+    assert reader.tags.count("script") == 2  # the page's own and its data
     outside = re.sub(r"<script[ >].*?</script>", "", text, flags=re.DOTALL)
     assert "<script>alert" not in text
     assert "alert(" not in outside.replace("&lt;script&gt;alert(", "")
@@ -76,9 +78,8 @@ def test_the_page_asks_nothing_of_the_network(page):
     text, reader = page
     assert reader.requests == []
     assert "@import" not in text
-    ours = text[: text.index('id="library"')]
-    assert re.findall(r"url\((?!#)", ours) == []
-    assert set(re.findall(r"https?://([\w.]+)", ours)) <= {"www.w3.org"}
+    assert re.findall(r"url\((?!#)", text) == []
+    assert set(re.findall(r"https?://([\w.]+)", text)) <= {"www.w3.org"}
     assert "default-src 'none'" in text
 
 
@@ -106,9 +107,8 @@ def test_every_figure_has_a_title_a_summary_and_its_files(page, written):
     }
     for key in figures:
         assert {f"{key}-title", f"{key}-desc"} <= set(reader.ids)
-        assert (written / "figures" / f"{key}.svg").read_text().startswith("<svg")
-        assert (written / "figures" / f"{key}.png").read_bytes().startswith(b"\x89PNG")
-    assert len(list((written / "figures").iterdir())) == 2 * len(figures)
+    shown = [path.stem for path in (written / "figures").iterdir()]
+    assert sorted(shown) == sorted(figures[:SHOWN])
 
 
 def test_the_same_store_gives_the_same_bytes(run, written, tmp_path):
@@ -278,17 +278,18 @@ def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
     record = reading.records(run)[0]
     case = msgspec.structs.replace(record.case, ensemble=Ensemble(count=100))
     record = msgspec.structs.replace(record, case=case)
-    for ends, said in ((7, True), (0, False)):
+    away = msgspec.structs.replace(record, result=msgspec.structs.replace(record.result, metrics={}))
+    for one, said in ((record, True), (away, False)):
         made = part(
             case.problem,
-            [(record, {"position_t": np.ones(ends)})],
+            [(one, {})],
             looks([case.method]),
             [],
             1,
             brief=False,
             summarized=False,
         )
-        assert (f"the largest of {ends} trajectories" in str(made.summary)) == said
+        assert ("the largest of 32 trajectories" in str(made.summary)) == said
 
 
 def test_times_taken_on_a_busy_machine_say_so(run):

@@ -1,9 +1,7 @@
 """Parts of the reports: numbers behind figures, packing, sections, merging, the list of reports."""
 
 import base64
-import csv
 import gzip
-import io
 from typing import Literal
 
 import msgspec
@@ -15,7 +13,7 @@ from hypothesis import strategies as st
 from hbvm_bench.report import pack
 from hbvm_bench.report.campaign import document, gather
 from hbvm_bench.report.document import Details
-from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, as_csv, as_json, numbers
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, numbers
 from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import write_index
 from hbvm_bench.report.markdown import markdown
@@ -42,11 +40,6 @@ def test_what_is_packed_can_be_unpacked_and_cannot_end_a_script(data):
     assert pack.packed(data) == text
 
 
-def test_the_plotting_library_is_the_installed_one():
-    text = gzip.decompress(base64.b85decode(pack.library().replace(",", "<"))).decode()
-    assert "plotly.js v" in text[:500]
-
-
 def test_the_numbers_of_a_figure_are_those_that_it_draws():
     table = numbers(plot())
     (row,) = table.rows
@@ -57,16 +50,6 @@ def test_the_numbers_of_a_figure_are_those_that_it_draws():
     assert row[table.head.index("at 10")] == "–"
     spread = numbers(plot("dots")).rows[0]
     assert spread[3:6] == ("101", "0", "10")
-
-
-def test_a_figures_csv_has_every_point_and_gaps_stay_gaps():
-    made = plot()
-    rows = list(csv.DictReader(io.StringIO(as_csv(made).decode())))
-    assert len(rows) == 202
-    assert rows[0]["name"] == 'a "b", c'
-    assert rows[100]["y"] == ""
-    encoded = msgspec.json.decode(msgspec.json.encode(as_json(made)))
-    assert encoded["panels"][0]["traces"][0]["y"][100] is None
 
 
 def test_crossings_of_a_circle_are_where_it_passes_the_axis():

@@ -150,7 +150,7 @@ def test_the_report_names_what_was_run_and_is_deterministic(tmp_path):
     result = made(tmp_path, years=1e5, starts=3)
     first = write(endure.document(result), tmp_path / "a")[0].read_bytes()
     assert write(endure.document(result), tmp_path / "b")[0].read_bytes() == first
-    for name in ("index.html", "figures/endure.svg", "figures/endure.png", "data/endure.csv"):
+    for name in ("index.html", "figures/endure.svg"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     assert b"Gauss(s=8, h=1.0)" in first
 

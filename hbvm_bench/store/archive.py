@@ -1,0 +1,158 @@
+"""Runs in one file, small enough for git: a table with a column for everything that is known of a case.
+
+The file is JSON, compressed by ``xz``::
+
+    runs[i].index       what was asked for
+    runs[i].beside      what must be known of problems that do not come with the package
+    runs[i].columns     lists of equal length by the names of `hbvm_bench.store.records.Record`'s fields
+    drawings            figures of series, which the file does not have: a series has a thousand times the
+                        numbers that its figure shows
+
+What was read off the series is in the columns, as it was read when the file was written.
+"""
+
+import lzma
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from hbvm_bench.campaign import own
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.reference import solutions
+from hbvm_bench.store.files import atomic, ensure_writable
+from hbvm_bench.store.records import SCHEMA, Record, decoded
+from hbvm_bench.store.store import Index, Store
+from problems import limits
+from problems.errors import InputError
+
+NAME = "results.json.xz"
+
+
+class Drawing(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A figure as it was drawn; the fields are those of `hbvm_bench.report.figures.canvas.Picture`.
+
+    ``place`` is the name of the part of the page that it stands in.
+    """
+
+    place: str
+    key: str
+    title: str
+    caption: str
+    summary: str
+    svg: str
+    numbers: list[list[str]] = []  # the head, then the rows
+    words: int = 0  # how many columns of these hold words
+    motion: dict[str, Any] | None = None
+    values: bool = False
+
+
+class Table(msgspec.Struct, frozen=True, kw_only=True):
+    """One run: what was asked for, and its records column by column."""
+
+    index: Index
+    columns: dict[str, list[Any]]
+    beside: list[own.Beside] = []
+
+
+class Contents(msgspec.Struct, frozen=True, kw_only=True):
+    """A whole file."""
+
+    runs: list[Table]
+    drawings: list[Drawing] = []
+    schema: int = SCHEMA
+
+
+class Archive:
+    """A run that can be read as a `Store` is; it has drawings in the place of series."""
+
+    def __init__(self, path: Path, table: Table, drawings: Sequence[Drawing] = ()) -> None:
+        self.directory = path
+        self.drawings = drawings
+        self._index = table.index
+        rows = zip(*table.columns.values(), strict=True)
+        named = [dict(zip(table.columns, row, strict=True)) for row in rows]
+        self._records = msgspec.convert(named, list[Record])
+        self._beside = table.beside
+
+    def learn(self) -> None:
+        """Know the problems and references that are stored here, and no other run's."""
+        solutions.forget()
+        for known in self._beside:
+            own.learn(known)
+
+    def index(self) -> Index:
+        """Return what the run was asked to do."""
+        self.learn()
+        return self._index
+
+    def records(self) -> list[Record]:
+        """Return the records with what was read off them, in the order of the campaign."""
+        return self._records
+
+
+def table(index: Index, records: Sequence[Record]) -> Table:
+    """Return records, as `hbvm_bench.measure.reading` reads them, column by column."""
+    rows = [msgspec.to_builtins(record) for record in records]
+    columns = {name: [row[name] for row in rows] for name in Record.__struct_fields__}
+    known = [own.beside(make_problem(text)) for text in dict.fromkeys(r.case.problem for r in records)]
+    return Table(index=index, columns=columns, beside=[one for one in known if one != own.Beside()])
+
+
+def write(path: Path, contents: Contents) -> None:
+    """Write an archive; the same contents give the same bytes.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If the directory cannot be written.
+    """
+    ensure_writable(path.parent)
+    with atomic(path) as temporary:
+        temporary.write_bytes(packed(contents))
+
+
+def packed(contents: Contents) -> bytes:
+    """Return the bytes of an archive."""
+    return lzma.compress(msgspec.json.encode(contents), preset=9 | lzma.PRESET_EXTREME)
+
+
+def read(path: Path) -> list[Archive]:
+    """Read the runs of an archive, in the order in which they were measured.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it is something else, or damaged.
+    """
+    most = int(limits.limit("GIB") * 2**30)
+    try:
+        unpacking = lzma.LZMADecompressor(memlimit=2**28)
+        unpacked = unpacking.decompress(path.read_bytes(), most)
+        if not unpacking.eof:
+            raise ValueError(f"it is cut, or has more than {most} bytes")
+        contents = decoded(unpacked, Contents)
+        if contents.schema != SCHEMA:
+            raise InputError(f"{str(path)!r} was written by another version; run its campaign again.")
+        return [Archive(path, run, contents.drawings) for run in contents.runs]
+    except InputError:
+        raise
+    except (OSError, lzma.LZMAError, msgspec.MsgspecError, ValueError, LookupError, TypeError) as error:
+        raise InputError(f"{str(path)!r} is no archive of results: {error}.") from None
+
+
+def opened(places: Sequence[Path]) -> list[Store] | list[Archive]:
+    """Return the runs at some places: directories with a store, or one archive, or the directory of one.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For an archive among several places: it has no series to draw together with others.
+    """
+    archives = [path for place in places for path in (place, place / NAME) if path.is_file()]
+    if not archives:
+        return [Store(place) for place in places]
+    if len(places) > 1:
+        raise InputError(f"{str(archives[0])!r} is an archive, which makes a report by itself alone.")
+    return read(archives[0])
