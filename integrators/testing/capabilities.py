@@ -111,15 +111,16 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
     program: Any = method.compile(problem.system)
     if not offers(program, Events):
         return "it finds no events"
-    grid, level = irregular(problem), float(problem.y0[0])
+    grid = irregular(problem)
+    plain = integrate(problem, method, grid)
+    level = float(plain.y[:, 0].min() + plain.y[:, 0].max()) / 2.0
 
-    def crossing(q: Any, t: Any) -> Any:
-        return q[0] - level - 1e-3 * (t - problem.t0)
+    def crossing(y: Any, t: Any) -> Any:
+        return y[0] - level - 1e-3 * (t - problem.t0)
 
     begin = program.with_events(problem, {"crossing": Event(crossing)})
     stepper = begin(problem.y0, problem.par, problem.t0, float(grid[-1]))
     require(offers(stepper, EventStepper), "what with_events starts is an EventStepper")
-    plain = integrate(problem, method, grid)
     solution = integrate(problem, method, grid, events=Event(crossing, name="crossing"))
     change = float(np.max(np.abs(solution.y - plain.y)))
     require(change < ROUNDING, f"events change no sample, but by {change:.1e}")
