@@ -18,6 +18,7 @@ from problems.errors import InputError, shown, unknown
 from problems.systems.stored import check_system
 from problems.trace import arguments
 from problems.trace.graph import Graph, Node, T
+from problems.trace.packed import packed, unpacked
 
 Value = float | Sequence[float]
 _NAMED = ("field", "hamiltonian", "force", "velocity_scale")
@@ -130,7 +131,7 @@ class System:
             "guards": list(self.guards),
             "vectors": sorted(self._vectors),
             "bodies": bodies,
-            "graph": self._graph.__getstate__(),
+            "graph": packed(self._graph),
             "functions": {name: function.plain() for name, function in self._written.items()},
         }
 
@@ -142,8 +143,7 @@ class System:
             {key: _parameter(key, value) for key, value in state["parameters"].items()}
         )
         self._layout, self.n_par = _layout(self.parameters)
-        self._graph = Graph.__new__(Graph)
-        self._graph.__setstate__(state["graph"])
+        self._graph = unpacked(state["graph"])
         self._written = {
             name: Function.of_plain(self._graph, plain, name) for name, plain in functions.items()
         }

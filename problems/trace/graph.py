@@ -17,7 +17,7 @@ products by binary powering, ``x**n = (x**(n//2))**2`` times ``x`` for odd ``n``
 
 import math
 import numbers
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -340,13 +340,10 @@ class Graph:
         args: tuple[Node, ...],
         data: Any = None,
         *,
-        key: Hashable = None,
         flags: int = 0,
         loop: Loop | None = None,
     ) -> Node:
-        if key is None:
-            key = (op, *(arg.id for arg in args))
-        found = self._table.get(key)
+        found = self._table.get(key := _key(op, args, data, loop))
         if found is not None:
             return found
         for arg in args:
@@ -365,39 +362,16 @@ class Graph:
         self._table[key] = node
         return node
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the graph as numbers, texts and lists, which JSON and pickle can keep.
+    def keep(self, op: str, args: tuple[Node, ...], data: Any, flags: int, loop: Loop | None) -> Node:
+        """Append an operation as it is, without any rewriting: one of a graph that was packed, or a sum."""
+        node = Node(self, op, args, data, flags, loop)
+        self.nodes.append(node)
+        self._table[_key(op, args, data, loop)] = node
+        return node
 
-        Operations on symbols that stand for something else while functions are derived or emitted are
-        left out, as ``None``: no function depends on them, and they are made again when they are needed.
-        """
-        passing: set[int] = set()
-        nodes: list[list[Any] | None] = []
-        for node in self.nodes:
-            if (node.op == "symbol" and node.data[0] not in _SPACES) or any(
-                a.id in passing for a in node.args
-            ):
-                passing.add(node.id)
-                nodes.append(None)
-            else:
-                inside = [] if node.loop is None else [node.loop.id]
-                nodes.append([node.op, [a.id for a in node.args], _plain(node.data), node.flags, *inside])
-        return {"dof": self.dof, "loops": [loop.rows.tolist() for loop in self.loops], "nodes": nodes}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Make the graph again: the same nodes, with the same numbers. See `problems.trace.stored`."""
-        self.__init__(state["dof"])
-        loops = [self.loop(np.array(rows, dtype=np.int64)) for rows in state["loops"]]
-        for plain in state["nodes"]:
-            if plain is None:
-                self.nodes.append(Node(self, "const", (), 0.0, 0, None))  # which is not found by its key
-                continue
-            op, args, data, flags, *inside = plain
-            loop = loops[inside[0]] if inside else None
-            data = _OF_PLAIN[op](data, loops) if op in _OF_PLAIN else None
-            node = Node(self, op, tuple(self.nodes[i] for i in args), data, int(flags), loop)
-            self.nodes.append(node)
-            self._table[_key(node)] = node
+    def skip(self) -> None:
+        """Append an operation that nothing finds: the place of one that was left out."""
+        self.nodes.append(Node(self, "const", (), 0.0, 0, None))
 
     def loop(self, rows: NDArray[np.int64]) -> Loop:
         """Return the loop over a list of indices, shape (n, width); one object per list."""
@@ -410,27 +384,20 @@ class Graph:
 
     def const(self, value: float) -> Node:
         """Return the node of a literal."""
-        # repr tells 0.0 from -0.0, which compare equal.
-        return self._intern("const", (), value, key=("const", repr(value)))
+        return self._intern("const", (), value)
 
     def symbol(self, space: str, index: int | Affine, *, flags: int, loop: Loop | None = None) -> Node:
         """Return the node of one input: ``space`` is "t", "y", "par" or "out"."""
-        key = ("symbol", space, index, None if loop is None else loop.id)
-        return self._intern("symbol", (), (space, index), key=key, flags=flags, loop=loop)
+        return self._intern("symbol", (), (space, index), flags=flags, loop=loop)
 
     def index(self, affine: Affine, loop: Loop) -> Node:
         """Return the node of a loop index used as a number."""
-        return self._intern("index", (), affine, key=("index", affine, loop.id), loop=loop)
+        return self._intern("index", (), affine, loop=loop)
 
     def sum(self, body: Node, loop: Loop) -> Node:
         """Return the node of a declared sum of ``body`` over ``loop``, in the loop's order."""
-        key = ("sum", body.id, loop.id)
-        found = self._table.get(key)
-        if found is None:
-            found = Node(self, "sum", (body,), loop, body.flags, None)
-            self.nodes.append(found)
-            self._table[key] = found
-        return found
+        found = self._table.get(_key("sum", (body,), loop, None))
+        return self.keep("sum", (body,), loop, body.flags, None) if found is None else found
 
     def node(self, value: Any) -> Node:
         """Return ``value``, a number or a node of this graph, as a node."""
@@ -467,7 +434,7 @@ class Graph:
             return self.sub(a, b.args[0])
         if a.op == "neg":
             return self.sub(b, a.args[0])
-        return self._intern("add", (a, b), key=("add", *sorted((a.id, b.id))))
+        return self._intern("add", (a, b))
 
     def sub(self, a: Node, b: Node) -> Node:
         """Return ``a - b``."""
@@ -509,7 +476,7 @@ class Graph:
             return self.neg(self.mul(a.args[0], b))
         if b.op == "neg":
             return self.neg(self.mul(a, b.args[0]))
-        return self._intern("mul", (a, b), key=("mul", *sorted((a.id, b.id))))
+        return self._intern("mul", (a, b))
 
     def div(self, a: Node, b: Node) -> Node:
         """Return ``a/b``."""
@@ -546,7 +513,7 @@ class Graph:
             return self.mul(base, base)
         if base.op == "const":
             return self.node(self.expanded(base, n))
-        return self._intern("pow", (base,), n, key=("pow", base.id, n))
+        return self._intern("pow", (base,), n)
 
     def expanded(self, base: Node, n: int) -> Node:
         """Return ``base**n``, ``n >= 1``, as products by binary powering."""
@@ -580,7 +547,7 @@ class Graph:
         """Return a piecewise polynomial of ``x``."""
         if x.op == "const":
             return self.node(float(table.at(x.data)))
-        return self._intern("table", (x,), table, key=("table", x.id, table))
+        return self._intern("table", (x,), table)
 
     def apply(self, node: Node, args: tuple[Node, ...]) -> Node:
         """Return the operation of ``node`` on other arguments."""
@@ -599,58 +566,21 @@ class Graph:
                 return self.call(node.op, *args)
 
 
-_SPACES = ("t", "y", "par")
-
-
-def _affine(plain: Sequence[Any]) -> Affine:
-    return Affine(tuple(int(c) for c in plain[0]), int(plain[1]))
-
-
-_OF_PLAIN: dict[str, Callable[[Any, list[Loop]], Any]] = {
-    "const": lambda data, _: float(data),
-    "symbol": lambda data, _: (
-        data[0],
-        data[1] if isinstance(data[1], int) else _affine(data[1]),
-    ),
-    "index": lambda data, _: _affine(data),
-    "pow": lambda data, _: int(data),
-    "sum": lambda data, loops: loops[data],
-    "table": lambda data, _: Table(tuple(map(float, data[0])), tuple(tuple(map(float, r)) for r in data[1])),
-}
-"""What `Node.data` is, from what `_plain` returns."""
-
-
-def _plain(data: Any) -> Any:
-    match data:
-        case Loop():
-            return data.id
-        case Table():
-            return [list(data.knots), [list(row) for row in data.rows]]
-        case Affine():
-            return [list(data.coefficients), data.offset]
-        case (space, place):
-            return [space, _plain(place)]
-    return data
-
-
-def _key(node: Node) -> Hashable:
-    """Return what a node is found by, as the methods of `Graph` that make nodes write it."""
-    args = tuple(arg.id for arg in node.args)
-    match node.op:
+def _key(op: str, args: tuple[Node, ...], data: Any, loop: Loop | None) -> Hashable:
+    """Return what an operation is found by: the same for all that have the same value."""
+    match op:
         case "const":
-            return "const", repr(node.data)
-        case "symbol":
-            return "symbol", *node.data, None if node.loop is None else node.loop.id
-        case "index":
-            assert node.loop is not None
-            return "index", node.data, node.loop.id
-        case "sum":
-            return "sum", *args, node.data.id
-        case "pow" | "table":
-            return node.op, *args, node.data
+            return op, repr(data)  # which tells 0.0 from -0.0; they compare equal
+        case "symbol" | "index":
+            return op, data, None if loop is None else loop.id
         case "add" | "mul":
-            return node.op, *sorted(args)
-    return node.op, *args
+            a, b = args
+            return (op, a.id, b.id) if a.id <= b.id else (op, b.id, a.id)
+        case "pow" | "table":
+            return op, args[0].id, data
+        case "sum":
+            return op, args[0].id, data.id
+    return op, *(arg.id for arg in args)
 
 
 def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:

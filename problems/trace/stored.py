@@ -81,7 +81,7 @@ class StoredGraph:
     Parameters
     ----------
     state : mapping
-        What ``Graph.__getstate__`` returns.
+        What `problems.trace.packed.packed` returns.
     shape : Shape
         Of the system.
 
