@@ -12,6 +12,7 @@ from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.summaries.table import Table
+from integrators.methods.automatic import exact_k
 from integrators.protocol import MethodBase
 from problems import emit
 from problems.analysis import structure
@@ -109,7 +110,7 @@ def _describe(name: str, problem: Problem) -> Findings:
         dimension=system.dim,
         separable=system.separable,
         degree=degree,
-        exact=() if degree is None else tuple((s, structure.exact_k(degree, s)) for s in DEGREES),
+        exact=() if degree is None else tuple((s, exact_k(degree, s)) for s in DEGREES),
         cyclic=tuple("q" if system.dof == 1 else f"q{place + 1}" for place in cyclic),
         depends_on_time=structure.depends_on_time(system),
         invariants=tuple(system.invariants),

@@ -2,7 +2,7 @@
 
 import math
 
-from problems.analysis.structure import degree, exact_k
+from problems.analysis.structure import degree
 from problems.systems.base import System
 
 FEW, MANY = 8, 16
@@ -18,6 +18,21 @@ DEFECT = 3e-17
 """Largest error allowed to a step's quadrature, as the last coefficient that k nodes see estimates it.
 
 The error itself is much smaller than this estimate."""
+
+
+def exact_k(nu: int, s: int) -> int:
+    """Return the least k with which HBVM(k, s) keeps a polynomial energy of degree nu exactly.
+
+    ``k >= nu s/2`` makes the line integral exact (L. Brugnano, F. Iavernaro, T.
+    Susca, "Numerical comparisons between Gauss-Legendre methods and Hamiltonian
+    BVMs defined over Gauss points"); never less than s.
+
+    Parameters
+    ----------
+    nu, s : int
+        Degree of the energy, and of the method's polynomial.
+    """
+    return max(s, -(-nu * s // 2))
 
 
 def choose(system: System, tol: float) -> tuple[int, int, float | None]:

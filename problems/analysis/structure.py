@@ -76,21 +76,6 @@ def _degree(node: Node, known: dict[int, float | None], par: list[float] | None)
             return 0 if not node.flags & STATE else None
 
 
-def exact_k(nu: int, s: int) -> int:
-    """Return the least k with which HBVM(k, s) keeps a polynomial energy of degree nu exactly.
-
-    ``k >= nu s/2`` makes the line integral exact (L. Brugnano, F. Iavernaro, T.
-    Susca, "Numerical comparisons between Gauss-Legendre methods and Hamiltonian
-    BVMs defined over Gauss points"); never less than s.
-
-    Parameters
-    ----------
-    nu, s : int
-        Degree of the energy, and of the method's polynomial.
-    """
-    return max(s, -(-nu * s // 2))
-
-
 def depends_on_time(system: System) -> bool:
     """Whether the energy, or the vector field where there is none, contains the time itself."""
     function = system.energy or system.function("field")

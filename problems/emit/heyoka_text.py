@@ -20,7 +20,7 @@ class _HeyokaPrinter(Printer):
             self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
         elif node.op in FUNCTIONS and node.op not in _FUNCTIONS:
             raise InputError(
-                f"heyoka cannot compute m.{node.op} to all digits; use another library's method."
+                f"heyoka cannot compute m.{node.op} to all digits; use a method of another library."
             )
         else:
             super().let(node, index)
@@ -28,7 +28,7 @@ class _HeyokaPrinter(Printer):
     def look_up(self, node: Node) -> None:
         raise InputError(
             "m.table is pieces of polynomials, of which a Taylor series sees one only; "
-            "use HBVM, Gauss or another method."
+            "use a method that needs no Taylor series."
         )
 
     def store(self, place: int, value: str) -> None:

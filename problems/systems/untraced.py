@@ -84,7 +84,6 @@ class Foreign(System):
         self.f = f
         self.takes_parameters, self.in_place = _form(f)
         self.numba = hasattr(f, "py_func") and hasattr(f, "inspect_llvm")
-        self.native: dict[int, tuple[int, Any]] = {}  # what the kernel makes of it, by lanes
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with the function itself, which pickle can keep and JSON cannot."""
@@ -107,8 +106,8 @@ class Foreign(System):
         if name == "field":
             kind = self.written.partition(",")[0]
             raise InputError(
-                f"{self.name} is not traced: its field is a {kind}, which HBVM, Gauss, DOP853 and Radau "
-                "integrate; write it as a VectorField or Hamiltonian for the others."
+                f"{self.name} is not traced: its field is a {kind}; write it as a VectorField or "
+                "Hamiltonian for what needs the formula."
             )
         return super().function(name)
 

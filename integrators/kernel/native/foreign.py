@@ -8,6 +8,7 @@ import ctypes
 from collections.abc import Callable
 from time import perf_counter
 from typing import Any
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from integrators.kernel.native.field import ONE_BY_ONE, compile_field
 from problems import emit
 from problems.systems.base import System
 from problems.systems.untraced import Foreign
+
+_made: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionary()
+"""The address of each field by lanes, and what keeps it alive: as long as its system is there."""
 
 
 def field_of(system: System, what: emit.What, lanes: int) -> binary.Native:
@@ -32,10 +36,11 @@ def field_of(system: System, what: emit.What, lanes: int) -> binary.Native:
         return compile_field(system, what, lanes)
     started = perf_counter()
     with binary.lock:  # two of them would leave one thread with the address of what the other throws away
-        known = lanes in system.native
+        made = _made.setdefault(system, {})
+        known = lanes in made
         if not known:
-            system.native[lanes] = (_compiled if system.numba else _called)(system, lanes)
-        address, _ = system.native[lanes]
+            made[lanes] = (_compiled if system.numba else _called)(system, lanes)
+        address, _ = made[lanes]
     return binary.Native(address, ONE_BY_ONE, known, perf_counter() - started)
 
 
@@ -108,6 +113,7 @@ def _compiled(system: Foreign, lanes: int) -> tuple[int, Any]:
 def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
     """Return the address of a callback to a Python field, and what keeps it alive."""
     dim, size = system.dim, system.n_par
+    owner = ref(system)  # which holds this callback, not the other way round
     line, block, numbers = (ctypes.c_double * n for n in (lanes, dim * lanes, size))
 
     def view(kind: Any, address: int) -> Any:
@@ -124,12 +130,14 @@ def _called(system: Foreign, lanes: int) -> tuple[int, Any]:
             given = view(numbers, par).copy() if size else np.empty(0)
             derivatives = np.empty((lanes, dim))
             behind: tuple[Any, ...] = ()
+            evaluated = owner()
+            assert evaluated is not None  # who steps holds its system
             with np.errstate(all="ignore"):
                 for time, state, derivative in zip(times, states, derivatives, strict=True):
                     if behind and time == behind[0] and (state == behind[1]).all():
                         derivative[:] = behind[2]  # idle lanes repeat the last stage
                     else:
-                        system.evaluate(time, state, given, derivative)
+                        evaluated.evaluate(time, state, given, derivative)
                     behind = time, state, derivative
             out[:] = derivatives.T
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code

@@ -10,11 +10,11 @@ from scipy.integrate import DenseOutput
 
 import integrators
 from integrators.kernel.fixed import FixedStepper
-from integrators.methods.automatic import DEFECT
+from integrators.methods.automatic import DEFECT, exact_k
 from integrators.plugins.scipy.field import Field
 from integrators.protocol import Samples, Status
 from integrators.running.times import plan
-from problems.analysis.structure import degree, exact_k
+from problems.analysis.structure import degree
 from problems.systems.base import System
 
 LANES = 8  # stages that the field takes at a time: fewer cost as much

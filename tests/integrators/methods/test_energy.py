@@ -8,7 +8,16 @@ import pytest
 
 import integrators
 from integrators import HBVM, Gauss
+from integrators.methods.automatic import exact_k
 from problems import Hamiltonian, Problem
+
+
+@pytest.mark.parametrize(
+    ("nu", "s", "k"),
+    [(5, 2, 5), (5, 3, 8), (5, 5, 13), (2, 4, 4), (1, 3, 3), (3, 2, 3), (4, 1, 2), (18, 2, 18)],
+)
+def test_k_is_half_the_degree_times_s_and_at_least_s(nu, s, k):
+    assert exact_k(nu, s) == k
 
 
 def polynomial(degree):

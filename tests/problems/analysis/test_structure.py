@@ -57,14 +57,6 @@ def test_a_product_with_a_parameter_that_is_zero_drops_out():
     assert structure.degree(system, system.pack({"beta": 0.0, "alpha": 0.0})) == 2
 
 
-@pytest.mark.parametrize(
-    ("nu", "s", "k"),
-    [(5, 2, 5), (5, 3, 8), (5, 5, 13), (2, 4, 4), (1, 3, 3), (3, 2, 3), (4, 1, 2), (18, 2, 18)],
-)
-def test_k_is_half_the_degree_times_s_and_at_least_s(nu, s, k):
-    assert structure.exact_k(nu, s) == k
-
-
 def test_cyclic_coordinates_are_those_that_do_not_occur():
     found = findings.inspect("(p1^2 + p2^2 + p3^2)/2 + q1^2 + q1*p3")
     assert found.cyclic == ("q2", "q3")

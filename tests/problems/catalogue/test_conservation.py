@@ -5,6 +5,7 @@ import pytest
 
 import integrators
 import problems
+from integrators.methods.automatic import exact_k
 from problems import registry
 from problems.analysis import structure
 
@@ -33,7 +34,7 @@ def test_energy_stays_at_rounding(name):
 )
 def test_polynomial_energies_need_k_of_half_the_degree_times_s(name, h):
     problem = problems.load(name)
-    k = structure.exact_k(structure.degree(problem.system, problem.par), 2)
+    k = exact_k(structure.degree(problem.system, problem.par), 2)
     times = np.arange(0, 101) * h
     exact = integrators.integrate(problem, integrators.HBVM(k=k, s=2, h=h), times=times)
     less = integrators.integrate(problem, integrators.HBVM(k=k - 1, s=2, h=h), times=times)

@@ -1,7 +1,9 @@
 """Fields that are not traced: numba functions and any Python functions."""
 
+import gc
 import math
 import re
+import weakref
 from collections import deque
 from functools import partial
 
@@ -12,6 +14,7 @@ import pytest
 import integrators
 import integrators.kernel.events.search
 from integrators import HBVM, Event, Gauss, LineIntegral, integrate
+from integrators.kernel.native import foreign
 from integrators.protocol import Status
 from problems import Foreign, InputError, Problem, VectorField, emit
 
@@ -248,6 +251,18 @@ def test_methods_that_need_formulas_refuse_with_the_reason(method):
         integrate(started(WRITTEN["python"]), method)
     with pytest.raises(InputError, match="van_der_pol is not traced: its field is a Python function"):
         emit.source(WRITTEN["python"], "field", "numba")
+
+
+@pytest.mark.parametrize("kind", ["python", "numba"])
+def test_what_the_kernel_makes_of_a_field_goes_with_its_system(kind):
+    written = WRITTEN[kind]
+    system = Foreign(written.f, dim=written.dim)
+    integrate(Problem(system, y0=[2.0, 0.0], t_end=0.5), METHODS[0], times=[0.5])
+    assert system in foreign._made
+    gone = weakref.ref(system)
+    del system
+    gc.collect()
+    assert gone() is None
 
 
 def test_events_and_checkpoints_work_as_ever():
