@@ -13,11 +13,12 @@ from .references import exact, forced_oscillator, primitive
 from .shape import Shape
 
 GROUP = "at rest"
+STAIRCASE = "at rest on a staircase of rounding"  # tanh + 1 far before the switch is 0, 1.1e-16, 2.2e-16, ...
 
 
-def _shape(name, f, dim, parameters, span, member, reference, draws=8):
+def _shape(name, f, dim, parameters, span, member, reference, draws=8, group=GROUP):
     return Shape(
-        GROUP, name, VectorField(f, dim=dim, parameters=parameters, name=name), span, member, reference, draws
+        group, name, VectorField(f, dim=dim, parameters=parameters, name=name), span, member, reference, draws
     )
 
 
@@ -122,6 +123,7 @@ SHAPES = [
         _switch,
         exact(_switched),
         12,
+        STAIRCASE,
     ),
     _shape(
         "pulse from 0",

