@@ -8,12 +8,11 @@ from scipy.special import erf
 from problems import VectorField
 
 from .general import _forward
-from .pulsed import PARAMETERS, gauss, long_span, pulse
+from .pulsed import PARAMETERS, STAIRCASE, gauss, long_span, pulse
 from .references import exact, forced_oscillator, primitive
 from .shape import Shape
 
 GROUP = "at rest"
-STAIRCASE = "at rest on a staircase of rounding"  # tanh + 1 far before the switch is 0, 1.1e-16, 2.2e-16, ...
 
 
 def _shape(name, f, dim, parameters, span, member, reference, draws=8, group=GROUP):

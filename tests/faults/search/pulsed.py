@@ -11,6 +11,7 @@ from .references import dop853, exact, forced_oscillator
 from .shape import Shape
 
 GROUP = "pulsed"
+STAIRCASE = "at rest on a staircase of rounding"  # a difference of tanh is 0, 1.1e-16, 2.2e-16, ...
 NARROW = "pulsed, narrower than the nodes"
 
 WIDTH = 0.1, 2.0  # of pulses that the methods are to see
@@ -123,7 +124,7 @@ def _field(group, name, f, dim, parameters, member, reference, draws=8):
 
 SHAPES = [
     *(
-        _oscillator(profile, rest)
+        _oscillator(profile, rest, group=STAIRCASE if profile is plateau and rest else GROUP)
         for profile in (gauss, sech2, lorentz, doublet, packet, plateau)
         for rest in (True, False)
     ),

@@ -2,8 +2,7 @@
 
 import pytest
 
-from .at_rest import STAIRCASE
-from .pulsed import NARROW
+from .pulsed import NARROW, STAIRCASE
 from .table import SHAPES, search, table
 from .ways import FAILED, SILENT
 
