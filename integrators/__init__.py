@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from integrators.running.poincare import section as section
 
 __all__ = [
+    "HBVM",
+    "Event",
+    "Gauss",
     "MethodBase",
     "Progress",
     "Samples",
@@ -32,10 +35,14 @@ __all__ = [
     "Solutions",
     "Stats",
     "Status",
+    "advise",
     "integrate",
     "integrate_many",
     "load",
+    "order_of",
     "registry",
+    "section",
+    "stability",
 ]
 
 _LATER = {  # imported when first used

@@ -11,6 +11,8 @@ from problems import limits
 from problems.checks import Must, at_least, checked, number, numbers, refusal
 from problems.errors import shown
 
+__all__ = ["Absolute", "Count", "Landings", "NotNegative", "Share", "Stages", "Step", "Tolerance"]
+
 SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
 

@@ -69,6 +69,32 @@ from problems.checks import checked
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
 
+__all__ = [
+    "CAPABILITIES",
+    "SAMPLINGS",
+    "AsHBVM",
+    "Batches",
+    "Checkpoints",
+    "Destination",
+    "EventStepper",
+    "Events",
+    "Interruptible",
+    "KeptError",
+    "MethodBase",
+    "PieceSize",
+    "PreparedBatches",
+    "Program",
+    "Samples",
+    "Samplings",
+    "Stats",
+    "Status",
+    "Stepper",
+    "Threads",
+    "Trajectories",
+    "UserError",
+    "offers",
+]
+
 Array = NDArray[np.float64]
 
 SAMPLINGS = ("side", "steps", "land", "dense")

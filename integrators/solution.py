@@ -154,7 +154,9 @@ class Solution:
             )
         found = np.empty((wanted.size, self.problem.system.dim))
         sample = np.searchsorted(sign * at, wanted, side="right") - 1
-        close = max(ROUNDING, getattr(self.method, "tol", None) or 0.0) * np.abs(states).max(axis=0)
+        close = max(ROUNDING, self.method.options(defaults=True).get("tol") or 0.0) * np.abs(states).max(
+            axis=0
+        )
         intervals, first, count = np.unique(sample), 0, 1
         while first < intervals.size:
             group = intervals[first : first + count]

@@ -25,6 +25,8 @@ from integrators.running.watchdog import Crawl
 from problems.errors import unknown
 from problems.problem import System
 
+__all__ = ["FixedStep", "FixedStepper", "March", "ProgramBase", "RestorableStepper", "StepperBase"]
+
 
 class ProgramBase(Compiled):
     """A method compiled for one system; satisfies `integrators.protocol.Program`.

@@ -7,6 +7,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
+_places: dict[str, str] = {}  # of modules, by their former names
+
 
 class _Moved(ModuleType):
     """Stands in `sys.modules` under a former name; gives what the module at its new place has."""
@@ -42,4 +44,10 @@ def moved(package: str, modules: Mapping[str, str], *, removed_in: str) -> None:
     """
     for former, present in modules.items():
         path = f"{package}.{former}"
-        sys.modules[path] = _Moved(path, f"{package}.{present}", removed_in)
+        _places[path] = f"{package}.{present}"
+        sys.modules[path] = _Moved(path, _places[path], removed_in)
+
+
+def place(module: str) -> str:
+    """Return the present name of a module, as files of an earlier version need it."""
+    return _places.get(module, module)

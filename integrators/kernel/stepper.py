@@ -35,7 +35,7 @@ from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import Counts
 from integrators.running.watchdog import Crawl
-from problems.errors import unknown
+from problems.errors import InputError, unknown
 from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
@@ -336,6 +336,11 @@ class HBVMStepper(ABC):
             other parameters; the stepper stays where it is.
         """
         self._identity.check(checkpoint, Checkpoint)
+        if checkpoint.words.size != len(self._places):
+            raise InputError(
+                "this checkpoint is of another version of hbvm-bench, whose steps depend on other numbers; "
+                "restore it with that version, or begin anew."
+            )
         self._context.words[self._places] = checkpoint.words
         self._set_step(self._context.h)
         for name, array in zip(self._kept, checkpoint.arrays, strict=True):

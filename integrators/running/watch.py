@@ -1,6 +1,7 @@
 """A long integration, watched: how far it is, what is kept of it in a file, and Ctrl-C."""
 
 import hashlib
+import io
 import json
 import os
 import pickle
@@ -16,12 +17,12 @@ import numpy as np
 
 from integrators.protocol import Array, MethodBase, Stats
 from integrators.solution import write_whole
-from problems import emit
+from problems import deprecated, emit
 from problems.errors import InputError, shown
 from problems.problem import Problem
 from problems.systems.code_digest import code_digest
 
-MAGIC = b"hbvm-bench checkpoint 1"
+MAGIC, VERSION = b"hbvm-bench checkpoint ", 2
 SOON = 0.1  # seconds from one look to the next, about
 
 
@@ -119,7 +120,7 @@ class Watch:
             return
         kept = pickle.dumps(self._kept, protocol=5)
         head = json.dumps(self._identity).encode()
-        parts = [MAGIC, head, hashlib.sha256(kept).hexdigest().encode(), kept]
+        parts = [MAGIC + str(VERSION).encode(), head, hashlib.sha256(kept).hexdigest().encode(), kept]
         try:
             write_whole(self._path, lambda file: file.write(b"\n".join(parts)))
             self.failure = ""
@@ -159,14 +160,19 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
     where = shown(str(path))
     try:
         magic, head, digest, kept = Path(path).read_bytes().split(b"\n", 3)
-        whole = magic == MAGIC and hashlib.sha256(kept).hexdigest().encode() == digest
-        found = json.loads(head) if whole else {}
+        whole = magic.startswith(MAGIC) and hashlib.sha256(kept).hexdigest().encode() == digest
+        found, version = (json.loads(head), int(magic.removeprefix(MAGIC))) if whole else ({}, 0)
     except FileNotFoundError:
         raise InputError(f"there is no checkpoint {where} to resume; leave out resume=.") from None
     except (OSError, ValueError):
-        whole, found, kept = False, {}, b""
+        whole, found, kept, version = False, {}, b"", 0
     if not whole:
         raise InputError(f"{where} is not a checkpoint of integrate, or is damaged; leave out resume=.")
+    if version not in READERS:
+        raise InputError(
+            f"{where} is a checkpoint of format {version}, and this version reads "
+            f"{' and '.join(map(str, READERS))}; resume it with the version that wrote it."
+        )
     for what, value in wanted.items():
         if found.get(what) != value:
             other = f"{found.get('method')} on {found.get('problem')}"
@@ -174,7 +180,22 @@ def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, A
                 f"{where} is a checkpoint of {other}, with other {what} than here ({shown(value)}); "
                 "resume that integration, or leave out resume=."
             )
-    return pickle.loads(kept)
+    return READERS[version](_Unpickler(io.BytesIO(kept)).load())
+
+
+class _Unpickler(pickle.Unpickler):
+    """Finds classes whose modules have moved since."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class of a file, by the name that its module has now."""
+        return super().find_class(deprecated.place(module), name)
+
+
+READERS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    1: lambda kept: kept["way"],
+    VERSION: lambda kept: kept,
+}
+"""What is kept, from a file of this format or the last one."""
 
 
 def both(before: Stats, now: Stats) -> Stats:

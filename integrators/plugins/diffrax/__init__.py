@@ -40,6 +40,8 @@ from integrators.plugins.diffrax.fixed_point import FixedPoint  # noqa: E402
 from integrators.plugins.diffrax.interpolation import LegendreInterpolation  # noqa: E402
 from integrators.plugins.rule import FARTHEST, FLOOR, MODES  # noqa: E402
 
+__all__ = ["HBVM", "FixedPoint", "Gauss"]
+
 DENSE = 48  # unknowns up to which derivatives solve by LU; GMRES beyond
 
 

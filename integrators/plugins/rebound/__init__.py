@@ -29,6 +29,8 @@ from integrators.plugins.rebound import layout
 from integrators.plugins.rule import MODES
 from problems.errors import InputError
 
+__all__ = ["install"]
+
 rebound = layout.rebound
 
 NAME = "hbvm"
