@@ -18,8 +18,7 @@ PI_SQUARED = math.pi * math.pi
 
 
 def _energy(q, p, par, m):
-    r = m.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
-    stretch = r - par.l0
+    stretch = m.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) - par.l0
     kinetic = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) / (2 * par.m)
     return kinetic + (par.k * (stretch * stretch) / 2 + par.m * par.g * q[2])
 

@@ -525,8 +525,8 @@ class Graph:
 
     def call(self, name: str, *args: Node) -> Node:
         """Return the elementary function ``name`` of its arguments."""
-        if all(arg.op == "const" for arg in args):
-            numbers = [arg.data for arg in args]
+        numbers = [arg.data for arg in args if arg.op == "const"]
+        if len(numbers) == len(args):
             try:
                 return self.node(FUNCTIONS[name].value(*numbers))
             except (ValueError, OverflowError):
@@ -576,11 +576,13 @@ def _key(op: str, args: tuple[Node, ...], data: Any, loop: Loop | None) -> Hasha
         case "add" | "mul":
             a, b = args
             return (op, a.id, b.id) if a.id <= b.id else (op, b.id, a.id)
+        case "sub" | "div":
+            return op, args[0].id, args[1].id
         case "pow" | "table":
             return op, args[0].id, data
         case "sum":
             return op, args[0].id, data.id
-    return op, *(arg.id for arg in args)
+    return op, *[arg.id for arg in args]
 
 
 def reachable(roots: Iterable[Node], within: Loop | None = None) -> list[Node]:
