@@ -1,6 +1,7 @@
 """What the entries of a campaign file say: problems, methods, ensembles, limits, timing, checks."""
 
 import re
+from datetime import datetime
 from typing import Annotated, Literal
 
 import msgspec
@@ -131,6 +132,11 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     alone : str
         Why the energy is compared without the position or the phase; without a reason such a
         goal is void.
+    declared : str
+        When it was declared, such as ``"2026-11-20"``, with the time of the day where that matters. A run
+        writes there when it first had the goal, unless the file says it.
+    measured : str
+        When what it is about had been measured first, if that was before; a run writes it.
     """
 
     words: str = ""
@@ -143,10 +149,23 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     within: Accuracy = {}
     no_worse: Accuracy = {}
     alone: str = ""
+    declared: str = ""
+    measured: str = ""
 
     def __post_init__(self) -> None:
+        for name in ("declared", "measured"):
+            _check_date(name, getattr(self, name))
         if (self.at is None) == (self.ratio is None) or (self.ratio is None) == bool(self.against):
             raise InputError("a goal has either at=, or against= and ratio=.")
+
+
+def _check_date(name: str, given: str) -> None:
+    try:
+        datetime.fromisoformat(given or "2026-01-01")
+    except ValueError:
+        raise InputError(
+            f'{name}={shown(given)} of a goal must be a date such as "2026-11-20" or "2026-11-20T18:30".'
+        ) from None
 
 
 class ProblemEntry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

@@ -2,14 +2,17 @@
 
 import shlex
 import sys
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 import typer
+from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Campaign, Grid, MethodEntry, ProblemEntry, file_of, load
+from hbvm_bench.campaign.file import Campaign, Goal, Grid, MethodEntry, ProblemEntry, file_of, load
 from hbvm_bench.campaign.identity import Resolved, make_method
 from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.campaign.spec import file_of as python_file_of
@@ -165,7 +168,8 @@ def carry_out(
             cases = loop.plan(campaign)
         with store.locked():
             ids = [case.id for case in cases]
-            index = Index(campaign=campaign, ids=ids, version=version("hbvm-bench"), command=command)
+            asked = dated(campaign, store)
+            index = Index(campaign=asked, ids=ids, version=version("hbvm-bench"), command=command)
             store.write_index(index)
             try:
                 _run(campaign, cases, store, pool, timing)
@@ -174,6 +178,25 @@ def carry_out(
             except UnfinishedRunError as error:
                 raise _given_up(str(error), ids, store, UNFINISHED) from None
     return store
+
+
+def dated(campaign: Campaign, store: Store) -> Campaign:
+    """Return a campaign whose goals say when this run first had them, and what it had measured before.
+
+    A goal that the run had before keeps its dates; they are of the goal as it is, and another one is new.
+    """
+    had = {_undated(one): one for one in store.goals()}
+    new = {_undated(one): one for one in campaign.goals if _undated(one) not in had}
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    ended = [one.finished for one in store.everything() if one.finished] if new else []
+    first = min(ended, default="")
+    for key, one in new.items():
+        had[key] = replace(one, declared=one.declared or now, measured=one.measured or first)
+    return replace(campaign, goals=[had[_undated(goal)] for goal in campaign.goals])
+
+
+def _undated(goal: Goal) -> bytes:
+    return msgspec.json.encode(replace(goal, declared="", measured=""))
 
 
 def _say(sentence: str) -> None:

@@ -130,10 +130,25 @@ def interleaved(
     return taken
 
 
+def chooses(number: int) -> bool:
+    """Whether a round of the timing pass, from 0, chooses settings; the others compare what was chosen.
+
+    The fastest of many settings is partly the luckiest, and the times that chose it would flatter whoever has
+    more settings. Each kind has as many rounds in either order where these alternate.
+    """
+    return number % 4 in (0, 3)
+
+
 def spread_evenly(count: int, rounds: int) -> list[int]:
-    """Return so many of the rounds, at least one and at most all, spread evenly."""
-    count = max(1, min(rounds, count))
-    return [number * rounds // count for number in range(count)]
+    """Return so many of the rounds, at least two and at most all, spread evenly.
+
+    Some of them choose settings, and others compare them.
+    """
+    count = max(min(2, rounds), min(rounds, count))
+    chosen = [number * rounds // count for number in range(count)]
+    if rounds > 1 and len({*map(chooses, chosen)}) == 1:  # 0 chooses, 1 does not
+        chosen = [0, 1, *(number for number in chosen if number > 1)][: len(chosen)]
+    return chosen
 
 
 @dataclass(frozen=True)

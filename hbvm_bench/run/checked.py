@@ -29,6 +29,8 @@ from problems.errors import InputError, unknown
 LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
 """Under less no case can begin: an interpreter with NumPy alone takes 0.05 GiB."""
 
+SHORTEST = 0.02  # seconds of a sample
+
 TIMES = ("warm_seconds", "throughput")
 """Metrics that only the timing pass has."""
 
@@ -69,6 +71,11 @@ def _limits(limits: Limits) -> None:
 
 
 def _timing(plan: TimingPlan) -> None:
+    if plan.shortest < SHORTEST:
+        raise InputError(
+            f"shortest={plan.shortest!r} of timing is too short for a clock to be trusted; give at least "
+            f"{SHORTEST}: shorter runs are repeated."
+        )
     for name in ("samples",) if plan.interleaved else ("order", "clock"):
         if (given := getattr(plan, name)) != getattr(TimingPlan(), name):
             other = str(not plan.interleaved).lower()

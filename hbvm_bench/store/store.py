@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.campaign import own
-from hbvm_bench.campaign.file import Campaign, Case
+from hbvm_bench.campaign.file import Campaign, Case, Goal
 from hbvm_bench.campaign.identity import make_method, make_problem, of_method
 from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
@@ -198,6 +198,12 @@ class Store:
         for path in (self.directory / PROBLEMS).glob("[!.]*.json"):
             with suppress(OSError, ValueError, LookupError, TypeError):  # damaged: whoever needs it says so
                 own.learn(decoded(path.read_bytes(), own.Beside))
+
+    def goals(self) -> list[Goal]:
+        """Return the goals of the run that is here, with their dates; none where there is no run."""
+        with suppress(OSError, ValueError):
+            return decoded((self.directory / INDEX).read_bytes(), Index).campaign.goals
+        return []
 
     def index(self) -> Index:
         """Return what the run was asked to do.

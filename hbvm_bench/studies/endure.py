@@ -153,7 +153,7 @@ def lines(result: Endurance) -> list[Line]:
     for record in result.run.records:
         errors = result.errors.get(record.case.method, np.empty((0, 0)))
         rms = drift.rms(errors[:, np.isin(result.t, years)]).tolist() if errors.size else []
-        ratio = standings.compare(ours, record).ratio
+        ratio = standings.compare(ours, record, chosen=True).ratio
         made.append(
             Line(
                 method=record.case.method,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Literal
 
 import msgspec
@@ -16,6 +17,9 @@ from hbvm_bench.summaries.rows import format_metric
 from hbvm_bench.summaries.standings import Comparison
 from hbvm_bench.summaries.table import NONE, Table
 
+OTHER_WORK = 0.1  # of a core: with more beside the times, no speed is judged
+TIMES = ("warm_seconds", "throughput")
+
 PLACE = ("position", "phase", "z_error")
 """With what the metrics begin that say where a run is, not only on which level of energy."""
 
@@ -29,8 +33,9 @@ class Verdict:
     words: str  # what it is about
     asked: str
     measured: str
-    verdict: Literal["reached", "missed", "void"]  # void: energies are compared without positions
-    why: str  # why nothing was measured, or why it is void
+    # void: energies are compared without positions; not judged: the machine had other work
+    verdict: Literal["reached", "missed", "void", "not judged"]
+    why: str  # why nothing was measured, or why it is void or not judged
     comparison: Comparison  # the cases that decide; for a goal without a peer it has only ours
     records: Sequence[Record]  # of all cases on the problem
 
@@ -38,6 +43,14 @@ class Verdict:
     def reached(self) -> bool:
         """Whether it is."""
         return self.verdict == "reached"
+
+    @property
+    def declared(self) -> str:
+        """When it was declared, and whether that was after the first measurement."""
+        if not self.goal.declared:
+            return "not recorded"
+        late = self.goal.measured and is_after(self.goal.declared, self.goal.measured)
+        return self.goal.declared[:10] + ", after the first measurement" * bool(late)
 
 
 def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
@@ -59,16 +72,36 @@ def verdicts(campaign: Campaign, records: Sequence[Record]) -> list[Verdict]:
 def table(found: Sequence[Verdict]) -> Table:
     """Return the goals as a table."""
     return Table(
-        "Goals declared before the run",
-        ("problem", "goal", "asked", "measured", "verdict"),
-        [(standings.title_of(one.entry), one.words, one.asked, one.measured, said(one)) for one in found],
-        words=(0, 1, 4),
+        "Goals",
+        ("problem", "goal", "declared", "asked", "measured", "verdict"),
+        [
+            (standings.title_of(one.entry), one.words, one.declared, one.asked, one.measured, said(one))
+            for one in found
+        ],
+        words=(0, 1, 2, 5),
     )
 
 
 def said(found: Verdict) -> str:
     """Return the verdict, with the reason where there is one."""
     return f"{found.verdict}: {found.why}" if found.why else found.verdict
+
+
+def is_after(date: str, other: str) -> bool:
+    """Whether one date is after another; where one has no time of the day, by their days."""
+    length = min(len(date), len(other))
+    return date[:length] > other[:length]
+
+
+def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
+    """Return why a speed is not judged: other work while its times were taken; else ``""``."""
+    timings = [one.timing for one in records if one is not None and one.timing is not None]
+    if goal.metric not in TIMES or not timings:
+        return ""
+    loads = [one.load for one in timings if one.load is not None]
+    shares = [1.0 - median(round_.share for round_ in one.rounds) for one in timings if one.rounds]
+    most = max([0.0, *shares, *(max(load.others, load.stolen) for load in loads)])
+    return f"other work took {most:.0%} of a core meanwhile" if most > OTHER_WORK else ""
 
 
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
@@ -80,6 +113,7 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
     metric, able = METRICS[goal.metric], standings.among(records, goal.method)
     ours = standings.best(able, goal.within, goal.metric)
     reached = ours is not None and (number(ours, goal.metric) or 0.0) <= goal.at
+    busy = disturbed(goal, [ours])
     missing = (one.result.metrics[goal.metric].why for one in able if goal.metric in one.result.metrics)
     return Verdict(
         goal=goal,
@@ -87,8 +121,8 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
         words=goal.words or f"{metric.label} of {goal.method or 'ours'}",
         asked=f"≤ {goal.at:g}",
         measured=NONE if ours is None else format_metric(ours, goal.metric),
-        verdict="reached" if reached else "missed",
-        why=next(missing, "") if ours is None else "",
+        verdict="not judged" if busy else "reached" if reached else "missed",
+        why=next(missing, "") if ours is None else busy,
         comparison=Comparison(ours, None),
         records=records,
     )
@@ -96,20 +130,25 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
 
 def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: float) -> Verdict:
     within = goal.within if goal.within or goal.no_worse else entry.within
-    theirs = standings.best(standings.among(records, goal.against), within, goal.metric)
+    able = standings.among(records, goal.method), standings.among(records, goal.against)
+    theirs = standings.best(able[1], within, goal.metric)
     found = Comparison(None, None)
     if theirs is not None:
         allowed = standings.no_worse(theirs, goal.no_worse)
         allowed |= {key: min(bound, allowed.get(key, bound)) for key, bound in within.items()}
-        ours = standings.best(standings.among(records, goal.method), allowed, goal.metric)
-        found = standings.compare(ours, theirs, goal.metric)
+        ours = standings.best(able[0], allowed, goal.metric)
+        found = standings.compare(ours, theirs, goal.metric, chosen=max(map(len, able)) > 1)
     blind = not goal.alone and not any(key.startswith(PLACE) for key in (*within, *goal.no_worse))
     reached = found.ratio is not None and found.ratio.median >= ratio
-    why = ""
+    verdict, why = "reached" if reached else "missed", ""
     if blind:
-        why = "energy is not ranked without position"
+        verdict, why = "void", "energy is not ranked without position"
     elif found.ratio is None:
         why = "the peer has no setting as accurate" if theirs is None else "none of ours is as accurate"
+    elif busy := disturbed(goal, [found.ours, found.theirs]):
+        verdict, why = "not judged", busy
+    elif found.chosen_by_them:
+        why = "of the rounds that chose the settings, for there are no others"
     label = METRICS[goal.metric].label
     return Verdict(
         goal=goal,
@@ -117,7 +156,7 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
         words=goal.words or f"{label} of {goal.against} over ours, {_bounds(goal, within)}",
         asked=f"≥ {ratio:g}",
         measured=ratio_text(found.ratio),
-        verdict="void" if blind else "reached" if reached else "missed",
+        verdict=verdict,
         why=why,
         comparison=found,
         records=records,
@@ -147,7 +186,13 @@ def as_data(found: Sequence[Verdict]) -> list[dict[str, object]]:
     """Return the verdicts as plain data for JSON."""
     return [
         {"problem": name_of(one.entry), "words": one.words, "goal": msgspec.to_builtins(one.goal)}
-        | {"verdict": one.verdict, "why": one.why, "measured": one.measured, **ratio_data(one.comparison)}
+        | {
+            "declared": one.declared,
+            "verdict": one.verdict,
+            "why": one.why,
+            "measured": one.measured,
+            **ratio_data(one.comparison),
+        }
         for one in found
     ]
 

@@ -1,4 +1,7 @@
-"""Who is how fast at which accuracy: read off the records of a problem, the same way for every family."""
+"""Who is how fast at which accuracy: read off the records of a problem, the same way for every family.
+
+Times that chose a setting do not compare it; see `hbvm_bench.measure.timing.chooses`.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,7 +12,7 @@ from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import combinations, fill
-from hbvm_bench.measure.timing import Spread
+from hbvm_bench.measure.timing import Spread, chooses
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.points import accurate, family_of, number
 from hbvm_bench.summaries.rows import Task, tasks
@@ -24,6 +27,7 @@ class Comparison:
     ours: Record | None  # what takes least of the settings that are accurate enough
     theirs: Record | None
     ratio: Spread | None = None  # theirs over ours; of times within each round of the timing pass
+    chosen_by_them: bool = False  # whether the times that chose the settings are those that are compared
 
 
 def entries(campaign: Campaign, records: Sequence[Record]) -> list[tuple[ProblemEntry, list[Record]]]:
@@ -54,22 +58,37 @@ def among(records: Sequence[Record], who: str) -> list[Record]:
 
 
 def best(records: Sequence[Record], within: Mapping[str, float], metric: str = TIME) -> Record | None:
-    """Return the case that takes least of those that are accurate enough; ``None`` if there is none."""
+    """Return the case that takes least of those that are accurate enough; ``None`` if there is none.
+
+    Times are those of the rounds that choose.
+    """
     able = [one for one in records if accurate(one, within) and number(one, metric) is not None]
-    return min(able, key=lambda one: number(one, metric) or 0.0, default=None)
+
+    def least(record: Record) -> float:
+        rounds = by_round(record) if metric == TIME else {}
+        choosing = [seconds for number, seconds in rounds.items() if chooses(number)] or rounds.values()
+        return median(choosing) if choosing else number(record, metric) or 0.0
+
+    return min(able, key=least, default=None)
 
 
-def compare(ours: Record | None, theirs: Record | None, metric: str = TIME) -> Comparison:
-    """Compare two cases of one problem."""
+def compare(
+    ours: Record | None, theirs: Record | None, metric: str = TIME, *, chosen: bool = False
+) -> Comparison:
+    """Compare two cases of one problem; where they were ``chosen``, in the rounds that did not choose."""
     if ours is None or theirs is None:
         return Comparison(ours, theirs)
     if metric == TIME:
         base = by_round(ours)
-        found = [seconds / base[number] for number, seconds in by_round(theirs).items() if number in base]
-    else:
-        numbers = number(theirs, metric), number(ours, metric)
-        found = [numbers[0] / numbers[1]] if numbers[0] is not None and numbers[1] else []
-    return Comparison(ours, theirs, Spread.of(found) if found else None)
+        found = {key: seconds / base[key] for key, seconds in by_round(theirs).items() if key in base}
+        by_others = all(any(map(chooses, by_round(one))) for one in (ours, theirs))
+        apart = [ratio for key, ratio in found.items() if by_others and not chooses(key)]
+        ratios = (apart if chosen else []) or [*found.values()]
+        ratio = Spread.of(ratios) if ratios else None
+        return Comparison(ours, theirs, ratio, chosen and bool(ratios) and not apart)
+    numbers = number(theirs, metric), number(ours, metric)
+    ratio = numbers[0] / numbers[1] if numbers[0] is not None and numbers[1] else None
+    return Comparison(ours, theirs, None if ratio is None else Spread.of([ratio]))
 
 
 def by_round(record: Record) -> dict[int, float]:
@@ -90,7 +109,9 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
     theirs = best(defaults, dict.fromkeys(errors, math.inf))
     if theirs is None:
         return Comparison(None, None)
-    return compare(best(among(records, ""), no_worse(theirs, dict.fromkeys(errors, 1.0))), theirs)
+    return compare(
+        best(among(records, ""), no_worse(theirs, dict.fromkeys(errors, 1.0))), theirs, chosen=True
+    )
 
 
 def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:

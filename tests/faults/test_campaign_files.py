@@ -175,6 +175,7 @@ RIGHT\n[grid]\nalso = [-1]                                    => Expected `float
 RIGHT\n[grid]\nstep = 1e99                                    => step=1e+99 of the grid of kepler lies beyond
 RIGHT\n[grid]\nmultiple_of = 1e99                             => multiple_of=1e+99 of the grid of kepler lies
 PROBLEMS\nproblems = [{use = "kepler()", grid = {also = [1e9]}}] => also=1000000000.0 of the grid of kepler li
+RIGHT\n[timing]\nshortest = 1e-4                              => shortest=0.0001 of timing is too short for a
 RIGHT\n[timing]\nclock = "thread"                             => clock='thread' of timing belongs to interleav
 RIGHT\n[timing]\norder = "alternating"                        => order='alternating' of timing belongs to
 RIGHT\n[timing]\ninterleaved = true\nsamples = 5              => samples=5 of timing belongs to interleaved

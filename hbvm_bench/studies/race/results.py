@@ -117,7 +117,8 @@ class Race:
 
     def at(self, family: str, energy: float, position: float) -> Comparison:
         """Compare the best settings of a peer and of ours at one accuracy."""
-        return standings.compare(self.best(OURS, energy, position), self.best(family, energy, position))
+        ours, theirs = (self.best(who, energy, position) for who in (OURS, family))
+        return standings.compare(ours, theirs, chosen=True)
 
 
 def counts(record: Record) -> bool:

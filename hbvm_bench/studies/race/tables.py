@@ -118,7 +118,7 @@ def fastest(race: Race) -> Table:
         if found is None:
             rows.append((row.title, _why_none(race, row), *[NONE] * 6))
             continue
-        ratio = "1" if found is ours else ratio_text(standings.compare(ours, found).ratio)
+        ratio = "1" if found is ours else ratio_text(standings.compare(ours, found, chosen=True).ratio)
         rows.append(
             (
                 row.title,

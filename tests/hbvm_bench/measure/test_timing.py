@@ -154,7 +154,14 @@ def test_short_runs_are_repeated_until_a_sample_is_long_enough(seconds, repeats)
 
 def test_a_setting_too_slow_for_all_rounds_takes_part_in_some_of_them():
     assert timing.spread_evenly(3, 9) == [0, 3, 6]
-    assert timing.spread_evenly(0, 9) == [0]
+    assert timing.spread_evenly(0, 9) == [0, 1]  # one chooses, the other compares
+    assert timing.spread_evenly(0, 1) == [0]
+    for rounds in range(2, 30):
+        for count in range(40):
+            chosen = timing.spread_evenly(count, rounds)
+            assert sorted(set(chosen)) == chosen
+            assert {*map(timing.chooses, chosen)} == {False, True}
+            assert max(chosen) < rounds
     taken = timing.interleaved([lambda: 1.0, lambda: 2.0], 3, turns=[[0, 1, 2], [1]])
     assert taken == [[1.0, 1.0, 1.0], [2.0]]
 

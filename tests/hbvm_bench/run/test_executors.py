@@ -126,7 +126,6 @@ methods = [{{ use = "Waving(h={{h}}, wait=0.05)", sweep = {{ h = [0.1, 0.2] }} }
 [timing]
 rounds = 2
 samples = 1
-shortest = 1e-4
 """
 
 

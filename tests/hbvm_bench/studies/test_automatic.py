@@ -10,6 +10,7 @@ import pytest
 
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.cli import main
+from hbvm_bench.measure import reading
 from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
@@ -62,14 +63,15 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
     monkeypatch.chdir(tmp_path)
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     store = Store(tmp_path / "runs" / "automatic")
-    run = kept.of(store, "automatic", store.records())
+    run = kept.of(store, "automatic", reading.records(store))
     (duel,) = automatic.duels(run)
     for side in (duel.ours, duel.theirs):
         metrics = side.result.metrics
         assert 0.0 < metrics["energy_max"].value < 1e-12  # measured 1e-14 to 5e-14
         assert 0.0 < metrics["position_mean"].value < 1e-9  # measured 2e-12 to 7e-12
         assert [len(one.samples) for one in side.timing.rounds] == [1, 1]
-        assert {one.repeats for one in side.timing.rounds} == {1}
+        (repeats,) = {one.repeats for one in side.timing.rounds}
+        assert repeats * side.timing.summary["min"] > 0.01  # 0.02 asked for; a busy first run gives fewer
     assert duel.ours.result.counters.steps < duel.theirs.result.counters.steps / 3
     assert duel.ratio.low <= duel.ratio.median <= duel.ratio.high
     assert (duel.words == "reached") == (duel.ratio.median >= duel.verdict.goal.ratio)

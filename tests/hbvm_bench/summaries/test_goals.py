@@ -1,9 +1,12 @@
 """What a campaign asks for, and the verdict on what was measured."""
 
 import pytest
+from msgspec.structs import replace
 
 from hbvm_bench.campaign.file import Campaign, Case, Goal, MethodEntry, ProblemEntry, parse
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.commands.run import dated
+from hbvm_bench.store.records import Compile, Load, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import goals, standings
 from problems.errors import InputError, UnknownNameError
 
@@ -150,6 +153,92 @@ def test_a_ratio_lies_within_its_quartiles():
     # of the medians 1.5; of the rounds 3, 3, 1.5, 3, 3
     assert ratio.low <= ratio.median <= ratio.high
     assert ratio.median == 3.0
+
+
+def test_the_rounds_that_choose_a_setting_do_not_compare_it():
+    """A setting that was lucky in the rounds that choose is chosen, and its luck is not in the ratio."""
+    lucky = record("Gauss(s=8, h=0.1)", [1.0, 4.0, 4.0, 1.0], 1e-14, 1e-12, "ours")
+    steady = record("Gauss(s=8, h=0.2)", [2.0, 2.0, 2.0, 2.0], 1e-14, 1e-12, "ours")
+    theirs = record("Taylor()", [8.0, 8.0, 8.0, 8.0], 1e-14, 1e-12)
+    found = judged(Goal(against="Taylor", ratio=3.0), [lucky, steady, theirs])
+    assert found.comparison.ours.case.method == "Gauss(s=8, h=0.1)"
+    assert (found.measured, found.verdict) == ("2.00× (2.00–2.00)", "missed")
+    assert not found.comparison.chosen_by_them
+
+
+def test_a_single_round_says_that_it_chose_what_it_compares():
+    ours = [record(f"Gauss(s=8, h={h})", [1.0], 1e-14, 1e-12, "ours") for h in (0.1, 0.2)]
+    found = judged(Goal(against="Taylor", ratio=3.0), [*ours, record("Taylor()", [8.0], 1e-14, 1e-12)])
+    assert found.verdict == "reached"
+    assert found.why == "of the rounds that chose the settings, for there are no others"
+
+
+@pytest.mark.parametrize("load", [Load(others=0.4, stolen=0.0), Load(others=0.0, stolen=0.2)])
+def test_a_speed_measured_beside_other_work_is_not_judged(load):
+    def loaded(one):
+        return replace(one, timing=replace(one.timing, load=load))
+
+    records = [*map(loaded, RECORDS)]
+    for ratio in (1.0, 100.0):  # neither reached nor missed
+        found = judged(Goal(against="Taylor", ratio=ratio), records)
+        assert found.verdict == "not judged"
+        assert found.why == f"other work took {max(load.others, load.stolen):.0%} of a core meanwhile"
+        assert not found.reached
+    assert judged(Goal(at=100.0, method="Gauss(s=8, h=0.1)"), records).verdict == "not judged"
+    energy = Goal(metric="energy_max", at=1e-13, method="Gauss(s=8, h=0.1)")
+    assert judged(energy, records).verdict == "reached"
+
+
+def test_a_visit_that_had_half_a_core_is_not_judged():
+    def shared(one):
+        return replace(one, timing=Timing(rounds=[replace(each, share=0.5) for each in one.timing.rounds]))
+
+    assert judged(Goal(against="Taylor", ratio=1.0), [*map(shared, RECORDS)]).verdict == "not judged"
+
+
+@pytest.mark.parametrize(
+    ("declared", "measured", "said"),
+    [
+        ("", "", "not recorded"),
+        ("2026-11-20", "", "2026-11-20"),
+        ("2026-11-20", "2026-11-20T10:00:00+00:00", "2026-11-20"),
+        ("2026-11-20T09:00", "2026-11-20T10:00:00+00:00", "2026-11-20"),
+        ("2026-11-21", "2026-11-20T10:00:00+00:00", "2026-11-21, after the first measurement"),
+        ("2026-11-20T11:00", "2026-11-20T10:00", "2026-11-20, after the first measurement"),
+    ],
+)
+def test_a_goal_says_when_it_was_declared(declared, measured, said):
+    found = judged(Goal(against="Taylor", ratio=1.0, declared=declared, measured=measured))
+    assert found.declared == said
+    assert goals.table([found]).rows[0][2] == said
+
+
+def test_a_date_that_is_none_is_refused():
+    with pytest.raises(InputError, match="declared='soon' of a goal must be a date such as"):
+        Goal(at=1.0, declared="soon")
+
+
+def test_a_run_keeps_the_dates_of_its_goals_and_says_which_came_after_a_measurement(tmp_path):
+    store = Store(tmp_path)
+    store.prepare()
+    first, later = Goal(at=1.0), Goal(at=2.0, words="later")
+    campaign = Campaign(
+        name="x", problems=[PROBLEM], methods=[MethodEntry(use="Gauss(s=8, h=0.1)")], goals=[first]
+    )
+
+    def ran(campaign):
+        asked = dated(campaign, store)
+        store.write_index(Index(campaign=asked, ids=["0" * 64], version="0", command=""))
+        return asked.goals
+
+    (before,) = ran(campaign)
+    assert before.declared
+    assert not before.measured
+    measured = record("Gauss(s=8, h=0.1)", [1.0], 1e-14, 1e-12)
+    store.save(replace(measured, id="0" * 64, finished="2026-01-01T00:00:00+00:00"))
+    again, new = ran(replace(campaign, goals=[first, later]))
+    assert again == before
+    assert (new.measured, goals.is_after(new.declared, new.measured)) == ("2026-01-01T00:00:00+00:00", True)
 
 
 def test_a_default_is_compared_with_ours_at_no_larger_errors():

@@ -35,7 +35,7 @@ def record(method, seconds, energy, position, role="peer", **more):
         machine=MACHINE,
         process="one",
         call=1e-5,
-        load=Load(others=0.2, stolen=0.0),
+        load=Load(others=0.08, stolen=0.0),
     )
     numbers = {
         "energy_max": energy,
@@ -51,7 +51,7 @@ def record(method, seconds, energy, position, role="peer", **more):
     problem = make_problem("outer_solar_system(t_end=1200.0)")
     return Record(
         id=hashlib.sha256(method.encode()).hexdigest(),
-        case=Case(problem=repr(problem), method=method),
+        case=Case(problem=repr(problem), method=method, grid=results.declared().grid),
         role=role,
         library="",
         order=None,

@@ -82,7 +82,7 @@ def test_the_report_says_what_is_doubtful_void_refused_and_quick(race):
 
 
 def test_compile_times_are_shown_where_the_machine_had_no_other_work(race):
-    assert tables.compiling(race) is None  # a fifth of a core went elsewhere
+    assert tables.compiling(race) is None  # some of a core went elsewhere
     quiet = [
         msgspec.structs.replace(one, timing=one.timing and msgspec.structs.replace(one.timing, load=None))
         for one in race.records
