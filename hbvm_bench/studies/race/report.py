@@ -1,6 +1,6 @@
 """The report of a race, from stored results alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from statistics import median
 
@@ -18,9 +18,7 @@ from hbvm_bench.studies.race.results import FILE, Race, declared
 from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.points import family_of
 
-DECLARED = declared()
-
-RULES_TEXT = f"""
+RULES_TEXT = """
 Fixed steps and steps that a method chooses itself are rows of their own, for every family that has both:
 ours, and IAS15, which at epsilon = 0 keeps its step. heyoka's Taylor method and DOP853 choose their steps
 always, WHFast and the leapfrog never, so that each of these has one row.
@@ -28,7 +26,8 @@ always, WHFast and the leapfrog never, so that each of these has one row.
 Every row has the same number of settings on every problem, declared before the run in
 hbvm_bench/campaign/shipped/race.toml. The fastest setting that is accurate enough is picked afterwards, by
 the same rule for every row. A ratio, and with it a goal, compares the fastest of all our settings with the
-fastest of all the peer's; ours, and IAS15's, are therefore picked from twice as many as the others'.
+fastest of all the peer's, in rounds that did not choose them; ours, and IAS15's, are therefore picked from
+twice as many as the others'.
 
 Energy is never ranked without position: a setting counts only if both errors are small enough. A run
 that leaves the trajectory which a symmetry prescribes is void.
@@ -40,18 +39,32 @@ One process, one thread, one core. All settings of a problem are timed in interl
 in an order shuffled anew, with garbage collection off; all samples are kept. Timed is the call that
 integrates from the start to the end time and returns the end state, without output; compiling and
 setting up are not in it. A sample is as many such runs one after the other as last
-{DECLARED.timing.shortest * 1e3:.0f} ms. The overhead of one call is in the tables.
+{shortest} ms. The overhead of one call is in the tables.
 
-The energy error is the largest at some {DECLARED.grid.count} times, one in each equal part of the span
+The energy error is the largest at some {count} times, one in each equal part of the span
 and at no common phase, at the methods' own steps where the step is fixed, else by the means that cost
 the method nothing; it is evaluated in double-double arithmetic.
 
-The position error is that of the end state of the very run that is timed. {POSITION}
+The position error is that of the end state of the very run that is timed. {position}
 
 A setting too slow for all rounds takes part in fewer, and the table says so. What did not finish, or
 does not apply, is a row with its reason.
 """
-RULES = tuple(" ".join(paragraph.split()) for paragraph in RULES_TEXT.strip().split("\n\n"))
+
+
+def rules(races: Sequence[Race]) -> list[str]:
+    """Return the rules under which these races were run, as their own files had them."""
+    asked = [race.run.index.campaign for race in races]
+    said = RULES_TEXT.format(
+        shortest=_each(f"{one.timing.shortest * 1e3:.0f}" for one in asked),
+        count=_each(str(one.grid.count) for one in asked),
+        position=POSITION,
+    )
+    return [" ".join(paragraph.split()) for paragraph in said.strip().split("\n\n")]
+
+
+def _each(values: Iterable[str]) -> str:
+    return " or ".join(dict.fromkeys(values))
 
 
 def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None = None) -> Document:
@@ -82,7 +95,7 @@ def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None 
             Section(
                 "The rules",
                 [
-                    Items(RULES, "numbered"),
+                    Items(rules(races), "numbered"),
                     *attempt(PEERS),
                     "What machine code runs:",
                     Items([f"{family.title}: {family.code}" for family in FAMILIES.values()]),
@@ -172,6 +185,6 @@ def commands(races: Sequence[Race]) -> str:
     alike = {
         " ".join(w for i, w in enumerate(ws) if "--problem" not in (w, ws[max(i - 1, 0)])) for ws in words
     }
-    if len(alike) == 1 and {race.key for race in races} == {name_of(entry) for entry in DECLARED.entries()}:
+    if len(alike) == 1 and {race.key for race in races} == {name_of(entry) for entry in declared().entries()}:
         return alike.pop()
     return "\n".join(dict.fromkeys(race.run.command for race in races))

@@ -1,10 +1,13 @@
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import pytest
 
 from hbvm_bench.campaign.file import name_of
+from hbvm_bench.campaign.identity import resolve
+from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.commands.studies import race_as_data
 from hbvm_bench.report.figures.style import looks
 from hbvm_bench.report.write import write
@@ -12,6 +15,8 @@ from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.figures import work_precision
 from problems.errors import InputError
 from tests.hbvm_bench.studies.race.conftest import record, save
+
+REPORTS = Path(__file__).parents[4] / "reports"
 
 
 def test_a_stored_race_is_read_back_equal(race, tmp_path):
@@ -111,8 +116,8 @@ def test_a_race_without_any_valid_run_has_no_figure(race):
 
 
 def test_fixed_and_own_steps_are_rows_of_their_own_and_the_faster_counts(race):
-    chosen = record("HBVM(tol=1e-14)", 0.0005, 5e-14, 5e-11, "ours")
-    both = replace(race, records=[*race.records, chosen])
+    own = record("HBVM(tol=1e-14)", 0.0005, 5e-14, 5e-11, "ours")
+    both = replace(race, records=[*race.records, own])
     rows = {row[0]: row[1] for row in tables.fastest(both).rows}
     assert rows["HBVM and Gauss, fixed step"] == "Gauss(s=8, h=1.5)"
     assert rows["HBVM and Gauss, own steps"] == "HBVM(tol=1e-14)"
@@ -139,3 +144,20 @@ def test_the_report_names_one_command_where_the_problems_together_are_one_run(ra
     assert report.commands(single[1:]) == "\n".join(one.run.command for one in single[1:])
     other = [run("kepler", "hbvm-bench race --problem kepler --rounds 5 --out x"), *single[1:]]
     assert report.commands(other).count("\n") == len(keys) - 1
+
+
+def test_the_rules_are_those_of_the_run_and_not_of_the_file_of_today(race):
+    timing = msgspec.structs.replace(race.run.index.campaign.timing, shortest=0.05)
+    campaign = msgspec.structs.replace(race.run.index.campaign, timing=timing)
+    run = msgspec.structs.replace(race.run, index=msgspec.structs.replace(race.run.index, campaign=campaign))
+    said = " ".join(report.rules([replace(race, run=run)]))
+    assert "as last 50 ms." in said
+
+
+def test_a_quick_run_has_the_best_known_setting_of_every_family():
+    for races in results.by_kind(REPORTS / "race").values():
+        for race in races:
+            short = msgspec.structs.replace(chosen(results.declared(), [race.key]), quick=True)
+            there = {resolve(case).case.method for case in short.cases()}
+            best = [race.best(family, *race.asked) for family in race.families]
+            assert {one.case.method for one in best if one is not None} <= there
