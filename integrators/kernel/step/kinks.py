@@ -119,7 +119,7 @@ def differs_at_an_end(ctx):
     for d in range(rows):
         before = 0.0 if begins else abs(values[lanes * d] - ctx.borders[at_start(d)])
         after = 0.0 if breaks else abs(values[lanes * d + 1] - ctx.borders[at_end(d)])
-        far = max(before, after)
+        far = max(finite(before), finite(after))
         if far > OUTSIDE * ctx.lasts[d] and far > least * block_size(ctx, ctx.block[d]):
             return True
         if ctx.border == EXTRAPOLATED and misses(ctx, d, values[lanes * d]):
@@ -130,9 +130,19 @@ def differs_at_an_end(ctx):
 
 
 @compiled
+def finite(far):
+    """Return how far the field is from its polynomial; 0 where the field is infinite or not a number.
+
+    At a singularity that can be integrated over it is infinite beside a step of any length; whether the step
+    is short enough follows from its nodes.
+    """
+    return far if far < INFINITY else 0.0
+
+
+@compiled
 def misses(ctx, d, value):
     """Whether the polynomial of the step behind is far from the field's value at its end, in row d."""
-    far = abs(value - ctx.borders_behind[at_end(d)])
+    far = finite(abs(value - ctx.borders_behind[at_end(d)]))
     least = ctx.negligible / (abs(ctx.length_behind) * ctx.nodes[0])
     return far > OUTSIDE * ctx.lasts_behind[d] and far > least * block_size(ctx, ctx.block[d])
 
