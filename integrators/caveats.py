@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.invariants import evaluate
-from problems.analysis.structure import has_kinks
+from problems.analysis.structure import has_kinks, switches_in_time
 from problems.calculus.function import Function
 from problems.double_double import DD
 from problems.problem import Problem, System
@@ -46,7 +46,7 @@ def warnings(problem: Problem, caveat: str | None, extra: Mapping[str, Any]) -> 
     """
     kinks, implicit = extra.get("kinks"), extra.get("implicit")
     if caveat is None and not kinks and implicit and implicit["steps"]:
-        caveat = unseen(problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
+        caveat = unseen_in_time(problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
     said = () if caveat is None else (caveat,)
     if not kinks:
         return said
@@ -126,6 +126,11 @@ def unseen(problem: Problem, why: str | None) -> str | None:
         f"its field has m.abs or m.where, and {why}: steps go over a kink with any error, "
         "and the run ends as finished."
     )
+
+
+def unseen_in_time(problem: Problem, why: str | None) -> str | None:
+    """As `unseen`, by steps with a tolerance, which formulas tell where they switch in the state."""
+    return unseen(problem, why) if problem.system.traced and switches_in_time(problem.system) else None
 
 
 def sees_kinks(k: int, system: System) -> bool:

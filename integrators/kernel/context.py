@@ -275,6 +275,9 @@ class Context(Memory):
     doubt = Real()  # last coefficients that are a smaller part of the low ones fall off well enough
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
     negligible = Real()  # part of a block's size that the error at a kink may be
+    sides = Integer()  # address of `problems.analysis.sides`, called like the field; 0: no such surfaces
+    side_values = Array(2, "lanes")  # its values at the stages, then times
+    crossed = Integer()  # 1: a switching surface lies in the step that was attempted
     kinked = Integer()  # 1: in the step that was estimated the field does not look smooth
     kinks = Integer()  # places where steps were rejected for that
     kink_end = Real()  # where the first such step at the last place would have ended

@@ -31,6 +31,7 @@ from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled
 from integrators.refusals import check_parameters, check_start, check_state
 from problems import emit
+from problems.analysis.sides import sides
 from problems.analysis.structure import depends_on_time
 from problems.analysis.switches import Switches
 from problems.errors import InputError
@@ -388,6 +389,15 @@ class AdaptiveProgram(HBVMProgram):
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
         # As much as rounding accounts for, and without a bound on the quadrature what the tolerance allows.
         self._negligible = UNSEEN if defect is not None else max(tol, UNSEEN)
+        surfaces = (
+            sides(system.function("force" if self.second else "field"))
+            if system.traced and not self.kept
+            else None
+        )
+        self._sides = None
+        if surfaces is not None:
+            self._sides = fields.compile_field(system, surfaces, tables.lanes_for(k))
+            self.from_cache = self.from_cache and self._sides.from_cache
         looks = sees_kinks(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
@@ -401,6 +411,7 @@ class AdaptiveProgram(HBVMProgram):
             and self.atol is None
             and not self._given.size
             and not self._switches.any
+            and self._sides is None
         )
 
     def _sizes(self, atol: float | Sequence[float] | None) -> Array:
@@ -462,6 +473,7 @@ class AdaptiveProgram(HBVMProgram):
             context.defect_decay = self.defect ** (0.5 / last)
         context.doubt, context.slowest_decay = self._doubt, self._slowest
         context.negligible = self._negligible
+        context.sides = self._sides.address if self._sides else 0
         context.absolute[:] = self._absolute
         context.asks = int(self.atol is None)
         self.limit(context, 0.0)

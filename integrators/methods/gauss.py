@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from integrators.caveats import blind, unknown_kinks, unseen
+from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
@@ -106,7 +106,8 @@ class Gauss(MethodBase):
 
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks that these options do not look for; see `HBVM`."""
-        kinks = unseen(problem, blind(self.s, self.tol, self.solver))
+        why = blind(self.s, self.tol, self.solver)
+        kinks = unseen(problem, why) if self.tol is None else unseen_in_time(problem, why)
         return kinks or unknown_kinks(problem, self.s, self.tol, self.breakpoints)
 
     def compile(self, system: System) -> Program:

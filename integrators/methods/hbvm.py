@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from integrators.caveats import blind, unknown_kinks, unseen
+from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
 from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
@@ -67,12 +67,11 @@ class HBVM(MethodBase):
     field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
     the field that nodes do see, such as those of ``m.abs`` and ``m.where``, are found, and steps cut until
     they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
-    ``warnings`` say so. They are looked for in steps that vary (``tol``), that the
-    fixed-point iteration solves, and that have eight nodes, or four on a field with these;
-    with k = s (`Gauss`) and with a loose tolerance a weak kink can still cost more than the
-    tolerance. They are not looked for with ``h``, with another solver, where ``"auto"`` goes
-    over to Newton, and on Poisson systems; of a field with these, ``warnings`` then say so
-    (`test_own_steps`).
+    ``warnings`` say so. In steps that vary (``tol``) the formulas tell where these and tables switch in
+    the state, so that weak kinks are found as well. In time, and in fields that are code, the nodes have to
+    show it: eight, or four on a formula with these, in steps that the fixed-point iteration solves.
+    Kinks are not looked for with ``h`` and on Poisson systems; of a field with these, ``warnings`` say so
+    (`test_own_steps`, `test_weak_kinks`).
 
     These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -205,7 +204,8 @@ class HBVM(MethodBase):
         """Name a field with kinks that these options do not look for; see the class."""
         poisson = problem.system.kind == "poisson"
         why = "the steps that keep a Poisson system's energy do not look for kinks" if poisson else None
-        kinks = unseen(problem, why or blind(self.k, self.tol, self.solver))
+        why = why or blind(self.k, self.tol, self.solver)
+        kinks = unseen(problem, why) if poisson or self.tol is None else unseen_in_time(problem, why)
         return kinks or unknown_kinks(problem, self.k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:

@@ -88,6 +88,12 @@ def has_kinks(system: System) -> bool:
     return any(has_kink(node) and node.flags & (STATE | T) for node in nodes)
 
 
+def switches_in_time(system: System) -> bool:
+    """Whether there is such an absolute value or choice of time alone."""
+    nodes = reachable(system.function("field").roots)
+    return any(has_kink(node) and node.args[0].flags & (STATE | T) == T for node in nodes)
+
+
 def has_kink(node: Node) -> bool:
     """Whether a node chooses, or is a function of which a derivative jumps."""
     return node.op == "where" or (node.op in FUNCTIONS and not FUNCTIONS[node.op].smooth)

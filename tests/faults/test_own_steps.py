@@ -229,8 +229,6 @@ def test_smooth_fields_have_no_kinks(method):
 @pytest.mark.parametrize(
     ("method", "why"),
     [
-        (Gauss(s=4, tol=1e-10, solver="newton"), "not looked for with solver='newton'"),  # 0.485 off
-        (Gauss(s=3, tol=1e-8), "k=3 nodes do not tell a kink from a smooth field"),  # 2.26
         (HBVM(k=4, s=2, h=0.1), "steps of one length are not cut there"),
         (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not look for kinks"),  # 2e-3
     ],
@@ -258,16 +256,29 @@ def test_few_nodes_on_a_field_that_is_not_traced_are_said(method):
     assert abs(solution.y[-1, 0] - exact) < 1e-10  # measured 1.6e-14
 
 
-def test_newton_steps_over_a_kink_are_said():
-    # A stiff linear field with a kink far away: the implicit solver takes over, and does not look.
-    def field(y, m):
-        return [-2000.0 * y[0] + y[1] + m.abs(y[1] + 5.0), -y[1]]
+def test_newton_steps_say_that_they_do_not_look_for_kinks_in_time():
+    # A stiff linear field whose switch in time cannot be solved for: the implicit solver takes over.
+    def field(t, y, m):
+        return [-2000.0 * y[0] + y[1] + m.abs(m.sin(t / 100.0) + 5.0), -y[1]]
 
     problem = Problem(VectorField(field, dim=2, name="stiff"), y0=[1.0, 1.0], t_end=20.0)
     solution = integrators.integrate(problem, HBVM(k=8, s=4, tol=1e-6), [20.0])
     assert solution.stats.extra["implicit"]["steps"] > 0
     (warning,) = solution.warnings
     sentence(warning, r"not looked for in its \d+ Newton steps")
+
+
+@pytest.mark.parametrize("method", [Gauss(s=4, tol=1e-10, solver="newton"), Gauss(s=3, tol=1e-8)], ids=repr)
+def test_a_formula_tells_where_it_switches_whatever_the_solver(method):
+    # Off by 0.485 and 2.26 where only nodes were to show it.
+    valley = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1, name="valley")
+    solution = integrators.integrate(Problem(valley, q0=[1.0], p0=[0.0], t_end=2.0), method, [2.0])
+    reached = math.sqrt(2.0)
+    since = 2.0 - reached
+    expected = [-reached * since + since * since / 2.0, since - reached]
+    assert np.abs(solution.y[-1] - expected).max() < 1e-7
+    assert len(solution.warnings) == 1
+    sentence(solution.warnings[0], "the field jumps or has a kink .* give breakpoints")
 
 
 def test_heyoka_says_that_it_does_not_see_a_kink():

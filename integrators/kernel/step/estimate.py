@@ -99,7 +99,8 @@ def estimate(ctx):
     the field they do not: |gamma_j| falls off like 1/j or 1/j^2, and the error of the
     quadrature is of the size of h |gamma_{k-1}| itself. `Context.kinked` says whether there is more
     of that than rounding and tolerance account for. If there is less, nothing is gained
-    by cutting the step further, whatever the squares are.
+    by cutting the step further, whatever the squares are. Where the formulas tell that a switching surface
+    is crossed (`Context.crossed`), all that the last coefficients are counts as a kink's.
 
     From rest the size is what the field makes of a block in this very step. If it begins like a power of t,
     the squares are the same at all lengths of the step; if it begins in the field's rounding or with a
@@ -113,7 +114,11 @@ def estimate(ctx):
         last = coefficient(ctx, d, 4), coefficient(ctx, d, 5), coefficient(ctx, d, 6), coefficient(ctx, d, 7)
         put(found, 8 * d, abs(sums(*first, *last)))
     doubtful = measure_blocks(ctx)
-    if doubtful:
+    if ctx.crossed:
+        doubtful = True
+        for b in range(ctx.block_count):
+            ctx.abrupt[b] = max(ctx.missing[b], ctx.unseen[b])
+    elif doubtful:
         note_what_stays(ctx)
     group, largest, steepest = ctx.group, ctx.largest, ctx.steepest
     for b in range(ctx.block_count):

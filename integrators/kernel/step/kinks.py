@@ -22,10 +22,10 @@ def kink(ctx, ends):
     t, h = ctx.t0, ctx.h
     ctx.border_ahead = NOTHING
     if ctx.kinked == 0:
-        if ctx.line or not (ends and ctx.doubt < INFINITY):
+        if ctx.line or not (ends and (ctx.doubt < INFINITY or ctx.crossed)):
             return False
         extrapolate(ctx)
-        suspect = ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
+        suspect = ctx.crossed or ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
         if not (suspect or jumps(ctx)):
             if ctx.border == EXTRAPOLATED:
                 ctx.border = SEEN
@@ -34,6 +34,37 @@ def kink(ctx, ends):
             return ctx.undone == 1
     count(ctx, t, h)
     return True
+
+
+@compiled
+def crosses(ctx):
+    """Whether the field is evaluated on two sides of a switching surface in the solved step, or at its end.
+
+    Nodes may not show it: a derivative that jumps changes the last coefficients by less than they are in a
+    smooth step, but the square of that is not its error.
+    """
+    if ctx.sides == 0:
+        return False
+    lanes, rows, found = ctx.lanes, ctx.rows, ctx.side_values
+    size = lanes * ctx.padded
+    first = 0.0
+    for call in range(ctx.calls):
+        call_field(ctx.sides, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, found)
+        if call == 0:
+            first = found[0]
+        for lane in range(lanes):
+            if found[lane] != first:
+                return True
+    times, ends, second = found + lanes, ctx.sums, ctx.second
+    for lane in range(lanes):
+        times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
+    for d in range(rows):
+        after = 8 * (d // 4) + 4 + d % 4 if second else d
+        ends[lanes * d] = ctx.row_state[d]
+        for lane in range(1, lanes):
+            ends[lanes * d + lane] = ctx.next_state[after]
+    call_field(ctx.sides, times, ends, ctx.par, found)
+    return found[0] != first or found[1] != first
 
 
 @compiled
@@ -120,7 +151,9 @@ def differs_at_an_end(ctx):
         before = 0.0 if begins else abs(values[lanes * d] - ctx.borders[at_start(d)])
         after = 0.0 if breaks else abs(values[lanes * d + 1] - ctx.borders[at_end(d)])
         far = max(finite(before), finite(after))
-        if far > OUTSIDE * ctx.lasts[d] and far > least * block_size(ctx, ctx.block[d]):
+        # A crossing beyond the last node is no smooth field's distance from its polynomial.
+        smooth = 0.0 if ctx.crossed else OUTSIDE * ctx.lasts[d]
+        if far > smooth and far > least * block_size(ctx, ctx.block[d]):
             return True
         if ctx.border == EXTRAPOLATED and misses(ctx, d, values[lanes * d]):
             undone = 1

@@ -38,7 +38,7 @@ from integrators.kernel.step.estimate import estimate, estimate_implicit, log_de
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
-from integrators.kernel.step.kinks import keep_end, kink, undo
+from integrators.kernel.step.kinks import crosses, keep_end, kink, undo
 from integrators.kernel.step.rule import FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sweep import sweep_measured
 
@@ -266,16 +266,20 @@ def accepts(ctx, outcome, iterations, implicit):
     error, defect = INFINITY, INFINITY
     ctx.undone = 0
     if outcome == DONE:
+        ctx.crossed = 1 if crosses(ctx) else 0
         error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
+        fits = error <= allowed and defect <= allowed_defect
         if implicit == 0:
-            fits = error <= allowed and defect <= allowed_defect
             if ctx.kinked:
                 ctx.doubts += 1
                 ctx.doubt_end = t + h
             if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
                 error = INFINITY
         else:
+            if ctx.crossed and (ctx.kinked or fits) and kink(ctx, fits):
+                error = INFINITY
             ctx.border_ahead = NOTHING
+            ctx.undone = 0
     factor = longer(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
     unseen = outcome == DONE and ctx.blind and abs(h) > ctx.longest_blind
     if unseen:
