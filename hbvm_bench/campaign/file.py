@@ -18,6 +18,7 @@ from hbvm_bench.campaign.entries import (
     Goal,
     Limits,
     MethodEntry,
+    Page,
     ProblemEntry,
     Settings,
     TimingPlan,
@@ -46,6 +47,8 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         What is asked for, declared before the run.
     grid, limits, timing, checks
         Shared by all cases.
+    page : Page
+        Which blocks its page has.
     quick : bool
         Whether only those settings are run that are marked for a quick run.
     """
@@ -61,6 +64,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     limits: Limits = Limits()
     timing: TimingPlan = TimingPlan()
     checks: Checks = Checks()
+    page: Page = Page()
     quick: bool = False
 
     def __post_init__(self) -> None:
@@ -274,6 +278,7 @@ NESTED: dict[str, type[msgspec.Struct]] = {
     "limits": Limits,
     "timing": TimingPlan,
     "checks": Checks,
+    "page": Page,
     "problems": ProblemEntry,
     "methods": MethodEntry,
     "ensembles": EnsembleEntry,

@@ -36,7 +36,7 @@ SEPARATE = {
         "doctor": ("doctor", "warm"),
         "paper": ("paper",),
         "plugins": ("plugins",),
-        "reports": ("gallery", "headline", "report"),
+        "reports": ("gallery", "report"),
         "run": ("run",),
         "stores": ("compare", "export", "merge"),
         "studies": ("automatic", "endure", "race"),

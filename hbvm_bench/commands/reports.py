@@ -1,4 +1,4 @@
-"""``hbvm-bench report | headline | gallery``: pages from what is stored."""
+"""``hbvm-bench report | gallery``: pages from what is stored."""
 
 import webbrowser
 from pathlib import Path
@@ -7,12 +7,8 @@ from typing import Annotated
 import typer
 
 from hbvm_bench.gallery import compile_times, pages
-from hbvm_bench.measure import machine
-from hbvm_bench.report.markdown import plain, printed
 from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
-from hbvm_bench.studies import automatic
-from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
 
 
@@ -40,17 +36,14 @@ def report(
     if not runs and index is None and pages is None:
         raise InputError("give at least one run, as in runs/sitnikov, or --index DIR, or --pages DIR.")
     if runs:
-        from hbvm_bench.commands.publishing import publish
-        from hbvm_bench.report.archived import contents
-        from hbvm_bench.report.campaign import document
+        from hbvm_bench.commands.publishing import report_on
 
         stores = opened(runs)
         for store in stores:
             store.index()
         target = out or runs[0] / "report"
         ensure_writable(target, keep=False)
-        made = document(stores)
-        publish(made, target, contents(made, stores), stderr=False)
+        report_on(stores, target, stderr=False)
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
     if pages is not None:
@@ -62,31 +55,6 @@ def report(
         from hbvm_bench.report.index import write_index
 
         print(write_index(index))
-
-
-def headline(
-    reports: Annotated[Path, typer.Argument(help="Where race/ and automatic/ lie.")] = Path("reports"),
-) -> None:
-    """Print the tables of the race and of `automatic` as markdown, from stored results alone.
-
-    For every kind of processor the ratios, the goals with what was measured, and the settings
-    that were compared; then HBVM() against heyoka's Taylor method, one column for each kind.
-    """
-    races = results.by_kind(reports / "race")
-    duels = automatic.by_kind(reports / "automatic")
-    if not races and not duels:
-        raise InputError(f"there is no result of a race or of automatic under {str(reports)!r}.")
-    parts = []
-    for kind, found in races.items():
-        parts += [f"**{plain(kind)}**", *map(plain, machine.sentences(race.machine for race in found))]
-        shown = [tables.headline(found), tables.goals(found), tables.behind(found)]
-        parts += [printed(table) for table in shown if table.rows]
-    parts += [printed(tables.kinds(races))] if len(races) > 1 else []
-    if duels:
-        parts += [printed(automatic.ratios(duels))]
-        for kind, runs in duels.items():
-            parts += [plain(f"{kind}: {said}") for said in machine.sentences(run.machine for run in runs)]
-    print("\n\n".join(parts))
 
 
 def gallery(

@@ -29,7 +29,7 @@ from problems.errors import InputError
 
 UNFINISHED = 1
 INTERRUPTED = 130
-ANYHOW = ("as_json", "executor", "jobs", "redraw", "report_to", "timing")  # options that change no number
+ANYHOW = ("as_json", "executor", "jobs", "report_to", "timing")  # options that change no number
 PRINTED = 1000  # cases; the tables of more are for `hbvm-bench show`
 
 
@@ -79,12 +79,9 @@ def run(
     )
     show(campaign, store)
     if report_to is not None:
-        from hbvm_bench.commands.publishing import publish
-        from hbvm_bench.report.archived import contents
-        from hbvm_bench.report.campaign import document
+        from hbvm_bench.commands.publishing import report_on
 
-        made = document(store)
-        publish(made, report_to, contents(made, [store]), stderr=False)
+        report_on([store], report_to, stderr=False)
 
 
 def opened(campaign: Campaign, name: str | None) -> Campaign:

@@ -5,30 +5,81 @@ store, which has the series.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report.document import Document, Section
 from hbvm_bench.report.figures.canvas import Picture
 from hbvm_bench.store import archive
 from hbvm_bench.store.archive import Archive, Contents, Drawing
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Record
 from hbvm_bench.store.store import Store
 from hbvm_bench.summaries.table import Table
+from problems.errors import InputError
 
 PLACE = "problem-"  # how the anchors of the sections begin whose figures are of series
 
 
-def contents(document: Document, stores: Sequence[Store] | Sequence[Archive]) -> Contents:
+def contents(document: Document, stores: Sequence[Store | Archive]) -> Contents:
     """Return what is kept of the runs that a document is made of, and of its figures."""
     sections = [one for one in document.walk() if isinstance(one, Section) and one.key.startswith(PLACE)]
+    beside = {name: value for store in stores for name, value in store.beside().items()}
     return Contents(
-        runs=[archive.table(store.index(), reading.records(store)) for store in stores],
+        runs=[_table(store) for store in stores],
         drawings=[
             _drawing(section.key, picture)
             for section in sections
             for picture in section.blocks
             if isinstance(picture, Picture)
         ],
+        beside=beside,
     )
+
+
+def joined(store: Store, before: Path) -> list[Store | Archive]:
+    """Return a run with those of an earlier archive that it stands beside, in the order they were measured.
+
+    They are those of other kinds of processor, and on the same kind those of problems that were not run
+    this time; each keeps the machine, the versions, the command and the date that it was measured with.
+    """
+    records = reading.records(store)
+    if not before.is_file() or not records:
+        return [store]
+    kind, again = machine.kind(_machine(records)), {one.case.problem for one in records}
+    runs = []
+    for old in archive.read(before):
+        if old.index().campaign.name != store.index().campaign.name:
+            raise InputError(
+                f"{str(before)!r} has results of {old.index().campaign.name!r}; give another place."
+            )
+        left = [one for one in old.records() if one.case.problem not in again]
+        kept = old.records() if machine.kind(_machine(old.records())) != kind else left
+        runs += [old.of(kept)] if kept else []
+    return [*runs, store]
+
+
+def _machine(records: Sequence[Record]) -> dict[str, str | int]:
+    return Kept.machine_of(records)
+
+
+def _table(store: Store | Archive) -> archive.Table:
+    index, records = store.index(), reading.records(store)
+    store.learn()
+    named = tuple(index.campaign.page.series)
+    series = {
+        record.id: {
+            name: values
+            for name, values in (
+                store.series(record.id)
+                if isinstance(store, Archive)
+                else reading.drawn(record, store.series(record.id))
+            ).items()
+            if name in named
+        }
+        for record in (records if named else [])
+    }
+    return archive.table(index, records, series)
 
 
 def pictures(drawings: Sequence[Drawing], place: str) -> list[Picture]:

@@ -1,10 +1,10 @@
 """What was measured with: days, versions, machines, and what the machine code is built for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
-from hbvm_bench.report.document import Commands, Maker, Section
+from hbvm_bench.report.document import Commands, Section
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.table import Table
@@ -18,7 +18,7 @@ BUILT = {
     "scipy": "generic wheel; vector field compiled on this machine by numba",
 }
 
-PEERS: Maker = ("what the bench costs the peers", peers.kept)
+PEERS: tuple[str, Callable[[], Table | None]] = ("what the bench costs the peers", peers.kept)
 
 
 def days(records: Sequence[Record]) -> str:
@@ -56,15 +56,15 @@ def _each_once(all_: Sequence[Mapping[str, object]], glue: str) -> dict[str, str
 
 
 def again(
-    study: str, command: str, measured: str, machine: Mapping[str, object], versions: Mapping[str, object]
+    command: str, measured: str, machine: Mapping[str, object], versions: Mapping[str, object]
 ) -> Section:
     """Return how a study is run again, where it was measured, and with what."""
     return Section(
         "Run it again",
         [
             Commands(command),
-            f"`hbvm-bench {study} --redraw --out DIRECTORY` draws this report again without running "
-            f"anything. Measured on {measured}.",
+            "`hbvm-bench report DIRECTORY` draws this report again without running anything. "
+            f"Measured on {measured}.",
             *facts(machine, versions),
         ],
         key="again",

@@ -5,18 +5,22 @@ The file is JSON, compressed by ``xz``::
     runs[i].index       what was asked for
     runs[i].beside      what must be known of problems that do not come with the package
     runs[i].columns     lists of equal length by the names of `hbvm_bench.store.records.Record`'s fields
-    drawings            figures of series, which the file does not have: a series has a thousand times the
-                        numbers that its figure shows
+    runs[i].series      the few series that the campaign's page asks for, by case
+    drawings            figures of the other series: these have a thousand times the numbers that are shown
+    beside              what a study keeps beside its cases
 
 What was read off the series is in the columns, as it was read when the file was written.
 """
 
 import lzma
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
@@ -48,11 +52,31 @@ class Drawing(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     values: bool = False
 
 
+class Array(msgspec.Struct, frozen=True, kw_only=True):
+    """Doubles: their shape, and their bytes, the least significant of each last."""
+
+    shape: list[int]
+    data: bytes
+
+    @classmethod
+    def of(cls, values: NDArray[np.float64]) -> "Array":
+        """Pack an array; all first bytes of its numbers stand together, which compresses."""
+        numbers = np.ascontiguousarray(values, dtype=">f8")
+        return cls(shape=list(values.shape), data=numbers.view(np.uint8).reshape(-1, 8).T.tobytes())
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """The array."""
+        numbers = np.frombuffer(self.data, np.uint8).reshape(8, -1).T
+        return np.ascontiguousarray(numbers).view(">f8").astype(np.float64).reshape(self.shape)
+
+
 class Table(msgspec.Struct, frozen=True, kw_only=True):
-    """One run: what was asked for, and its records column by column."""
+    """One run: what was asked for, its records column by column, and those series that its page keeps."""
 
     index: Index
     columns: dict[str, list[Any]]
+    series: dict[str, dict[str, Array]] = {}
     beside: list[own.Beside] = []
 
 
@@ -61,26 +85,45 @@ class Contents(msgspec.Struct, frozen=True, kw_only=True):
 
     runs: list[Table]
     drawings: list[Drawing] = []
+    beside: dict[str, Any] = {}
     schema: int = SCHEMA
 
 
 class Archive:
     """A run that can be read as a `Store` is; it has drawings in the place of series."""
 
-    def __init__(self, path: Path, table: Table, drawings: Sequence[Drawing] = ()) -> None:
+    def __init__(self, path: Path, table: Table, contents: Contents) -> None:
         self.directory = path
-        self.drawings = drawings
+        self._kept_beside = contents.beside
+        self.drawings = contents.drawings
         self._index = table.index
         rows = zip(*table.columns.values(), strict=True)
         named = [dict(zip(table.columns, row, strict=True)) for row in rows]
         self._records = msgspec.convert(named, list[Record])
         self._beside = table.beside
+        self._series = {
+            key: {name: array.values for name, array in named.items()} for key, named in table.series.items()
+        }
+
+    def series(self, case_id: str) -> dict[str, NDArray[np.float64]]:
+        """Return the series of a case that its page keeps, by name."""
+        return self._series.get(case_id, {})
 
     def learn(self) -> None:
         """Know the problems and references that are stored here, and no other run's."""
         solutions.forget()
         for known in self._beside:
             own.learn(known)
+
+    def of(self, records: list[Record]) -> "Archive":
+        """Return the run with some of its records only."""
+        made = copy(self)
+        made._records = records
+        return made
+
+    def beside(self) -> dict[str, Any]:
+        """Return what a study keeps beside its cases, by name."""
+        return self._kept_beside
 
     def index(self) -> Index:
         """Return what the run was asked to do."""
@@ -92,12 +135,17 @@ class Archive:
         return self._records
 
 
-def table(index: Index, records: Sequence[Record]) -> Table:
-    """Return records, as `hbvm_bench.measure.reading` reads them, column by column."""
+def table(
+    index: Index, records: Sequence[Record], series: Mapping[str, Mapping[str, NDArray[np.float64]]]
+) -> Table:
+    """Return records, as `hbvm_bench.measure.reading` reads them, column by column, with series of them."""
+    kept = {key: {name: Array.of(v) for name, v in named.items()} for key, named in series.items() if named}
     rows = [msgspec.to_builtins(record) for record in records]
     columns = {name: [row[name] for row in rows] for name in Record.__struct_fields__}
     known = [own.beside(make_problem(text)) for text in dict.fromkeys(r.case.problem for r in records)]
-    return Table(index=index, columns=columns, beside=[one for one in known if one != own.Beside()])
+    return Table(
+        index=index, columns=columns, series=kept, beside=[one for one in known if one != own.Beside()]
+    )
 
 
 def write(path: Path, contents: Contents) -> None:
@@ -135,7 +183,7 @@ def read(path: Path) -> list[Archive]:
         contents = decoded(unpacked, Contents)
         if contents.schema != SCHEMA:
             raise InputError(f"{str(path)!r} was written by another version; run its campaign again.")
-        return [Archive(path, run, contents.drawings) for run in contents.runs]
+        return [Archive(path, run, contents) for run in contents.runs]
     except InputError:
         raise
     except (OSError, lzma.LZMAError, msgspec.MsgspecError, ValueError, LookupError, TypeError) as error:

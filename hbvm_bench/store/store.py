@@ -258,6 +258,15 @@ class Store:
             made.append(msgspec.structs.replace(record, case=words))
         return made
 
+    def beside(self) -> dict[str, Any]:
+        """Return what a study keeps beside its cases, by name: the other JSON files of the directory."""
+        found = {}
+        for path in sorted(self.directory.glob("*.json")):
+            if path.name != INDEX:
+                with suppress(OSError, ValueError):
+                    found[path.stem] = decoded(path.read_bytes(), object)
+        return found
+
     def everything(self) -> Iterator[Record]:
         """Yield all records in the directory, those of earlier versions and other settings too."""
         for path in sorted(self.cases.glob("[!.]*.json")):

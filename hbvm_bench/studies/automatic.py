@@ -1,23 +1,16 @@
-"""HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side.
-
-Results of several kinds of processor lie side by side, one file each::
-
-    DIR/<kind>.json     e.g. znver4-256bit.json, znver4-256bit-avx2.json
-    DIR/README.md       all of them, one column for each kind, and index.html the same
-"""
+"""HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.shorter import chosen, with_rounds
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
-from hbvm_bench.report.document import Block, Document, Files, Note, Section, attempt
-from hbvm_bench.store import kept
+from hbvm_bench.report.document import Block, Note, Section, attempt
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries import outcomes, standings
@@ -89,16 +82,6 @@ def campaign(names: Sequence[str], rounds: int | None = None) -> Campaign:
     return with_rounds(chosen(load(NAME), list(names)), rounds)
 
 
-def keep(run: Kept, directory: Path) -> None:
-    """Write a run beside those of other kinds of processor; see `hbvm_bench.store.kept.keep`."""
-    kept.keep(run, directory / f"{machine.kind(run.machine)}.json", NAME)
-
-
-def by_kind(directory: Path) -> dict[str, list[Kept]]:
-    """Return the runs in a directory by the kind of processor."""
-    return {path.stem: kept.load(path, NAME) for path in sorted(directory.glob("*.json"))}
-
-
 def duels(run: Kept) -> list[Duel]:
     """Return what came out, problem by problem."""
     campaign, found = run.index.campaign, []
@@ -113,35 +96,26 @@ def duels(run: Kept) -> list[Duel]:
 METRICS = ("warm_seconds", "steps", "energy_max", "position_mean")
 
 
-def document(results: Mapping[str, Sequence[Kept]]) -> Document:
-    """Return the report: the ratios by kind of processor, then each kind's numbers."""
-    return Document(
-        "HBVM() against heyoka's Taylor method",
-        [
-            "HBVM() chooses k, s and its steps by itself; heyoka's Taylor method likewise has no step to "
-            "set. The ratio is the Taylor method's time over ours within each round, of one core's time, "
-            "alternating: the median over the rounds.",
-        ],
-        [
-            Note(POSITION + " Here: the geometric mean over ten such times."),
-            *attempt(("the ratios", partial(ratios, results))),
-            *(
-                Section(
-                    kind,
-                    [block for run in runs for block in _run(run)],
-                    key=kind,
-                    nav=kind,
-                )
-                for kind, runs in results.items()
-            ),
-            Section(
-                "Raw data",
-                [Files("With all timing samples", [f"{kind}.json" for kind in results])],
-                "data-files",
-                nav="Data",
-            ),
-        ],
-    )
+@block
+def errors_are(results: Results) -> Note:
+    """Return what a position error is here."""
+    del results
+    return Note(POSITION + " Here: the geometric mean over ten such times.")
+
+
+@block
+def ratios_by_kind(results: Results) -> Table:
+    """Return the ratios, one column for each kind of processor."""
+    return ratios(results.by_processor)
+
+
+@block
+def kinds(results: Results) -> list[Section]:
+    """Return the numbers of each kind of processor."""
+    return [
+        Section(kind, [one for run in runs for one in _run(run)], key=kind, nav=kind)
+        for kind, runs in results.by_processor.items()
+    ]
 
 
 def _run(run: Kept) -> list[Block]:

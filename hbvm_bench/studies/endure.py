@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
@@ -11,17 +10,16 @@ from numpy.typing import NDArray
 
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.measure import drift, machine, reading
+from hbvm_bench.measure import drift, machine
 from hbvm_bench.measure.starts import PERTURBATION
-from hbvm_bench.report.document import Document, Note, attempt
+from hbvm_bench.report.document import Note, Section
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
-from hbvm_bench.report.figures.style import MUTED, Look, looks
+from hbvm_bench.report.figures.style import MUTED, Look
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.report.provenance import PEERS, again
-from hbvm_bench.store import kept
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Law
-from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
@@ -97,17 +95,10 @@ def campaign(
     return made
 
 
-def read(directory: Path) -> Endurance:
-    """Read a run.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If there is none, or another campaign's.
-    """
-    store = Store(directory)
-    run = kept.of(store, NAME, reading.records(store))
-    series = {one.case.method: reading.drawn(one, store.series(one.id)) for one in run.records}
+def of(results: Results) -> Endurance:
+    """Return the run that was measured last."""
+    run = results.runs[-1]
+    series = {one.case.method: results.series.get(one.id, {}) for one in run.records}
     times = [one["drift.t"] for one in series.values() if "drift.t" in one]
     return Endurance(
         run,
@@ -184,27 +175,54 @@ floor and a growth are fitted together to the logarithm of the rms over windows 
 """
 
 
-def document(result: Endurance) -> Document:
-    """Return the report."""
-    look, run = looks(result.methods), result.run
-    return Document(
-        "Endurance: the energy of the outer Solar System",
-        [
-            "How the energy error grows with time, ours beside the peers', in one run.",
-            f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
-            f"position and momentum is changed by up to {PERTURBATION} of itself "
-            "(`hbvm_bench.measure.starts`).",
-        ],
-        [
-            Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)])),
-            *attempt(
-                ("the tables", lambda: tables(result)), PEERS, ("the figure", lambda: over_time(result, look))
-            ),
-            Note(METHOD),
-            again("endure", run.command, run.started[:10], run.machine, run.versions),
-        ],
-        list(look.values()),
+@block
+def about(results: Results) -> str:
+    """Return what was run."""
+    result = of(results)
+    return (
+        f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
+        f"position and momentum is changed by up to {PERTURBATION} of itself (`hbvm_bench.measure.starts`)."
     )
+
+
+@block
+def measured_on(results: Results) -> Note:
+    """Return on what machine, and what else it did."""
+    run = of(results).run
+    return Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)]))
+
+
+@block
+def errors_and_goals(results: Results) -> list[Table]:
+    """Return the tables: the errors with their laws, and the goals."""
+    return tables(of(results))
+
+
+@block
+def peers(results: Results) -> Table | None:
+    """Return what the bench costs the peers."""
+    del results
+    return PEERS[1]()
+
+
+@block
+def energy_over_time(results: Results) -> Picture | None:
+    """Draw the rms over the starts against time."""
+    return over_time(of(results), results.look)
+
+
+@block
+def how(results: Results) -> Note:
+    """Return how it is measured."""
+    del results
+    return Note(METHOD)
+
+
+@block
+def run_again(results: Results) -> Section:
+    """Return the command, and what was measured with what."""
+    run = of(results).run
+    return again(run.command, run.started[:10], run.machine, run.versions)
 
 
 def tables(result: Endurance) -> list[Table]:

@@ -135,18 +135,10 @@ automatic nosuch                                           | unknown problem of 
 automatic kepler --rounds 0                                | rounds must be at least 2, not 0
 automatic kepler --rounds a                                | Invalid value for '--rounds': Input should be a
 automatic kepler --rounds -5                               | rounds must be at least 2, not -5
-automatic --general nosuch                                 | unknown problem of general 'nosuch'; known: C1
-automatic --general --limit -1                             | --limit=-1.0 must be above 0 and at most 1e300
-automatic --general --limit 0                              | --limit=0.0 must be above 0 and at most 1e300
-automatic --general --limit nan                            | --limit=nan must be above 0 and at most 1e300
-automatic --general --limit inf                            | --limit=inf must be above 0 and at most 1e300
-automatic --general --limit a                              | Invalid value for '--limit': Input should be a
 race -p nosuch                                             | unknown problem of race 'nosuch'; known:
 race --rounds 1                                            | Invalid value for '--rounds': Input should be
 race --rounds 0                                            | Invalid value for '--rounds': Input should be
 race --rounds a                                            | Invalid value for '--rounds': Input should be a
-race --redraw                                              | there is no result of a race in 'runs/race';
-race --redraw --out nowhere                                | there is no result of a race in 'nowhere'; run:
 race --quick --out /dev/null/x                             | cannot write to the directory '/dev/null/x':
 race extra                                                 | Got unexpected extra argument(s) (extra)
 endure --years 1                                           | --years must be a whole number from 100 to
@@ -158,8 +150,6 @@ endure --starts 0                                          | Invalid value for '
 endure --starts a                                          | Invalid value for '--starts': Input should be a
 endure -m "HBVM(kk=3)" --quick                             | HBVM(kk=3): unknown option of HBVM 'kk'; did
 endure -m "nosuch()" --quick                               | nosuch(): unknown method 'nosuch'; known:
-endure --redraw                                            | the directory 'runs/endure' does not exist;
-endure --redraw --out nowhere                              | the directory 'nowhere' does not exist; make some
 endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
 endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x
 endure -m "Leapfrog(h=0.1)" -m "Leapfrog(h=0.1)" --quick --out /dev/null/x | is given twice

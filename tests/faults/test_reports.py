@@ -1,5 +1,6 @@
 """What a report must survive: ensembles, names that attack, bytes that command a terminal."""
 
+import lzma
 import re
 from typing import Any
 
@@ -7,12 +8,11 @@ import msgspec
 import pytest
 
 from hbvm_bench import cli
-from hbvm_bench.report.markdown import markdown
-from hbvm_bench.store import kept
+from hbvm_bench.store import archive
+from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies import automatic
-from hbvm_bench.studies.race import results
 from problems.errors import InputError
+from tests.hbvm_bench.made_up_run import archived
 from tests.hbvm_bench.studies.race.conftest import made_up as a_race
 from tests.hbvm_bench.studies.race.conftest import save
 from tests.hbvm_bench.studies.test_automatic import made as a_duel
@@ -86,58 +86,36 @@ def stored_results(directory):
     run = a_duel(said["machine"])
     records = [msgspec.structs.replace(one, versions=said["versions"]) for one in run.records]
     index = msgspec.structs.replace(run.index, command=said["command"])
-    (directory / "automatic").mkdir()
-    kept.keep(kept.Kept(index=index, records=records), directory / "automatic" / "one.json", "automatic")
+    archived(directory / "automatic", Kept(index=index, records=records))
 
 
-@pytest.mark.parametrize(
-    ("command", "page"),
-    [
-        (["headline", "."], None),
-        (["race", "--redraw", "--out", "race"], "race/README.md"),
-        (["endure", "--redraw", "--out", "endure"], "endure/README.md"),
-    ],
-)
-def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(
-    tmp_path, monkeypatch, capsys, command, page
-):
+@pytest.mark.parametrize("name", ["race", "endure", "automatic"])
+def test_a_stored_result_commands_no_terminal_and_leaves_no_markdown(tmp_path, monkeypatch, capsys, name):
     monkeypatch.chdir(tmp_path)
     stored_results(tmp_path)
-    assert cli.main(command) == 0
+    assert cli.main(["report", name, "-o", "r"]) == 0
     said = capsys.readouterr().out
     assert "\x1b" not in said
     assert "\u200f" not in said
-    if page is not None:
-        said = (tmp_path / page).read_text(encoding="utf-8")
-        assert "<script>alert" not in (tmp_path / page).with_name("index.html").read_text(encoding="utf-8")
+    assert "<script>alert" not in (tmp_path / "r" / "index.html").read_text(encoding="utf-8")
+    said = (tmp_path / "r" / "README.md").read_text(encoding="utf-8")
+    assert "\x1b" not in said
     for line in said.splitlines():
         assert line.startswith("    ") or not re.search(r"(?<!\\)<script|^```|[^\\`]```", line)
-
-
-def test_the_page_of_automatic_shows_a_hostile_result_as_text(tmp_path):
-    stored_results(tmp_path)
-    page = markdown(automatic.document(automatic.by_kind(tmp_path / "automatic")))
-    assert "\x1b" not in page
-    assert not any(re.search(r"(?<!\\)<script", line) for line in page.splitlines())
 
 
 def test_a_race_whose_problem_is_no_file_name_is_refused(tmp_path):
     """It names the files of the report."""
     save(a_race(), tmp_path)
-    path = tmp_path / "race.json"
-    path.write_bytes(path.read_bytes().replace(b'"outer_solar_system"', b'"../../elsewhere"'))
+    path = tmp_path / archive.NAME
+    content = lzma.decompress(path.read_bytes())
+    path.write_bytes(lzma.compress(content.replace(b'"outer_solar_system"', b'"../../elsewhere"')))
     with pytest.raises(InputError, match="must be a file name"):
-        results.load(tmp_path)
+        archive.read(path)
 
 
 @pytest.mark.parametrize("content", [b"\xff", b'"\xff"', b"[" * 100_000])
-def test_bytes_that_are_no_text_are_refused_by_all_three(tmp_path, content):
-    for name in ("race.json", "campaign.json", "one.json"):
-        (tmp_path / name).write_bytes(content)
-    for read in (
-        lambda: results.load(tmp_path),
-        lambda: Store(tmp_path).index(),
-        lambda: kept.load(tmp_path / "one.json", "automatic"),
-    ):
-        with pytest.raises(InputError, match=r"is not the (result|index) of"):
-            read()
+def test_bytes_that_are_no_text_are_refused(tmp_path, content):
+    (tmp_path / "campaign.json").write_bytes(content)
+    with pytest.raises(InputError, match="is not the index of"):
+        Store(tmp_path).index()

@@ -11,6 +11,8 @@ from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry, TimingPl
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.measure import raw, reading
 from hbvm_bench.reference import solutions
+from hbvm_bench.report.page import Results
+from hbvm_bench.store import archive
 from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index, Store
 from integrators.protocol import Stats, Status
@@ -184,6 +186,17 @@ def toml(campaign):
     """Return the file of a campaign of problems and methods."""
     entries = "".join(f"[[methods]]\nuse = {entry.use!r}\n" for entry in campaign.methods)
     return f"name = {campaign.name!r}\nproblems = {campaign.problems!r}\n{entries}[timing]\nrounds = 1\n"
+
+
+def results_of(*runs, beside=None):
+    """Return what a page is made of, from runs that nobody ran."""
+    return Results(list(runs), [record for run in runs for record in run.records], {}, beside=beside or {})
+
+
+def archived(directory, *runs):
+    """Put runs that nobody ran into an archive."""
+    tables = [archive.table(run.index, run.records, {}) for run in runs]
+    archive.write(directory / archive.NAME, archive.Contents(runs=tables))
 
 
 if __name__ == "__main__":  # python -m tests.hbvm_bench.made_up_run DIRECTORY CASES

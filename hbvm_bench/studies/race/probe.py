@@ -15,11 +15,9 @@ from pathlib import Path
 import msgspec
 
 from hbvm_bench.run.worker import ENVIRONMENT
-from hbvm_bench.store.records import decoded
 from hbvm_bench.studies.race.families import OURS
-from problems.errors import InputError
 
-PROBES = "compile_times.json"
+PROBES = "compile_times"  # what the results of a race keep beside its cases
 TIMES = 3
 SLOW = 5.0  # seconds; what takes longer is measured once
 LIMIT = 180.0  # seconds
@@ -71,22 +69,6 @@ class Answer(msgspec.Struct, frozen=True):
     compile_seconds: float
     from_cache: bool | None
     refused: str = ""
-
-
-def load_probes(path: Path) -> list[Probe]:
-    """Read the compile times that were measured; none where there is no file.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the file is something else.
-    """
-    if not path.is_file():
-        return []
-    try:
-        return decoded(path.read_bytes(), list[Probe])
-    except (OSError, msgspec.MsgspecError, ValueError) as error:
-        raise InputError(f"{str(path)!r} is not the result of a race: {error}.") from None
 
 
 def probe(name: str, problem: str, h: float, families: Sequence[str]) -> list[Probe]:

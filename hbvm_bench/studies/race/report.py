@@ -1,4 +1,4 @@
-"""The report of a race, from stored results alone."""
+"""The blocks of the race's page."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -8,15 +8,16 @@ from hbvm_bench.campaign.file import name_of
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
-from hbvm_bench.report.document import Details, Document, Files, Items, Maker, Note, Section, attempt
-from hbvm_bench.report.figures.style import Look, looks
+from hbvm_bench.report.document import Details, Items, Note, Section, attempt
+from hbvm_bench.report.figures.style import Look
+from hbvm_bench.report.page import Results, block
 from hbvm_bench.report.provenance import PEERS, again
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
-from hbvm_bench.studies.race.results import FILE, Race, declared
+from hbvm_bench.studies.race.results import Race, by_kind, declared, of
 from hbvm_bench.summaries import outcomes
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.table import Table
 
 RULES_TEXT = """
 Fixed steps and steps that a method chooses itself are rows of their own, for every family that has both:
@@ -67,58 +68,65 @@ def _each(values: Iterable[str]) -> str:
     return " or ".join(dict.fromkeys(values))
 
 
-def document(races: Sequence[Race], others: Mapping[str, Sequence[Race]] | None = None) -> Document:
-    """Return the report on some races, beside all that was measured by the kind of processor."""
-    look = looks(family_of(one) for race in races for one in race.records)
-    in_order = sorted(races, key=lambda race: race.started)
-    last = in_order[-1]
-    top: list[Maker] = [
-        ("the ratios", partial(tables.headline, races)),
-        ("the goals", partial(tables.goals, races)),
+@block
+def machines(results: Results) -> list[Note]:
+    """Return what the times were taken on."""
+    races = sorted(of(results), key=lambda race: race.started)
+    return [Note(said) for said in machine.sentences(race.machine for race in races)]
+
+
+@block
+def ratios(results: Results) -> Table:
+    """Return the peers' best times over ours."""
+    return tables.headline(of(results))
+
+
+@block
+def kinds(results: Results) -> Table | None:
+    """Return the same by the kind of processor, where there are several."""
+    found = by_kind(results)
+    return tables.kinds(found) if len(found) > 1 else None
+
+
+@block
+def goals(results: Results) -> Table:
+    """Return what was asked for before, and what was measured."""
+    return tables.goals(of(results))
+
+
+@block
+def behind(results: Results) -> Table:
+    """Return the settings whose times are compared."""
+    return tables.behind(of(results))
+
+
+@block
+def contests(results: Results) -> list[Section]:
+    """Return the section of each problem."""
+    races = of(results)
+    navs = short([race.title for race in races])
+    return [section(race, results.look, nav) for race, nav in zip(races, navs, strict=True)]
+
+
+@block
+def terms(results: Results) -> Section:
+    """Return by what rules they competed."""
+    families = [f"{family.title}: {family.code}" for family in FAMILIES.values()]
+    blocks = [
+        Items(rules(of(results)), "numbered"),
+        *attempt(PEERS),
+        "What machine code runs:",
+        Items(families),
     ]
-    if others is not None and len(others) > 1:
-        top.insert(1, ("the kinds of processor", partial(tables.kinds, others)))
-    return Document(
-        "The race: who is how fast at which accuracy",
-        [
-            "Time at the same energy and position error: of every family the same number of settings for "
-            "either kind of step, fixed or its own, declared before the run, all in one process and "
-            "interleaved round by round."
-        ],
-        [
-            *map(Note, machine.sentences(race.machine for race in in_order)),
-            *attempt(*top),
-            *(
-                section(race, look, nav)
-                for race, nav in zip(races, short([race.title for race in races]), strict=True)
-            ),
-            Section(
-                "The rules",
-                [
-                    Items(rules(races), "numbered"),
-                    *attempt(PEERS),
-                    "What machine code runs:",
-                    Items([f"{family.title}: {family.code}" for family in FAMILIES.values()]),
-                ],
-                "rules",
-                nav="Rules",
-            ),
-            Section(
-                "Raw data",
-                [Files("With all timing samples", [FILE])],
-                "data-files",
-                nav="Data",
-            ),
-            again(
-                "race",
-                commands(in_order),
-                ", ".join(sorted({race.started[:10] for race in races})),
-                last.machine,
-                last.run.versions,
-            ),
-        ],
-        list(look.values()),
-    )
+    return Section("The rules", blocks, "rules", nav="Rules")
+
+
+@block
+def run_again(results: Results) -> Section:
+    """Return the commands, and what was measured with what."""
+    races = sorted(of(results), key=lambda race: race.started)
+    days = ", ".join(sorted({race.started[:10] for race in races}))
+    return again(commands(races), days, races[-1].machine, races[-1].run.versions)
 
 
 def short(titles: Sequence[str]) -> list[str]:

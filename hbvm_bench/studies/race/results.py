@@ -1,24 +1,19 @@
-"""What a race leaves behind, problem by problem; its pages are drawn from it without running anything.
+"""What a race says, problem by problem: read off the results of its campaign."""
 
-::
-
-    DIR/race.json                the records, with all timing samples
-    DIR/compile_times.json       what fresh processes pay
-    DIR/campaign.json, cases/    the store of the run, as every campaign has it
-"""
-
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
+
+import msgspec
 
 from hbvm_bench.campaign.file import Campaign, ProblemEntry, name_of
 from hbvm_bench.campaign.file import load as load_campaign
 from hbvm_bench.measure import machine
-from hbvm_bench.store import kept
+from hbvm_bench.report.page import Results
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
 from hbvm_bench.studies.race.families import OURS, Row, row_of
-from hbvm_bench.studies.race.probe import PROBES, Probe, load_probes
+from hbvm_bench.studies.race.probe import PROBES, Probe
 from hbvm_bench.summaries import standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.points import number
@@ -26,7 +21,6 @@ from hbvm_bench.summaries.standings import Comparison
 from problems.errors import InputError
 
 NAME = "race"
-FILE = "race.json"
 ERRORS = ENERGY, POSITION = ("energy_max", "position_end")
 
 
@@ -133,47 +127,34 @@ def declared() -> Campaign:
     return load_campaign(NAME)
 
 
-def load(directory: Path) -> list[Race]:
-    """Read the results in a directory, in the order of declaration.
+def of(results: Results) -> list[Race]:
+    """Return the contests of the processor that was measured last, in the order of declaration."""
+    return by_kind(results)[machine.kind(results.runs[-1].machine)]
+
+
+def by_kind(results: Results) -> dict[str, list[Race]]:
+    """Return the contests by the kind of processor, in the order of declaration."""
+    return {kind: _contests(runs, probes(results)) for kind, runs in results.by_processor.items()}
+
+
+def probes(results: Results) -> list[Probe]:
+    """Return the compile times that are kept beside the cases.
 
     Raises
     ------
     problems.errors.InputError
-        If there are none, or a file is not a result.
+        If they are something else.
     """
-    found = _in(directory)
-    if not found:
-        raise InputError(
-            f"there is no result of a race in {str(directory)!r}; run: hbvm-bench race --out DIR."
-        )
-    return found
+    try:
+        return msgspec.convert(results.beside.get(PROBES, []), list[Probe])
+    except msgspec.ValidationError as error:
+        raise InputError(f"the compile times of the race are damaged: {error}.") from None
 
 
-def by_kind(directory: Path) -> dict[str, list[Race]]:
-    """Read the results in a directory and in the directories in it, by the kind of processor.
-
-    Several kinds lie side by side as ``DIR`` and ``DIR/<kind>``. Of two results of
-    one problem on one kind the outer directory's counts.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If a file is not a result.
-    """
-    found: dict[str, list[Race]] = {}
-    for folder in [directory, *sorted(path for path in directory.glob("*") if path.is_dir())]:
-        for race in _in(folder):
-            of_kind = found.setdefault(machine.kind(race.machine), [])
-            if race.key not in {one.key for one in of_kind}:
-                of_kind.append(race)
-    return found
-
-
-def _in(directory: Path) -> list[Race]:
-    probes = load_probes(directory / PROBES)
+def _contests(runs: Sequence[Kept], measured: Sequence[Probe]) -> list[Race]:
     found = {
-        name_of(entry): Race(entry, run, records, [one for one in probes if one.problem == name_of(entry)])
-        for run in kept.load(directory / FILE, NAME)
+        name_of(entry): Race(entry, run, records, [one for one in measured if one.problem == name_of(entry)])
+        for run in runs
         for entry, records in standings.entries(run.index.campaign, run.records)
         if records
     }

@@ -3,16 +3,12 @@
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from hbvm_bench.campaign import file as campaigns
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.entries import Limits
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen, quick_run
-from hbvm_bench.cli import main
-from hbvm_bench.commands import studies
-from hbvm_bench.measure import reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.run import references
 from hbvm_bench.store.store import Store
@@ -87,17 +83,3 @@ def test_a_quick_run_shortens_no_span_of_a_file_and_keeps_no_end_of_another_span
     ends = {campaigns.name_of(entry): entry.end for entry in shorter.entries()}
     assert len(ends["robertson"]) == 3
     assert ends["stiff_chain"] is None
-
-
-def test_the_command_runs_a_part_of_it(tmp_path, monkeypatch, capsys):
-    declared = campaigns.load("general")
-    alone = replace(declared, methods=declared.methods[:1], timing=replace(declared.timing, rounds=0))
-    monkeypatch.setattr(studies, "load", lambda name: alone)
-    monkeypatch.chdir(tmp_path)
-    assert main(["automatic", "--general", "driven_pendulum"]) == 0
-    (ours,) = reading.records(Store(Path("runs/general")))
-    assert ours.case.method == "HBVM(tol=3e-16)"
-    assert ours.result.metrics["position_end"].value < 1e-11  # measured 2.2e-15
-    assert "time of Radau over ours" in capsys.readouterr().out
-    assert main(["automatic", "--general", "robertsen"]) == 2
-    assert "did you mean 'robertson'" in capsys.readouterr().err

@@ -13,8 +13,8 @@ from hbvm_bench.campaign import file, own
 from hbvm_bench.campaign.identity import make_problem, resolve, typed_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import reading
-from hbvm_bench.report.campaign import document
 from hbvm_bench.report.markdown import markdown
+from hbvm_bench.report.page import document
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
 

@@ -4,23 +4,28 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import TimingPlan
 from hbvm_bench.cli import main
+from hbvm_bench.commands.publishing import report_on
 from hbvm_bench.measure import machine, processor
 from hbvm_bench.report.markdown import markdown
-from hbvm_bench.report.write import write
+from hbvm_bench.report.page import page_of
 from hbvm_bench.run import timing_pass
-from hbvm_bench.store import kept
+from hbvm_bench.store import archive
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Timing
-from hbvm_bench.studies import automatic
-from hbvm_bench.studies.race import report, results, tables
+from hbvm_bench.store.store import Store
+from hbvm_bench.studies.race import results, tables
 from problems.errors import InputError
-from tests.hbvm_bench.studies.race.conftest import made_up, save
+from tests.hbvm_bench.made_up_run import archived, results_of
+from tests.hbvm_bench.studies.race.conftest import made_up
 from tests.hbvm_bench.studies.test_automatic import made as of
 
 OLD = {"processor": "AMD EPYC", "cores": 2, "vector_instructions": "AVX-512"}
@@ -127,24 +132,38 @@ def test_a_processor_without_avx2_is_refused(monkeypatch, capsys):
         machine.restricted_to_avx2()
     assert main(["race", "--quick", "--avx2"]) == 2
     assert "--avx2" in capsys.readouterr().err
-    assert main(["automatic", "--general", "--avx2"]) == 2
+
+
+def keep(run, directory):
+    """Write the report of a run into a directory, as the command does."""
+    with tempfile.TemporaryDirectory() as folder:
+        store = Store(Path(folder))
+        store.prepare()
+        for one in run.records:
+            store.save(one, {"t": np.arange(2.0), "y": np.zeros((2, 2))})
+        store.write_index(run.index)
+        return report_on([store], directory)
+
+
+def text_in(directory):
+    return (directory / "README.md").read_text(encoding="utf-8")
 
 
 def test_results_of_several_kinds_lie_side_by_side(tmp_path):
-    automatic.keep(of(ZEN4), tmp_path)
-    automatic.keep(of(ZEN5, 3.0), tmp_path)
-    automatic.keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
-    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
-    assert {path.name for path in tmp_path.iterdir()} == {"znver4-256bit.json", "znver5.json"}
+    keep(of(ZEN4), tmp_path)
+    keep(of(ZEN5, 3.0), tmp_path)
+    keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
+    page = text_in(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {archive.NAME, "README.md", "index.html"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
     assert (
         "| `kepler(e=0.6, t_end=3150.0)` | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 3.00× reached" in page
     )
     assert re.search(r"`henon_heiles\(.*\)` \| .* \| not run", page)
     assert "256 bits wide" in page
-    (tmp_path / "znver4-256bit.json").write_bytes(b"{}")
-    with pytest.raises(InputError, match="not the result of automatic"):
-        automatic.by_kind(tmp_path)
+    archived(tmp_path, msgspec.structs.replace(of(ZEN5), index=made_up().run.index))
+    with pytest.raises(InputError, match="has results of 'race'"):
+        keep(of(ZEN4), tmp_path)
 
 
 def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
@@ -158,52 +177,36 @@ def test_a_number_stays_with_the_run_that_it_came_from(tmp_path):
             for one in later.records
         ],
     )
-    automatic.keep(first, tmp_path)
-    automatic.keep(later, tmp_path)
-    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
-    assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [first, later]
+    keep(first, tmp_path)
+    keep(later, tmp_path)
+    assert [one.records() for one in archive.read(tmp_path / archive.NAME)] == [first.records, later.records]
+    page = text_in(tmp_path)
     assert "Measured on 2026-01-02 with numpy 2: `hbvm-bench automatic`" in page
     assert "Measured on 2027-01-02 with numpy 3: `hbvm-bench automatic henon_heiles`" in page
     again = of(ZEN4)
-    automatic.keep(again, tmp_path)
-    assert kept.load(tmp_path / "znver4-256bit.json", "automatic") == [later, again]
+    keep(again, tmp_path)
+    assert [one.records() for one in archive.read(tmp_path / archive.NAME)] == [later.records, again.records]
 
 
 def test_arithmetic_of_another_width_is_another_kind(tmp_path):
     for bits, ratio in ((512, 2.0), (256, 3.0)):
-        automatic.keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path)
-    page = markdown(automatic.document(automatic.by_kind(tmp_path)))
+        keep(of(ZEN5 | {"vector_bits": bits}, ratio), tmp_path)
+    page = text_in(tmp_path)
     assert "| znver5-256bit | znver5-512bit |" in page
     assert re.search(r"\| 3\.00× reached \| 2\.00× reached \|", page)
 
 
-def test_races_of_several_kinds_are_columns_of_one_table(tmp_path, capsys):
-    save(made_up(machine=ZEN5), tmp_path / "race")
-    save(made_up(machine=ZEN4 | {"ours_built_for": "AVX2"}), tmp_path / "race" / "znver4-avx2")
-    found = results.by_kind(tmp_path / "race")
-    assert list(found) == ["znver5", "znver4-256bit-avx2"]
+def test_races_of_several_kinds_are_columns_of_one_table():
+    runs = made_up(machine=ZEN4 | {"ours_built_for": "AVX2"}).run, made_up(machine=ZEN5).run
+    found = results.by_kind(results_of(*runs))
+    assert list(found) == ["znver4-256bit-avx2", "znver5"]
     table = tables.kinds(found)
-    assert table.head == ("problem", "peer", "znver5", "znver4-256bit-avx2")
+    assert table.head == ("problem", "peer", "znver4-256bit-avx2", "znver5")
     assert table.rows[0][1] == "heyoka"
     assert table.rows[0][2] == table.rows[0][3] == "15.0× (15.0–15.0)"
-    path, _ = write(report.document(found["znver5"], found), tmp_path / "race")
-    text = path.read_text(encoding="utf-8")
+    text = markdown(page_of(results_of(*runs)))
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
-    automatic.keep(of(ZEN4), tmp_path / "automatic")
-    automatic.keep(of(ZEN5, 1.5), tmp_path / "automatic")
-    assert main(["headline", str(tmp_path)]) == 0
-    said = capsys.readouterr().out
-    assert "was restricted to AVX2" in said
     goal = "time of Taylor over ours, energy ≤ 1e-13, position ≤ 1e-10"
-    assert f"| Outer Solar System, six bodies, 12 000 years | {goal} | ≥ 10 | 15.0×" in said
-    assert "| Outer Solar System, six bodies, 12 000 years | `Gauss(s=8, h=1.5)` | `Taylor()` |" in said
-    assert "| problem | against | goal | znver4-256bit | znver5 |" in said
-    assert (
-        "| `kepler(e=0.6, t_end=3150.0)` | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 1.50× missed |" in said
-    )
-
-
-def test_without_results_there_is_no_headline(tmp_path, capsys):
-    assert main(["headline", str(tmp_path)]) == 2
-    assert "no result of a race" in capsys.readouterr().err
+    assert f"| Outer Solar System, six bodies, 12 000 years | {goal} | ≥ 10 | 15.0×" in text
+    assert "| Outer Solar System, six bodies, 12 000 years | `Gauss(s=8, h=1.5)` | `Taylor()` |" in text

@@ -5,13 +5,14 @@ import pytest
 pytest.importorskip("playwright.sync_api")
 
 from hbvm_bench.report.document import Claim, Claims, Document, Section
+from hbvm_bench.report.page import document, page_of
 from hbvm_bench.report.write import write
-from hbvm_bench.studies import endure
+from hbvm_bench.store.store import Store
 from hbvm_bench.studies.paper.drawn import LOOKS
 from hbvm_bench.studies.paper.experiments.properties import Order
 from hbvm_bench.studies.paper.properties_part import order
-from hbvm_bench.studies.race import report as race
 from hbvm_bench.summaries.table import Table
+from tests.hbvm_bench.made_up_run import results_of
 from tests.hbvm_bench.studies import test_endure
 from tests.hbvm_bench.studies.race.conftest import made_up as made_up_race
 
@@ -39,9 +40,10 @@ def made_up_document():
 def folder(request, tmp_path_factory):
     target = tmp_path_factory.mktemp(request.param)
     if request.param == "race":
-        made = race.document([made_up_race()])
+        made = page_of(results_of(made_up_race().run))
     elif request.param == "endure":
-        made = endure.document(test_endure.made(target, years=1e5, starts=3))
+        test_endure.made(target, years=1e5, starts=3)
+        made = document(Store(target))
     else:
         made = made_up_document()
     write(made, target)

@@ -11,11 +11,11 @@ from hbvm_bench.campaign.file import Campaign, Ensemble, MethodEntry, TimingPlan
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.report import words
-from hbvm_bench.report.campaign import document
 from hbvm_bench.report.document import SHOWN
 from hbvm_bench.report.figures.over_time import BINS, envelope
 from hbvm_bench.report.figures.style import looks, panels
 from hbvm_bench.report.markdown import code, plain
+from hbvm_bench.report.page import document
 from hbvm_bench.report.problem import part
 from hbvm_bench.report.write import write
 from hbvm_bench.store import archive

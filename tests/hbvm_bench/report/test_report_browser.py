@@ -14,7 +14,7 @@ pytest.importorskip("playwright.sync_api")
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect, sync_playwright
 
-from hbvm_bench.report.campaign import document
+from hbvm_bench.report.page import document
 from hbvm_bench.report.write import write
 from hbvm_bench.store.store import Store
 from tests.hbvm_bench import made_up_run

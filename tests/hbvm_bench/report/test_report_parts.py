@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hbvm_bench.report import pack
-from hbvm_bench.report.campaign import document, gather
 from hbvm_bench.report.document import Details
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace, numbers
 from hbvm_bench.report.figures.portraits import crossings
 from hbvm_bench.report.index import write_index
 from hbvm_bench.report.markdown import markdown
+from hbvm_bench.report.page import document, gather
 from hbvm_bench.store.merge import merge
 from hbvm_bench.store.records import Result
 from hbvm_bench.store.store import Store
@@ -74,7 +74,7 @@ def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
     content = gather([first, second])
     assert len(content.records) == 4 + 3  # the case that the first run lacks is in the second
     assert [record.seconds for record in content.records if record.id == newer.id] == [7.0]
-    assert content.runs[0].missing == []
+    assert content.missing(content.runs[0]) == []
     made = document([first, second])
     assert made.title.startswith("2 runs together")
     assert "Measured on 2026-11-21 to 2026-11-22" in markdown(made)
@@ -100,7 +100,7 @@ def test_a_report_keeps_of_a_case_what_merge_keeps(tmp_path):
 def test_what_is_missing_is_named(tmp_path):
     store = made_up_run.write(Store(tmp_path), ["pendulum(p=1.0)"], 3, missing=1)
     content = gather([store])
-    assert [case.method for case in content.runs[0].missing] == [made_up_run.methods(3)[0]]
+    assert [case.method for case in content.missing(content.runs[0])] == [made_up_run.methods(3)[0]]
     folded = [block.summary for block in document(store).walk() if isinstance(block, Details)]
     assert "1 cases on this problem have no result yet" in folded
 

@@ -10,7 +10,7 @@ import pytest
 from hbvm_bench.measure import reading
 from hbvm_bench.report import html, markdown
 from hbvm_bench.report.archived import contents
-from hbvm_bench.report.campaign import document
+from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
@@ -80,7 +80,7 @@ def rows(text):
     return sorted(re.findall(r"^\| \d+ \| `.*$", text, re.MULTILINE))
 
 
-@pytest.mark.parametrize("name", ARCHIVED)
+@pytest.mark.parametrize("name", [name for name in ARCHIVED if (REPORTS / name / "report.md").is_file()])
 def test_a_committed_archive_has_the_numbers_of_its_text(name):
     folder = REPORTS / name
     made = document(archive.opened([folder]))

@@ -10,8 +10,7 @@ import pytest
 
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.cli import main
-from hbvm_bench.measure import reading
-from hbvm_bench.store import kept
+from hbvm_bench.report.page import gather
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index, Store
@@ -63,7 +62,7 @@ def test_both_sides_are_measured_on_the_same_trajectory_and_a_rerun_does_nothing
     monkeypatch.chdir(tmp_path)
     assert main(["automatic", "henon_heiles", "--rounds", "2", "--out", "kept"]) == 0
     store = Store(tmp_path / "runs" / "automatic")
-    run = kept.of(store, "automatic", reading.records(store))
+    (run,) = gather([store]).runs
     (duel,) = automatic.duels(run)
     for side in (duel.ours, duel.theirs):
         metrics = side.result.metrics

@@ -12,6 +12,7 @@ from hbvm_bench.store.store import Index
 from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import Race
+from tests.hbvm_bench.made_up_run import archived
 
 MACHINE = {"processor": "<b>fast</b> | one"}
 
@@ -104,6 +105,7 @@ def made_up(**said):
         ids=[one.id for one in records],
         version="0",
         command=said.get("command", "hbvm-bench race --quick"),
+        cases=[one.case for one in records],
     )
     probes = [
         Probe(
@@ -122,4 +124,4 @@ def made_up(**said):
 
 def save(race, directory):
     """Keep a race in a directory, as the command does."""
-    results.kept.keep(race.run, directory / results.FILE, "race")
+    archived(directory, race.run)

@@ -10,10 +10,14 @@ from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.campaign.shorter import chosen
 from hbvm_bench.commands.studies import race_as_data
 from hbvm_bench.report.figures.style import looks
+from hbvm_bench.report.page import gather, page_of
 from hbvm_bench.report.write import write
+from hbvm_bench.store import archive
+from hbvm_bench.store.archive import opened
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.figures import work_precision
 from problems.errors import InputError
+from tests.hbvm_bench.made_up_run import results_of
 from tests.hbvm_bench.studies.race.conftest import record, save
 
 REPORTS = Path(__file__).parents[4] / "reports"
@@ -21,30 +25,14 @@ REPORTS = Path(__file__).parents[4] / "reports"
 
 def test_a_stored_race_is_read_back_equal(race, tmp_path):
     save(race, tmp_path)
-    (found,) = results.load(tmp_path)
+    (found,) = results.of(gather(opened([tmp_path])))
     assert (found.entry, found.run, found.records) == (race.entry, race.run, race.records)
-    assert [p.name for p in tmp_path.iterdir()] == ["race.json"]  # no temporary file is left
+    assert [p.name for p in tmp_path.iterdir()] == [archive.NAME]  # no temporary file is left
 
 
-def test_an_empty_directory_says_how_to_fill_it(tmp_path):
-    with pytest.raises(InputError, match="hbvm-bench race --out"):
-        results.load(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["race.json", "compile_times.json"])
-@pytest.mark.parametrize("content", [b"", b"{", b'{"contest": 1}'])
-def test_a_file_that_is_no_race_is_refused_by_name(content, name, race, tmp_path):
-    save(race, tmp_path)
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=name):
-        results.load(tmp_path)
-
-
-def test_a_race_of_another_version_is_refused(race, tmp_path):
-    other = msgspec.structs.replace(race.run, schema=0)
-    (tmp_path / "race.json").write_bytes(msgspec.json.encode([other]))
-    with pytest.raises(InputError, match="another version"):
-        results.load(tmp_path)
+def test_compile_times_that_are_none_are_refused(race):
+    with pytest.raises(InputError, match="compile times of the race are damaged"):
+        results.of(results_of(race.run, beside={"compile_times": {"contest": 1}}))
 
 
 def test_the_json_has_ratios_goals_and_all_samples(race):
@@ -60,8 +48,8 @@ def test_the_json_has_ratios_goals_and_all_samples(race):
 
 
 def test_the_report_is_drawn_from_the_results_alone_and_deterministic(race, tmp_path):
-    first = [path.read_bytes() for path in write(report.document([race]), tmp_path / "a")]
-    second = [path.read_bytes() for path in write(report.document([race]), tmp_path / "b")]
+    first = [path.read_bytes() for path in write(page_of(results_of(race.run)), tmp_path / "a")]
+    second = [path.read_bytes() for path in write(page_of(results_of(race.run)), tmp_path / "b")]
     assert first == second
     figure = "figures/work-precision-outer_solar_system.svg"
     assert (tmp_path / "a" / figure).read_bytes() == (tmp_path / "b" / figure).read_bytes()
@@ -69,10 +57,10 @@ def test_the_report_is_drawn_from_the_results_alone_and_deterministic(race, tmp_
 
 
 def test_the_page_asks_for_nothing_and_escapes_everything(race, tmp_path):
-    page = write(report.document([race]), tmp_path)[1].read_text()
+    page = write(page_of(results_of(race.run)), tmp_path)[1].read_text()
     assert "<b>fast</b>" not in page
     assert "&lt;b&gt;fast&lt;/b&gt;" in page
-    assert not re.search(r'(?:src|href)="(?!#|figures/|data/|\w+\.json")', page)
+    assert not re.search(r'(?:src|href)="(?!#|results\.json\.xz")', page)
     assert page.count("<table") == page.count("</table>")
 
 
@@ -155,7 +143,7 @@ def test_the_rules_are_those_of_the_run_and_not_of_the_file_of_today(race):
 
 
 def test_a_quick_run_has_the_best_known_setting_of_every_family():
-    for races in results.by_kind(REPORTS / "race").values():
+    for races in results.by_kind(gather(opened([REPORTS / "race"]))).values():
         for race in races:
             short = msgspec.structs.replace(chosen(results.declared(), [race.key]), quick=True)
             there = {resolve(case).case.method for case in short.cases()}

@@ -8,6 +8,8 @@ import time
 import pytest
 
 from hbvm_bench.cli import main
+from hbvm_bench.report.page import gather
+from hbvm_bench.store.store import Store
 from hbvm_bench.studies.race import results
 
 
@@ -19,10 +21,8 @@ def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
     data = json.loads(capsys.readouterr().out)
     assert [race["problem"] for race in data["races"]] == ["kepler"]
     assert {ratio["peer"] for ratio in data["ratios"]} == {"Taylor", "IAS15", "Leapfrog", "DOP853"}
-    assert {path.name for path in tmp_path.iterdir()} == {
-        *("race.json", "campaign.json", "cases", "README.md", "index.html", "figures", "data")
-    }
-    (race,) = results.load(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {*("campaign.json", "cases", "readings", "report")}
+    (race,) = results.of(gather([Store(tmp_path)]))
     ours, taylor = race.best("", 1e-13, 1e-10), race.best("Taylor", 1e-13, 1e-10)
     for record, energy, position in ((ours, 1e-13, 1e-10), (taylor, 1e-13, 1e-11)):
         assert record.result.metrics["energy_max"].value < energy  # measured 7e-15 and 3e-15
@@ -30,8 +30,7 @@ def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
         assert [one.number for one in record.timing.rounds] == [0, 1]
         assert record.timing.call > 0
     assert len(race.calibration) == 2
-    assert str(tmp_path) not in (tmp_path / "README.md").read_text()
-    assert main(["race", "--redraw", "--out", str(tmp_path)]) == 0
+    assert str(tmp_path) not in (tmp_path / "report" / "README.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -39,7 +38,6 @@ def test_the_quick_race_runs_and_prints_json(tmp_path, capsys):
     [
         (["--problem", "keppler"], "kepler"),
         (["--rounds", "1"], "rounds"),
-        (["--redraw", "--out", "/nowhere/at/all"], "no result"),
         (["--out", "/proc/nowhere"], "cannot write"),
         (["--speed"], "speed"),
     ],
@@ -99,6 +97,6 @@ def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     assert "21, 21 already there" in capsys.readouterr().err
     after = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert after == measured
-    (race,) = results.load(tmp_path)
+    (race,) = results.of(gather([Store(tmp_path)]))
     assert {one.timing.process for one in race.records if one.timing} != {""}
     assert all(len(one.timing.rounds) == 2 for one in race.records if one.timing and one.timing.rounds)

@@ -1,0 +1,209 @@
+"""The one builder of pages: a campaign names the blocks of its page, and a block is a function of results.
+
+A name without a colon is that of a block in `hbvm_bench.report.campaign`; ``race.report:ratios`` is the
+function ``ratios`` of ``hbvm_bench/studies/race/report.py``. A new block is a function with `block` above it.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from importlib import import_module
+from typing import TypeVar
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from hbvm_bench.campaign.file import Case, Page
+from hbvm_bench.campaign.identity import make_problem
+from hbvm_bench.measure import machine, reading
+from hbvm_bench.report.archived import pictures
+from hbvm_bench.report.document import Block, Document, attempt
+from hbvm_bench.report.figures.canvas import Picture
+from hbvm_bench.report.figures.style import Look, looks
+from hbvm_bench.store.archive import Archive, Drawing
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Store, again, damage, progress
+from hbvm_bench.summaries.points import family_of
+from problems.errors import InputError, unknown
+
+Series = dict[str, NDArray[np.float64]]
+Stores = Sequence[Store] | Sequence[Archive] | Sequence[Store | Archive]
+Made = Block | Sequence[Block] | None
+
+DRAWN_CASES = 300  # of a larger campaign the first so many are drawn: a figure takes seconds
+HERE, STUDIES = "hbvm_bench.report.campaign", "hbvm_bench.studies"
+DEFAULT = (
+    *("goals_reached", "overview_of_many", "what_came_out", "overview_of_one", "problems_in_turn"),
+    *("fairness", "raw_data", "run_again", "sources"),
+)
+"""The blocks of a campaign that names none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What a page is made of.
+
+    Attributes
+    ----------
+    runs : list of Kept
+        What was asked for, and the records of each.
+    records : list of Record
+        Of all cases; of one that several runs have, that of the run that got further with it.
+    series : dict
+        What is drawn of each case, by its id; empty where an archive has drawings instead.
+    drawings : sequence of Drawing
+        Of an archive.
+    beside : dict
+        What a study keeps beside its cases, by name.
+    """
+
+    runs: list[Kept]
+    records: list[Record]
+    series: dict[str, Series]
+    drawings: Sequence[Drawing] = ()
+    beside: dict[str, object] = field(default_factory=dict)
+
+    @property
+    def page(self) -> Page:
+        """What the campaign says of its page; several campaigns together have the default one."""
+        pages = {run.index.campaign.name: run.index.campaign.page for run in self.runs}
+        return next(iter(pages.values())) if len(pages) == 1 else Page()
+
+    @cached_property
+    def look(self) -> dict[str, Look]:
+        """The colour and marker of each method, or of each family where the page has it so."""
+        name = family_of if self.page.colours == "family" else lambda record: record.case.method
+        return looks(map(name, self.records))
+
+    def missing(self, run: Kept) -> list[Case]:
+        """Return the cases of a run that have no result yet."""
+        there = {record.id for record in self.records}
+        return [case for number, case in run.index.listed() if number not in there]
+
+    @cached_property
+    def by_processor(self) -> dict[str, list[Kept]]:
+        """The runs by the kind of processor, by its name."""
+        found: dict[str, list[Kept]] = {}
+        for run in self.runs:
+            found.setdefault(machine.kind(run.machine), []).append(run)
+        return dict(sorted(found.items()))
+
+    def drawn(self, place: str) -> list[Picture]:
+        """Return the figures of a section as an archive has them."""
+        return pictures(self.drawings, place)
+
+
+BlockMaker = Callable[[Results], Made]
+F = TypeVar("F", bound=BlockMaker)
+_blocks: dict[str, BlockMaker] = {}
+
+
+def block(function: F) -> F:
+    """Let campaign files name a function of results as a block of their page."""
+    _blocks[f"{function.__module__}:{function.__name__}"] = function
+    return function
+
+
+def find(name: str) -> BlockMaker:
+    """Return the block called ``name``.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is none, with the nearest names.
+    """
+    module, _, function = name.rpartition(":")
+    place = f"{STUDIES}.{module}" if module else HERE
+    if re.fullmatch(r"[\w.]+", place):
+        try:
+            import_module(place)
+        except ModuleNotFoundError:
+            raise unknown("block of a page", name, _names()) from None
+    if f"{place}:{function}" not in _blocks:
+        raise unknown("block of a page", name, _names())
+    return _blocks[f"{place}:{function}"]
+
+
+def _names() -> list[str]:
+    return [name.removeprefix(f"{HERE}:").removeprefix(f"{STUDIES}.") for name in _blocks]
+
+
+def gather(stores: Stores) -> Results:
+    """Read the stores of one or more runs, or the runs of an archive.
+
+    A case that several runs have is taken from the one that got further with it
+    (`hbvm_bench.store.store.progress`).
+
+    Raises
+    ------
+    problems.errors.InputError
+        If a directory holds no run, or no run has a finished case.
+    """
+    indices = [store.index() for store in stores]
+    runs = []
+    furthest: dict[str, tuple[Record, Store | Archive]] = {}
+    for store, index in zip(stores, indices, strict=True):
+        runs.append(Kept(index=index, records=reading.records(store)))
+        for record in runs[-1].records:
+            if record.id not in furthest or progress(record) > progress(furthest[record.id][0]):
+                furthest[record.id] = (record, store)
+    if not furthest:
+        raise InputError(
+            f"none of the {sum(len(index.ids) for index in indices)} cases of the run in "
+            f"{str(stores[0].directory)!r} has finished; {again(indices[0], stores[0].directory)}."
+        )
+    series: dict[str, Series] = {}
+    records: list[Record] = []
+    last = None
+    for number, (key, (record, store)) in enumerate(furthest.items()):
+        if store is not last:
+            store.learn()  # of two runs each may have a reference of its own
+            last = store
+        found, series[key] = record, {}
+        if isinstance(store, Archive):
+            series[key] = store.series(key)
+        elif number < DRAWN_CASES:
+            found, series[key] = _read(record, store)
+        records.append(found)
+    beside = {name: value for store in stores for name, value in store.beside().items()}
+    return Results(runs, records, series, _drawings(stores), beside)
+
+
+def document(stores: Store | Stores) -> Document:
+    """Return the page on one or more runs; raises what `gather` and `find` do."""
+    return page_of(gather([stores] if isinstance(stores, Store) else stores))
+
+
+def page_of(results: Results) -> Document:
+    """Return the page on results; raises what `find` does."""
+    page, campaigns = results.page, [run.index.campaign for run in results.runs]
+    makers = [(name, partial(find(name), results)) for name in page.blocks or DEFAULT]
+    one = len({campaign.name for campaign in campaigns}) == 1
+    titles = [campaign.title or campaign.name for campaign in campaigns]
+    together = f"{len(titles)} runs together: {'; '.join(titles)}"
+    return Document(
+        titles[0] if one and (page.by_processor or len(titles) == 1) else together,
+        page.lead or ([campaigns[0].description] if len(campaigns) == 1 else []),
+        attempt(*makers),
+        list(results.look.values()),
+        name=page.name,
+    )
+
+
+def _drawings(stores: Stores) -> Sequence[Drawing]:
+    """Return the figures that an archive has in the place of series; its runs have them in common."""
+    return next((store.drawings for store in stores if isinstance(store, Archive)), ())
+
+
+def _read(record: Record, store: Store) -> tuple[Record, Series]:
+    """Return a record and its series; where these are damaged, none and a remark."""
+    series = store.series(record.id)
+    why = damage(record, series, make_problem(record.case.problem).system.dim)
+    if not why:
+        return record, reading.drawn(record, series)
+    said = f"its series in the store are damaged ({why}): not drawn"
+    note = "; ".join(text for text in (record.case.note, said) if text)
+    return replace(record, case=replace(record.case, note=note)), {}
