@@ -475,7 +475,7 @@ class AdaptiveProgram(HBVMProgram):
         context.negligible = self._negligible
         context.sides = self._sides.address if self._sides else 0
         context.absolute[:] = self._absolute
-        context.asks = int(self.atol is None)
+        context.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
         self.limit(context, 0.0)
         context.stop = context.length_limit = math.inf
         return context

@@ -23,13 +23,14 @@ from integrators.kernel.context import (
 from integrators.kernel.native import engine
 from integrators.kernel.step.rule import FIRST_AT_REST, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
-from integrators.options import SHORTEST
+from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Stats, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
 
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
+NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
 
@@ -60,6 +61,7 @@ class AdaptiveStepper(HBVMStepper):
         self._breakpoints = program.breakpoints(par)
         self._origin = self._goal = t0
         self._reached, self._in_vain = np.empty((0, 1 + y.size)), 1
+        self._given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
         super().__init__(program, y, par, t0)
         if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.border = START
@@ -172,33 +174,83 @@ class AdaptiveStepper(HBVMStepper):
         """Let errors be relative to what the blocks will reach, or to their own sizes if that is no more.
 
         A second trajectory tells it, whose steps only the iteration, the interval and the breakpoints limit.
+        Where errors grow, as in y' = y + f(t), what is allowed is less by as much.
         """
         ctx = self._context
         ahead = math.copysign(1.0, ctx.next_length)
-        known = self._reached[ahead * (self._reached[:, 0] - self.t) >= 0.0]
-        if not len(known) and ahead * (self._goal - self.t) > 0.0:
-            scout = self._program.start(self.y, ctx.par.copy(), self.t)
-            scout.only_looks()
-            pieces = [scout.walk(self._goal, limit=LOOK_AHEAD)]
-            if not scout.status.failed and scout.stats.steps < LOOK_AHEAD:
-                pieces.append(scout.advance([self._goal]))
-            known = np.concatenate([np.column_stack([made.t, np.abs(made.y)]) for made in pieces])
-            self._reached = known
-            ctx.evaluations += scout.stats.evaluations or 0
-            ctx.iterations += scout.stats.iterations or 0
-        sizes = known[:, 1:].max(axis=0, initial=0.0)
-        shape = ctx.shape
-        ctx.expected[:] = 0.0
-        np.maximum.at(ctx.expected, shape.block, sizes[-shape.rows :])
-        if not (ctx.expected > LARGER * ctx.extent).any():
+        expected = self._expected(ahead) if self._given is None else self._given
+        if not (expected > LARGER * ctx.extent).any():
+            ctx.expected[:] = 0.0
             self._in_vain *= 2
             ctx.asks = -self._in_vain
             return
+        ctx.expected[:] = expected
         ctx.rescaled, ctx.age = SCALE_LASTS, 0
         ctx.next_length = ahead * max(FIRST_AT_REST * ctx.interval, abs(ctx.next_length))
         places = ctx.kink_places.reshape(-1, 2)[: min(ctx.kinks, KINKS_KEPT), 0]
         if len(places) and ahead * (places[-1] - self.t) > -FIRST_AT_REST * ctx.interval:
             ctx.kinks -= 1  # by a block's own size; if it is one by this size, it is found again
+
+    def _expected(self, ahead: float) -> Array:
+        """Return the sizes that errors of the blocks may be relative to."""
+        known = self._reached[ahead * (self._reached[:, 0] - self.t) >= 0.0]
+        if not len(known) and ahead * (self._goal - self.t) > 0.0:
+            scout = self._scout(self.y)
+            scout.only_looks()
+            known = self._reached = self._seen(scout)
+            self._charge(scout)
+        sizes = known[:, 1:].max(axis=0, initial=0.0)
+        expected = self._of_blocks(sizes)
+        if (expected > LARGER * self._context.extent).any():
+            growth = self._growth(known[-1, 0], sizes, expected)
+            expected *= min(1.0, max(1.0, NOISE / self._program.tol) / growth)
+        return expected
+
+    def _scout(self, y: Array) -> "AdaptiveStepper":
+        """Return a trajectory from a state now."""
+        return self._program.start(y, self._context.par.copy(), self.t)
+
+    def _seen(self, scout: "AdaptiveStepper") -> Array:
+        """Return times and sizes on a trajectory to the goal: its first steps, and the end."""
+        pieces = [scout.walk(self._goal, limit=LOOK_AHEAD)]
+        if not scout.status.failed and scout.stats.steps < LOOK_AHEAD:
+            pieces.append(scout.advance([self._goal]))
+        return np.concatenate([np.column_stack([made.t, np.abs(made.y)]) for made in pieces])
+
+    def _charge(self, scout: "AdaptiveStepper") -> None:
+        """Count the work of a trajectory that looks ahead as this one's."""
+        self._context.evaluations += scout.stats.evaluations or 0
+        self._context.iterations += scout.stats.iterations or 0
+
+    def _of_blocks(self, sizes: Array) -> Array:
+        """Return the largest of the sizes of components in each block."""
+        shape = self._context.shape
+        largest = np.zeros(shape.group.size)
+        np.maximum.at(largest, shape.block, sizes[-shape.rows :])
+        return largest
+
+    def _growth(self, end: float, sizes: Array, expected: Array) -> float:
+        """Return how many times as large a small error becomes by ``end``, at most, beside what is reached.
+
+        Two trajectories tell it whose errors are relative to that, one of them from a state that is moved.
+        """
+        nudge = math.sqrt(max(self._program.tol, SMALLEST))
+        moved = np.random.default_rng(0).choice([-1.0, 1.0], sizes.size)
+        times = np.linspace(self.t, end, 65)[1:]
+        found = []
+        for shift in (0.0, nudge):
+            scout = self._scout(self.y + shift * moved * sizes)
+            scout._given = scout._context.expected[:] = expected
+            scout._context.rescaled = SCALE_LASTS
+            made = scout.advance(times)
+            self._charge(scout)
+            found.append(made.y)
+        count = min(map(len, found))
+        if count < len(times):
+            return math.inf
+        apart = np.abs(found[0] - found[1]) / np.where(sizes > 0.0, sizes, math.inf)
+        largest = np.maximum(np.append(nudge, apart.max(axis=1)), nudge**1.5)
+        return float((largest / np.minimum.accumulate(largest)).max())
 
     def only_looks(self) -> None:
         """Take steps whatever their errors are."""

@@ -127,7 +127,8 @@ class HBVM(MethodBase):
         q'' = a(q) those of the momenta). So a step is good enough where its error is at most
         ``max(tol * size, atol)``. 0: errors are relative, always. By default the same, but where a step does
         not become good enough by cutting it, as from rest, errors may there be relative to the
-        largest size that a block will reach in the interval; a second, coarse trajectory tells it.
+        largest size that a block will reach in the interval, divided by how much errors grow on the way;
+        coarse further trajectories tell it.
 
     Raises
     ------

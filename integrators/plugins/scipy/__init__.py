@@ -58,7 +58,7 @@ class HBVM(OdeSolver):
         ``dy``; or the `field` of a problem or system.
     t0, y0, t_bound, first_step, max_step, rtol, atol, jac, jac_sparsity
         As for `scipy.integrate.Radau`. The local error of a step is kept below
-        ``atol + rtol * abs(y)``; by the kernel below ``rtol`` times the size of each block of the
+        ``atol + rtol * abs(y)``; by the kernel below ``max(rtol * size, atol)`` for each block of the
         state (the momenta of one body, else each component). The stage equations are solved
         to round-off whatever the tolerances: by fixed-point iteration, or by simplified
         Newton where that does not contract; only then ``jac`` is needed. The kernel makes

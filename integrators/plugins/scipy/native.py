@@ -31,7 +31,7 @@ class NativeSteps:
     Parameters
     ----------
     solver : OdeSolver
-        At its start, with ``rtol`` and ``max_step``.
+        At its start, with ``rtol``, ``atol`` and ``max_step``.
     field : Field
         The field and its parameters.
     k : int or None
@@ -64,10 +64,11 @@ class NativeSteps:
         self._t_bound = t_bound
         if h is None:
             tol = float(np.min(solver.rtol))
-            program = _program(field.system, k, s, first_step, tol, defect)
-            self._program_between = _program(field.system, k, s, BEYOND, None, None)
+            atol = tuple(solver.atol.tolist()) if solver.atol.ndim else float(solver.atol)
+            program = _program(field.system, k, s, first_step, tol, defect, atol)
+            self._program_between = _program(field.system, k, s, BEYOND)
         else:
-            program = self._program_between = _program(field.system, k, s, h, None, None)
+            program = self._program_between = _program(field.system, k, s, h)
         self._stepper: Any = program.start(y, field.par, t)
         self._between: Between | None = None
         self._started = False
@@ -224,13 +225,19 @@ def nodes(system: System, s: int) -> tuple[int, float | None]:
 
 @lru_cache(maxsize=32)
 def _program(
-    system: System, k: int, s: int, h: float | None, tol: float | None, defect: float | None
+    system: System,
+    k: int,
+    s: int,
+    h: float | None,
+    tol: float | None = None,
+    defect: float | None = None,
+    atol: float | tuple[float, ...] | None = None,
 ) -> "integrators.protocol.Program":
     if defect is not None:
         from integrators.kernel.program import AdaptiveProgram
 
         assert tol is not None
-        return AdaptiveProgram(system, k=k, s=s, tol=tol, defect=defect, h=h)
+        return AdaptiveProgram(system, k=k, s=s, tol=tol, defect=defect, h=h, atol=atol)
     if k == s:
-        return integrators.Gauss(s=s, h=h, tol=tol).compile(system)
-    return integrators.HBVM(k=k, s=s, h=h, tol=tol).compile(system)
+        return integrators.Gauss(s=s, h=h, tol=tol, atol=atol).compile(system)
+    return integrators.HBVM(k=k, s=s, h=h, tol=tol, atol=atol).compile(system)

@@ -233,11 +233,12 @@ class PythonSteps:
     def _unseen(self, solved: Solved) -> float:
         """Return how much of the field k nodes do not see: up to 1, the energy is kept to round-off.
 
-        The coefficients must have decayed to the root of that.
+        The coefficients must have decayed to the root of that; what moves a component by less than ``atol``
+        counts as moving it by so much, else a field whose rounding is all there is at first had no step.
         """
         sizes = np.abs(self._stages.coefficients(solved.values))
         top = sizes.max(axis=0)
-        floor = SEEN * np.maximum(top, 1e-3 * top.max())
+        floor = SEEN * np.maximum(np.maximum(top, 1e-3 * top.max()), self._solver.atol)
         return float((sizes[-2:] / np.where(floor > 0.0, floor, 1.0)).max())
 
     def dense_output(self) -> DenseOutput:

@@ -165,3 +165,11 @@ def test_one_time_is_landed_on_as_several_are():
     with pytest.raises(InputError, match="finite"):
         one.advance(np.array([np.inf]), sample="land")
     assert one.advance(np.array([30.0]), sample="land").t.tolist() == [30.0]
+
+
+def test_a_start_at_rest_that_heyoka_cannot_leave_is_a_status():
+    # What is wrong here is loud: HBVM() comes to 1.986171412 (tests/integrators/kernel/step/test_rest.py).
+    system = VectorField(lambda t, y, m: [-y[0] + m.tanh(4 * (t - 5)) + 1], dim=1)
+    solution = integrate(Problem(system, y0=[0.0], t_end=10.0), Taylor(), [10.0])
+    assert solution.status is Status.NOT_FINITE
+    assert "from t = 0.0" in solution.reason

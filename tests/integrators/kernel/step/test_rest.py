@@ -10,6 +10,7 @@ from problems.errors import InputError
 
 METHODS = [HBVM(), HBVM(k=8, s=7, tol=1e-12), Gauss(s=8, tol=1e-12)]
 PULSE = np.sqrt(np.pi)
+GROWN = [3.5789247666305486, 2248.668818421065, 3255045678022011.0]  # by quadrature with 40 digits
 CASES = {
     "oscillator": (lambda t, y, m: [y[1], -y[0] + m.exp(-((t - 5) ** 2))], [0.0, 0.0], 15.0,
                    [-0.7509604564200418, -1.1582446449788493]),
@@ -56,3 +57,20 @@ def test_an_absolute_tolerance_bounds_the_steps_and_is_checked():
         integrate(problem, HBVM(tol=1e-8, atol=[1.0] * 3), [1.0])
     with pytest.raises(InputError, match="atol with a tolerance only"):
         LineIntegral(k=4, s=2, h=0.1, atol=1e-8, invariants=["energy"])
+
+
+def test_what_is_reached_later_does_not_spoil_what_comes_first_where_errors_grow():
+    # Rounding of tanh + 1 is all there is at first; e^35 is reached. By that size 13 % were wrong.
+    f = VectorField(lambda t, y, m: [y[0] + m.tanh(4 * (t - 5)) + 1], dim=1)
+    solution = integrate(Problem(f, y0=[0.0], t_end=40.0), HBVM(), [6.0, 12.0, 40.0])
+    assert solution.status.name == "FINISHED"
+    assert np.abs(solution.y[:, 0] / GROWN - 1.0).max() < 1e-12  # 8e-16
+
+
+def test_no_later_growth_spoils_a_smooth_start_at_rest():
+    # exp(t) - 1 to e^60; nothing has to be known of that.
+    f = VectorField(lambda y: [y[0] + 1.0], dim=1)
+    times = np.array([1e-3, 1.0, 20.0, 60.0])
+    for method in METHODS:
+        solution = integrate(Problem(f, y0=[0.0], t_end=60.0), method, times)
+        assert np.abs(solution.y[:, 0] / np.expm1(times) - 1.0).max() < 1e-9

@@ -187,3 +187,11 @@ def test_numbers_that_make_no_method_are_refused() -> None:
         HBVM(k=2, s=3)
     with pytest.raises(InputError, match="s=0 of the solver must be a whole number of at least 1"):
         Gauss(s=0)
+
+
+@pytest.mark.parametrize("solver", [HBVM(k=8, s=7), Gauss(s=8)], ids=["HBVM", "Gauss"])
+def test_the_absolute_tolerance_of_a_controller_is_kept_from_rest(solver: Any) -> None:
+    term = dx.ODETerm(lambda t, y, args: -y + jnp.tanh(4 * (t - 5)) + 1)
+    controller = dx.PIDController(rtol=1e-8, atol=1e-8)
+    found = dx.diffeqsolve(term, solver, 0.0, 10.0, 0.1, jnp.zeros(1), stepsize_controller=controller)
+    assert abs(float(found.ys[-1, 0]) - 1.986171412) < 1e-7

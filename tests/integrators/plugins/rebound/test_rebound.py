@@ -236,3 +236,8 @@ def test_what_cannot_be_done_is_said() -> None:
     with pytest.raises(RuntimeError, match=r"did not converge; take a smaller sim\.dt"):
         simulation.steps(1)
     assert str(rebound.Simulation().integrator) != "hbvm"
+
+
+def test_an_absolute_tolerance_is_refused() -> None:
+    with pytest.raises(InputError, match="atol= is not to be had in REBOUND"):
+        install(rebound.Simulation(), HBVM(k=8, s=8, tol=1e-12, atol=1e-10))

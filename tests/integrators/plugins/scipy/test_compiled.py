@@ -285,3 +285,28 @@ def test_a_field_is_made_of_problems_and_systems_only() -> None:
         field(python)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="load it with"):
         field(PENDULUM, {"g": 2.0})
+
+
+SWITCH = problems.VectorField(lambda t, y, m: [-y[0] + m.tanh(4 * (t - 5)) + 1], dim=1)
+
+
+@pytest.mark.parametrize(
+    "fun", [field(SWITCH), lambda t, y: np.tanh(4 * (t - 5)) + 1 - y], ids=["traced", "Python"]
+)
+@pytest.mark.parametrize("method", [(HBVM, {}), (HBVM, {"k": 8, "s": 7}), (Gauss, {"s": 8})], ids=str)
+@pytest.mark.parametrize("tolerances", [{}, {"rtol": 1e-8, "atol": 1e-8}], ids=["default", "1e-8"])
+def test_the_absolute_tolerance_of_scipy_is_kept_from_rest(fun: Any, method: Any, tolerances: Any) -> None:
+    # Rounding of tanh + 1 is all there is before t = 1; by relative errors no step was short enough there.
+    which, options = method
+    found = solve_ivp(fun, (0.0, 10.0), [0.0], method=which, **options, **tolerances)
+    assert found.success
+    assert abs(found.y[0, -1] - 1.986171412) < 1e-7  # 4e-8 with atol=1e-6, 8e-10 with 1e-8
+
+
+def test_a_larger_absolute_tolerance_takes_fewer_steps() -> None:
+    small = 1e-6 * Y0
+    steps = [
+        solve_ivp(TRACED, (0.0, 20.0), small, method=HBVM, k=8, s=4, rtol=1e-8, atol=atol).t.size
+        for atol in (0.0, 1e-12, [1e-12, 1e-12], 1e-9)
+    ]
+    assert steps[0] > steps[1] == steps[2] > steps[3]
