@@ -72,7 +72,11 @@ def run(
     campaign = quick_run(campaign) if quick else campaign
     campaign = opened(campaign, name)
     if report_to is not None:
+        from hbvm_bench.report.page import find  # what draws costs seconds to import
+
         ensure_writable(report_to, keep=False)
+        for block in campaign.page.blocks:
+            find(block)
     out = out or Path("runs") / (campaign.name + "-quick" * quick)
     store = carry_out(
         campaign, out, as_typed(context), executor=executor, jobs=jobs, timing=timing, whole=True

@@ -1,6 +1,5 @@
 """A run for other tools: JSON, and flat tables as CSV or, with the extra ``hbvm-bench[export]``, Parquet."""
 
-import csv
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -54,11 +53,6 @@ def export(store: Store, path: Path, table: str = "cases") -> int:
     return count
 
 
-def cases_csv(records: Sequence[Record]) -> bytes:
-    """Return the table of cases as comma-separated text."""
-    return csv_of([list(CASES), *map(_case, records)])
-
-
 def as_json(records: Sequence[Record]) -> dict[str, Any]:
     """Return all about the cases as JSON values; numbers are finite or null with a reason."""
     metrics = {
@@ -83,11 +77,10 @@ def _whole(declared: msgspec.Struct) -> dict[str, Any]:
 
 
 @contextmanager
-def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], None]]:
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        made = csv.writer(stream)
-        made.writerow(columns)
-        yield made.writerows
+def _csv(path: Path, columns: dict[str, type]) -> Iterator[Callable[[list[Row]], object]]:
+    with path.open("wb") as stream:
+        stream.write(csv_of([list(columns)]))
+        yield lambda rows: stream.write(csv_of(rows))
 
 
 @contextmanager

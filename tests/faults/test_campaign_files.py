@@ -33,7 +33,7 @@ name = "x"                                                   => campaign 'x' has
 METHODS                                                      => campaign 'x' has no methods; give at least
 PROBLEMS                                                     => campaign 'x' has no problems; give at least
 problems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => Object missing required field `name`
-RIGHT\nnmae = "y"                                            => unknown key 'nmae'; did you mean 'name'?
+RIGHT\nnmae = "y"                                            => unknown key 'nmae'; did you mean 'name' or
 RIGHT\ntitle = 3                                             => Expected `str`, got `int`, at `title`
 RIGHT\ndescription = []                                      => Expected `str`, got `array`, at `description`
 name = 3\nproblems = ["kepler()"]\nmethods = [{use = "HBVM(k=4,s=2,h=0.1)"}] => Expected `str`, got `int`, at

@@ -1,0 +1,90 @@
+"""A campaign names the blocks of its page, and a block is a function of results."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from hbvm_bench.campaign.file import Page, load, parse, shipped
+from hbvm_bench.cli import main
+from hbvm_bench.report import markdown, page
+from hbvm_bench.report.document import Note
+from hbvm_bench.report.page import DEFAULT, document, find
+from hbvm_bench.store.store import Store
+from problems.errors import InputError, UnknownNameError
+from tests.hbvm_bench import made_up_run
+
+
+@pytest.fixture
+def store(tmp_path, undrawn):
+    return made_up_run.write(Store(tmp_path / "run"), ["pendulum(p=1.0)"], 3)
+
+
+def with_page(store, **said):
+    index = store.index()
+    campaign = replace(index.campaign, page=Page(**said))
+    store.write_index(replace(index, campaign=campaign))
+    return document(store)
+
+
+def test_every_shipped_campaign_names_blocks_that_are_there():
+    named = {name for campaign in map(load, shipped()) for name in campaign.page.blocks}
+    assert {"race.report:ratios", "endure:energy_over_time", "automatic:kinds"} <= named
+    for name in (*named, *DEFAULT):
+        assert callable(find(name))
+
+
+def test_a_page_has_the_blocks_that_its_campaign_names_in_this_order(store):
+    made = with_page(store, blocks=["sources", "what_came_out"], name="text.md", lead=["Two blocks."])
+    assert made.name == "text.md"
+    text = markdown.markdown(made)
+    assert text.startswith("# A large campaign\n\nTwo blocks.\n\n## Sources")
+    assert text.index("## Sources") < text.index("## What came out")
+    assert "Fairness" not in text
+
+
+def test_a_new_block_is_one_function(store, monkeypatch):
+    monkeypatch.setattr(page, "_blocks", dict(page._blocks))
+
+    @page.block
+    def how_many(results):
+        return Note(f"{len(results.records)} cases.")
+
+    how_many.__module__ = page.HERE
+    page.block(how_many)
+    assert "3 cases." in markdown.markdown(with_page(store, blocks=["how_many"]))
+
+
+@pytest.mark.parametrize("name", ["what_came_in", "race.report:ratio", "nosuch:block", "../x:y", "os:system"])
+def test_an_unknown_block_is_refused_with_the_nearest_names(store, name):
+    with pytest.raises(UnknownNameError, match="block of a page"):
+        with_page(store, blocks=[name])
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [('blocs = ["sources"]', "blocs"), ('name = "../x"', "page.name"), ("colours = 1", "page")],
+)
+def test_a_page_that_is_written_wrong_is_refused(said, why):
+    text = (
+        f'name = "x"\nproblems = ["pendulum()"]\nmethods = [{{ use = "Gauss(s=2, h=0.1)" }}]\n[page]\n{said}'
+    )
+    with pytest.raises(InputError, match=why):
+        parse(text)
+
+
+def test_another_page_of_a_run_integrates_nothing(toys, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = (
+        'name = "x"\nproblems = ["sitnikov(t_end=1.0)"]\nmethods = [{ use = "Waving(h=0.3)" }]\n'
+        "[grid]\ncount = 4\n[timing]\nrounds = 0\n"
+    )
+    for more in ("", '[page]\nblocks = ["sources"]\n'):
+        Path("x.toml").write_text(text + more)
+        assert main(["run", "x.toml", "--report", "r"]) == 0
+    assert "1, 1 already there" in capsys.readouterr().err
+    Path("x.toml").write_text(text + '[page]\nblocks = ["source"]\n')
+    assert main(["run", "x.toml", "--out", "nothing", "--report", "r"]) == 2
+    assert "unknown block of a page 'source'; did you mean 'sources'" in capsys.readouterr().err
+    assert not Path("nothing").exists()
+    assert "What came out" not in Path("r/report.md").read_text(encoding="utf-8")
