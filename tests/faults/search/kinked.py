@@ -12,11 +12,12 @@ from .references import dop853, exact, forced_oscillator, piecewise_oscillator, 
 from .shape import Shape
 
 GROUP = "kinked"
+GRAZING = "kinked, a contact between two nodes"
 
 
-def _shape(name, f, dim, parameters, span, member, reference, draws=8):
+def _shape(name, f, dim, parameters, span, member, reference, draws=8, group=GROUP):
     return Shape(
-        GROUP, name, VectorField(f, dim=dim, parameters=parameters, name=name), span, member, reference, draws
+        group, name, VectorField(f, dim=dim, parameters=parameters, name=name), span, member, reference, draws
     )
 
 
@@ -164,6 +165,7 @@ SHAPES = [
         ),
         exact(_contact),
         10,
+        GRAZING,
     ),
     _shape(
         "relay",

@@ -2,6 +2,7 @@
 
 import pytest
 
+from .kinked import GRAZING
 from .pulsed import NARROW, STAIRCASE
 from .table import SHAPES, search, table
 from .ways import FAILED, SILENT
@@ -38,10 +39,10 @@ GROUPS = [
 @pytest.mark.parametrize("group", GROUPS)
 def test_nothing_is_silently_wrong(group):
     found = search(case for shape in SHAPES if shape.group == group for case in shape.cases())
-    if group != NARROW:  # no node sees those; where an invariant shows them there is a warning
+    if group not in (NARROW, GRAZING):  # no node sees those; where an invariant shows them there is a warning
         assert not any(one.verdict == SILENT for one in found), report(found)
     assert sum(one.verdict == FAILED for one in found) <= FAILURES * len(found), report(found)
 
 
 def test_there_are_four_hundred_systems():
-    assert sum(shape.draws for shape in SHAPES if shape.group != NARROW) >= 400
+    assert sum(shape.draws for shape in SHAPES if shape.group not in (NARROW, GRAZING)) >= 400
