@@ -11,6 +11,7 @@ from rich.text import Text
 
 from hbvm_bench.report import terminal
 from hbvm_bench.store import merge as merging
+from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
 from hbvm_bench.store.store import Store
 from hbvm_bench.summaries import compare as comparing
@@ -85,7 +86,7 @@ def merge(
 
 
 def export(
-    directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
+    directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov, or a report.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="A file that ends in .csv or .parquet.")],
     table: Annotated[
         str, typer.Option(help="cases; timings, one row per sample; or series, one row per number.")
@@ -93,4 +94,4 @@ def export(
 ) -> None:
     """Write a run as a flat table, for a spreadsheet or a data frame."""
     ensure_writable(out.parent)
-    print(f"{exporting.export(Store(directory), out, table)} rows in {out}")
+    print(f"{exporting.export(opened([directory]), out, table)} rows in {out}")

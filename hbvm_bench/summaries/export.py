@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -14,6 +14,7 @@ from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import reading
 from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.store.archive import Archive
 from hbvm_bench.store.files import atomic, csv_of
 from hbvm_bench.store.records import Record, Timing, Value
 from hbvm_bench.store.store import Store, damage
@@ -31,25 +32,29 @@ class Table:
     rows: Callable[[Record, Store], Iterable[Row]]
 
 
-def export(store: Store, path: Path, table: str = "cases") -> int:
+def export(stores: Sequence[Store] | Sequence[Archive], path: Path, table: str = "cases") -> int:
     """Write one of `TABLES` to a file that ends in ``.csv`` or ``.parquet``; return the number of rows.
 
     Raises
     ------
     problems.errors.InputError
-        For another ending or table, a directory without a run, or a missing library.
+        For another ending or table, a directory without a run, the series of an archive, or a missing
+        library.
     """
     if table not in TABLES:
         raise unknown("table", table, TABLES)
     if path.suffix not in FORMATS:
         raise InputError(f"{str(path)!r} must end in {' or '.join(FORMATS)}.")
-    chosen, records, count = TABLES[table], reading.records(store), 0
+    if table == "series" and any(isinstance(store, Archive) for store in stores):
+        raise InputError(f"{str(stores[0].directory)!r} is an archive, which has no series; export a run.")
+    chosen, found, count = TABLES[table], [(store, reading.records(store)) for store in stores], 0
     writer = _csv if path.suffix == ".csv" else _parquet
     with atomic(path) as temporary, writer(temporary, chosen.columns) as write:
-        for record in records:
-            rows = list(chosen.rows(record, store))
-            write(rows)
-            count += len(rows)
+        for store, records in found:
+            for record in records:
+                rows = list(chosen.rows(record, cast(Store, store)))
+                write(rows)
+                count += len(rows)
     return count
 
 

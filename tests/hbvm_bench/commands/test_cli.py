@@ -64,7 +64,12 @@ def test_a_run_is_stored_shown_and_not_repeated(toys, here, capsys):
     assert "Steady()" in first.out
     assert "something <b>broke</b>" in first.out
     assert "measuring on this machine: 2 to do" in first.err
-    assert {path.name for path in (here / "rep").iterdir()} == {"report.md", "index.html", "figures", "data"}
+    assert {path.name for path in (here / "rep").iterdir()} == {
+        "report.md",
+        "index.html",
+        "figures",
+        "results.json.xz",
+    }
     records = {path: path.stat().st_mtime_ns for path in (here / "r" / "cases").iterdir()}
     assert cli.main(arguments) == 0
     assert "2 already there" in capsys.readouterr().err

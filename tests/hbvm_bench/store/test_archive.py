@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from hbvm_bench.cli import main
 from hbvm_bench.measure import reading
 from hbvm_bench.report import html, markdown
 from hbvm_bench.report.archived import contents
@@ -93,3 +94,11 @@ def test_a_committed_archive_has_the_numbers_of_its_text(name):
 def test_there_are_committed_archives_and_one_page_which_is_small():
     assert {"sitnikov", "drift", "general"} <= set(ARCHIVED)
     assert (REPORTS / "sitnikov" / "index.html").stat().st_size < 500_000
+
+
+def test_an_archive_is_exported_as_a_table_and_has_no_series(tmp_path, capsys):
+    out = tmp_path / "cases.csv"
+    assert main(["export", str(REPORTS / "sitnikov"), "-o", str(out)]) == 0
+    assert f"28 rows in {out}" in capsys.readouterr().out
+    assert main(["export", str(REPORTS / "sitnikov"), "-o", str(out), "--table", "series"]) == 2
+    assert "is an archive, which has no series" in capsys.readouterr().err
