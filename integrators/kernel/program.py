@@ -37,8 +37,6 @@ from problems.analysis.switches import Switches
 from problems.errors import InputError
 from problems.problem import Problem, System
 
-FIRST_RATE = math.log2(0.01)
-
 MARGIN = 0.9
 """Part of the length allowed that steps aim at, besides `integrators.kernel.step.control.SAFETY`.
 
@@ -288,7 +286,6 @@ class HBVMProgram(Compiled):
             made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
             made.tolerance = TOLERANCE
             made.log_rest = LOG_REST
-            made.rate = FIRST_RATE
             self._fresh[side] = made  # when it is complete: another thread may copy it at once
         return self._fresh[side].copy()
 

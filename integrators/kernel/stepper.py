@@ -169,6 +169,8 @@ class HBVMStepper(ABC):
         ctx = self._context
         self._uncounted = ctx.steps  # steps that are not of this trajectory
         ctx.t0 = t0
+        for workspace in self._implicit or ():
+            workspace.forget()
         steps(engine.RESET, ctx.address, out=y.ctypes.data)
 
     @property

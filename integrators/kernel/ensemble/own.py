@@ -67,11 +67,11 @@ def load(group, lane):
         group.velocity[lanes * d + lane] = ctx.velocity[d]
     for j in range(ctx.padded * ctx.lanes):
         ctx.values[j] = 0.0
-    ctx.t0, ctx.time_low = group.start_time, 0.0
+    ctx.t0 = group.start_time
     ctx.stop = ctx.length_limit = INFINITY
     ctx.next_length, ctx.length_behind = group.first_length, 0.0
     ctx.doubt_end = group.start_time
-    ctx.slow = ctx.kinks = ctx.steps = 0
+    ctx.kinks = ctx.steps = 0
     begin_attempts(ctx)
     reset(ctx, group.starts + group.dim * i)
     for d in range(group.dim):

@@ -267,6 +267,11 @@ class Workspace(Memory):
         self.words[_LASTING], self.increment[:], self.entries[:] = saved
         self.factored = 0
 
+    def forget(self) -> None:
+        """Forget the steps behind; the counters of the work done keep counting."""
+        self.words[_LASTING] = 0
+        self.factored = 0
+
     def raise_what_is_no_failure(self) -> None:
         """Raise what stopped a factorization, unless that is a singular matrix: Ctrl-C, no memory left."""
         if self.elsewhere is not None and self.elsewhere.error is not None:

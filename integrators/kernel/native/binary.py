@@ -81,7 +81,7 @@ def platform() -> str:
 
 @lru_cache(maxsize=32)
 def sources(*modules: str) -> str:
-    """Return the digest of modules and folders of the kernel: an edit voids what was compiled from them."""
+    """Return the digest of modules and folders, by paths from the kernel: an edit voids their code."""
     digest = hashlib.sha256()
     for name in modules:
         place = Path(__file__).parents[1] / name

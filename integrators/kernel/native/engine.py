@@ -47,8 +47,13 @@ class Engine:
 
             return " ", binary.build(self._make(), [(types.int64, "i64")] * len(self._arguments), "i64")
 
-        name = store.key("engine", self._make.__module__, binary.sources(*self._sources))
-        return binary.obtain(name, make)
+        return binary.obtain(self.key, make)
+
+    @property
+    def key(self) -> str:
+        """What the machine code is kept by: the function, and the sources of all that is in it."""
+        make = self._make
+        return store.key("engine", make.__module__, make.__qualname__, binary.sources(*self._sources))
 
     @cached_property
     def _function(self) -> Any:

@@ -1,6 +1,6 @@
 """Whole trajectories: own steps to the times asked for."""
 
-from integrators.kernel.context import BUDGET, DONE, NOTHING, UNSEEN, UNSOLVED, Context
+from integrators.kernel.context import ALWAYS_IMPLICIT, BUDGET, DONE, NOTHING, UNSEEN, UNSOLVED, Context
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
@@ -10,7 +10,7 @@ from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
-from integrators.kernel.step.vary import CLOSE, ready, remaining, take
+from integrators.kernel.step.vary import CLOSE, FIRST_RATE, ready, remaining, take
 
 context = view(Context)
 
@@ -142,7 +142,11 @@ def walk(ctx, times, out, budget):
 
 @compiled
 def reset(ctx, start):
-    """Put a trajectory at a start, at t0, with h or a first length: no history."""
+    """Put a trajectory at a start, at t0, with h or a first length: no history.
+
+    What follows is the same, bit for bit, whatever the memory was used for before. The implicit solver's
+    own memory is not here.
+    """
     for i in range(vectors_of_state(ctx)):
         put(ctx.state, 8 * i, splat8(0.0))
         put(ctx.error, 8 * i, splat8(0.0))
@@ -153,6 +157,9 @@ def reset(ctx, start):
     ctx.solved = UNSOLVED
     ctx.border = ctx.border_ahead = NOTHING
     ctx.outcome = DONE
+    ctx.time_low, ctx.rate = 0.0, FIRST_RATE
+    if ctx.strategy != ALWAYS_IMPLICIT:
+        ctx.implicit = ctx.slow = ctx.held = ctx.left = 0
     arrive(ctx)
     if ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)

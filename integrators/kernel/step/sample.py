@@ -2,6 +2,7 @@
 
 from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSEEN, UNSOLVED
 from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
@@ -110,8 +111,11 @@ def part_step(ctx, side, part, known):
     set_step(side, part)
     copy(ctx.state, side.state, vectors_of_state(ctx))
     copy(ctx.error, side.error, vectors_of_state(ctx))
+    n, h = float(ctx.n), ctx.h
+    elapsed = n * h
     side.n = 0
-    side.t0, side.time_low = ctx.t0 + ctx.n * ctx.h, ctx.time_low
+    side.t0, lost = two_sum(ctx.t0, elapsed)
+    side.time_low = lost + fma(n, h, -elapsed) + ctx.time_low
     rewind(side)
     prepare(side)
     if known != 0.0:
