@@ -45,11 +45,12 @@ def independent(
     dim = y.size
     with np.errstate(all="ignore"):
         slope = function(t, y, par)[:dim]
-        rate = float(np.linalg.norm(slope) / np.linalg.norm(y))
+        rate = float(np.abs(slope).max() / np.abs(y).max())
         shift = SHIFT / rate if 0.0 < rate < np.inf else 0.0
         points = [y, *(_moved(lambda s, x: function(s, x, par)[:dim], t, y, h) for h in (shift, -shift))]
         rests = np.stack([function(t, point, par)[dim:].reshape(-1, dim) for point in points])
         rests = rests * np.sqrt(metric)
+        rests /= _power_of_two(np.abs(rests).max(axis=(0, 2)))[:, None]  # so that squares have doubles
     chosen = np.zeros(rests.shape[1], dtype=bool)
     if not np.isfinite(rests).all():
         return ~chosen
@@ -68,6 +69,11 @@ def independent(
                 for _ in range(2):  # twice is enough
                     point -= np.outer(point @ unit, unit)
     return chosen
+
+
+def _power_of_two(sizes: Array) -> Array:
+    """Return a power of two of each size, by which it is divided without rounding; 1 for 0."""
+    return np.ldexp(1.0, np.frexp(sizes)[1])
 
 
 def _moved(slope: Callable[[float, Array], Array], t: float, y: Array, h: float) -> Array:
