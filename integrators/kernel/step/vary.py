@@ -68,6 +68,11 @@ SURE = 3
 STAY = 16  # steps for which it then stays
 # Attempts at a step after which its errors do not become small enough by cutting it; at a kink they do.
 FUTILE = 24
+# From rest, by its own size, a block may follow the steps of the field's rounding: no step fails, and
+# there are many. So what the blocks will reach is asked for now and then where steps are cut to less
+# than such a part of the interval.
+CRAWL = 1e-4
+CRAWL_STEPS, CRAWL_LOOKS = 256, 32
 STEADY = 1.2  # an implicit step that could be longer by less keeps its length, and so the factors
 
 
@@ -226,6 +231,7 @@ def ready(ctx):
         too_short = not abs(h) > SHORTEST * abs(ctx.t0)
         futile = too_short or ctx.attempts >= FUTILE
         futile |= ctx.attempts > 0 and abs(h) < FUTILE_PART * ctx.interval
+        futile |= ctx.attempts > 1 and ctx.longest < INFINITY and crawls(ctx, h)
         if futile and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
             ctx.length = 0.0
             return UNSCALED
@@ -246,6 +252,14 @@ def ready(ctx):
             undo(ctx)
             begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
+
+
+@compiled
+def crawls(ctx, h):
+    """Whether steps are so short after many that the field's rounding may be what cuts them."""
+    return (
+        abs(h) < CRAWL * ctx.interval and ctx.steps >= CRAWL_STEPS and ctx.steps % CRAWL_STEPS < CRAWL_LOOKS
+    )
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.special import erf
 
 from integrators import HBVM, Gauss, LineIntegral, integrate, integrate_many
@@ -74,3 +75,17 @@ def test_no_later_growth_spoils_a_smooth_start_at_rest():
     for method in METHODS:
         solution = integrate(Problem(f, y0=[0.0], t_end=60.0), method, times)
         assert np.abs(solution.y[:, 0] / np.expm1(times) - 1.0).max() < 1e-9
+
+
+@pytest.mark.parametrize("method", [HBVM(max_steps=8000), Gauss(s=6, tol=1e-12, max_steps=8000)], ids=str)
+@pytest.mark.parametrize("s", [0.8956592459797973, 1.9])
+def test_steps_do_not_follow_the_rounding_of_a_field_that_begins_with_it(s, method):
+    # y' = -k y + tanh(s (t - c)) + 1: HBVM() came to t = 1.6e-4 in 8,000 steps, Gauss(6) to 4.1.
+    k, c, end = 0.4362726285784803, 12.88236514463009, 36.2272084126424
+    system = VectorField(lambda t, y, m: [-k * y[0] + m.tanh(s * (t - c)) + 1], dim=1)
+    exact, _ = quad(
+        lambda t: np.exp(k * (t - end)) * (np.tanh(s * (t - c)) + 1), 0.0, end, points=[c], epsabs=1e-13
+    )
+    solution = integrate(Problem(system, y0=[0.0], t_end=end), method, [end])
+    assert solution.status.name == "FINISHED"
+    assert abs(solution.y[-1, 0] - exact) < 1e-9
