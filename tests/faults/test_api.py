@@ -65,7 +65,7 @@ Gauss(s=0, h=.1)                                             | s=0 of Gauss must
 Gauss(s=2.5, h=.1)                                           | s=2.5 of Gauss must be a whole number of at le
 Gauss(s=300, h=.1)                                           | HBVM_BENCH_MAX_STAGES
 Gauss(s=1, tol=1e-6)                                         | Gauss needs k > 1 with a tolerance: one stage
-Gauss(s=2, h=.1, k=3)                                        | unknown option of Gauss 'k'; known: break
+Gauss(s=2, h=.1, k=3)                                        | unknown option of Gauss 'k'; known: atol, break
 Gauss(s=2, h=.1, solver='x')                                 | unknown solver of Gauss 'x'; known: auto, blen
 Gauss(2, .1)                                                 | Gauss takes its options by name, not 2; write
 LineIntegral(k=4, s=2, h=.1)                                 | LineIntegral needs invariants; give a value
