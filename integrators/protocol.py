@@ -52,20 +52,18 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     plugins then know its coefficients.
 """
 
-import dataclasses
 import inspect
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache, wraps
-from typing import Any, ClassVar, Protocol, cast, get_type_hints, runtime_checkable
+from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from problems.calls import Called
-from problems.checks import checked
+from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
 
@@ -522,16 +520,8 @@ def members(capability: type) -> tuple[str, ...]:
     return tuple(name for name in named if not name.startswith("_"))
 
 
-class _Signature:
-    """What ``help`` shows of a method: its options and their defaults; the docstring has the types."""
-
-    def __get__(self, method: object, cls: type) -> inspect.Signature:
-        options = list(inspect.signature(cls.__init__).parameters.values())[1:]
-        return inspect.Signature([p.replace(annotation=inspect.Signature.empty) for p in options])
-
-
 @dataclass(frozen=True, kw_only=True)
-class MethodBase(Called):
+class MethodBase(CheckedOptions):
     """Base of all methods: a frozen description that prints as the call that makes it.
 
     Attributes
@@ -562,8 +552,6 @@ class MethodBase(Called):
     family: ClassVar[str] = ""
     to_end: ClassVar[str | None] = None
 
-    __signature__ = _Signature()
-
     order = cast("int | None", None)  # without an annotation, with which it would be an option
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""
 
@@ -571,11 +559,6 @@ class MethodBase(Called):
         super().__init_subclass__(**options)
         if "compile" in vars(cls):
             setattr(cls, "compile", _of_a_system(cls.compile))  # noqa: B010 -- its type stays as written
-
-    def __post_init__(self) -> None:
-        for name, annotation in _annotations(type(self)).items():
-            value = checked(type(self).__name__, name, getattr(self, name), annotation)
-            object.__setattr__(self, name, value)
 
     def accepts(self, problem: Problem) -> str | None:
         """Return ``None`` if the method can integrate ``problem``, else the reason; it can, by default."""
@@ -599,22 +582,11 @@ class MethodBase(Called):
 
     def options(self, *, defaults: bool = False) -> dict[str, Any]:
         """Return the options by name: those that differ from their default, or all."""
-        return {
-            f.name: getattr(self, f.name)
-            for f in dataclasses.fields(self)
-            if defaults or f.default is dataclasses.MISSING or getattr(self, f.name) != f.default
-        }
+        return self._values() if defaults else self._printed()
 
     def __repr__(self) -> str:
         inside = ", ".join(f"{name}={value!r}" for name, value in self.options().items())
         return f"{type(self).__name__}({inside})"
-
-
-@cache
-def _annotations(method: type[MethodBase]) -> dict[str, Any]:
-    """Return what the options of a method must be, by name."""
-    found = get_type_hints(method, include_extras=True)
-    return {option.name: found[option.name] for option in dataclasses.fields(method)}
 
 
 def _of_a_system(compile_: Callable[[Any, System], Program]) -> Callable[[Any, System], Program]:

@@ -26,8 +26,7 @@ from integrators.plain import (
 )
 from integrators.protocol import Array, MethodBase, Program, Stats, Status
 from integrators.refusals import as_numbers
-from problems import checks
-from problems.calls import readable
+from problems.checks import File, checked_arguments, readable
 from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
 
@@ -320,7 +319,8 @@ class Solution:
     def _about(self) -> dict[str, str]:
         return {"problem": repr(self.problem), "method": repr(self.method), "status": str(self.status)}
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    @checked_arguments
+    def save(self, path: File) -> None:
         """Write the solution to a file that `load` reads: arrays and JSON in NumPy's npz format.
 
         The problem is in it with its formulas as they were traced, so that it needs none of your
@@ -347,7 +347,7 @@ class Solution:
         words |= {key: getattr(self, key) for key in _AS_THEY_ARE}
         arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
         write_whole(
-            checks.path("save", "path", path),
+            Path(path),
             lambda file: np.savez(file, **arrays),  # pyright: ignore[reportArgumentType]
         )
 
@@ -355,7 +355,8 @@ class Solution:
 _AS_THEY_ARE = ("reason", "t_stop", "compile_seconds", "from_cache")
 
 
-def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Solution:
+@checked_arguments
+def load(path: File, problem: Problem | None = None) -> Solution:
     """Return the solution that `Solution.save` wrote to a file, bit for bit.
 
     Parameters
@@ -380,11 +381,10 @@ def load(path: str | os.PathLike[str], problem: Problem | None = None) -> Soluti
     >>> load(path).method
     Gauss(s=2, h=0.1)
     """
-    place = checks.path("load", "path", path)
     if not isinstance(problem, Problem | None):
         raise InputError(f"problem={shown(problem)} of load must be the Problem that was integrated.")
     try:
-        with place.open("rb") as handle, np.load(handle, allow_pickle=False) as file:
+        with Path(path).open("rb") as handle, np.load(handle, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         words = json.loads(arrays["words"].tobytes())
         if words["format"] != FORMAT:

@@ -1,4 +1,4 @@
-"""Values checked by their annotations: a problem's arguments and a method's options alike.
+"""Arguments checked by the signature that takes them: of a function, a problem or a method alike.
 
 What must hold of a value stands where its type does::
 
@@ -7,21 +7,45 @@ What must hold of a value stands where its type does::
     class Leapfrog(MethodBase):
         h: Positive
         order: Literal[2, 4, 6, 8] = 2
+
+`Arguments` reads that from a signature: which names there are, what their values must be, and which
+of them a call is printed with. `checked_arguments` puts it before a function or an ``__init__``,
+`CheckedOptions` before a frozen dataclass and all that inherit from it.
 """
 
+import functools
+import inspect
 import math
 import operator
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    ParamSpec,
+    Self,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+    overload,
+)
 
 import numpy as np
 
 from problems.errors import InputError, shown, unknown
 
 T = TypeVar("T")
+P = ParamSpec("P")
+R = TypeVar("R")
+Described = TypeVar("Described", bound=Callable[..., Any])
+EMPTY = inspect.Parameter.empty
 
 
 @dataclass(frozen=True)
@@ -50,6 +74,37 @@ Named = Annotated[
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 """The empty one, as a default."""
+
+
+@dataclass(frozen=True)
+class Word:
+    """A name that is looked up later: what is no text is refused as an unknown one of its kind."""
+
+    kind: str
+    known: Sequence[str]
+
+    def checked(self, owner: str, name: str, value: Any) -> str | None:
+        if not isinstance(value, str | None):
+            raise unknown(self.kind, value, self.known)
+        return value
+
+
+class _File:
+    def __repr__(self) -> str:
+        return "a path of a file"
+
+    def checked(self, owner: str, name: str, value: Any) -> Path:
+        try:
+            found = Path(value)
+        except TypeError:
+            found = None
+        if found is None or "\0" in str(found):
+            raise refusal(owner, name, value, "a path of a file, such as 'pendulum.npz'")
+        return found
+
+
+File = Annotated[str | os.PathLike[str], _File()]
+"""A path of a file, from text or something path-like; returned as a `pathlib.Path`."""
 
 
 def at_least(least: int) -> Must:
@@ -121,23 +176,6 @@ def numbers(value: Any) -> tuple[float, ...] | None:
     return None if None in found else tuple(found)  # type: ignore[return-value]
 
 
-def path(owner: str, name: str, value: Any) -> Path:
-    """Return a path from text or something path-like, or refuse it.
-
-    Raises
-    ------
-    problems.errors.InputError
-        For anything else, and for text that no file can be called.
-    """
-    try:
-        found = Path(value)
-    except TypeError:
-        found = None
-    if found is None or "\0" in str(found):
-        raise refusal(owner, name, value, "a path of a file, such as 'pendulum.npz'")
-    return found
-
-
 def whole(value: Any) -> int | None:
     """Return a whole number as an int, one of NumPy's too; ``None`` for anything else."""
     try:
@@ -177,3 +215,202 @@ def _one_of(owner: str, name: str, value: Any, known: tuple[Any, ...]) -> Any:
     if (found := whole(value)) not in known:
         raise refusal(owner, name, value, f"one of {', '.join(map(str, known))}")
     return found
+
+
+class Arguments:
+    """What a call may give to a function or a class, by the signature of that.
+
+    Parameters
+    ----------
+    name : str
+        What is called.
+    signature : inspect.Signature
+        What it takes; `checked` says which annotations it knows.
+    kind : str
+        What messages call its arguments: ``"option"``.
+    owner : str, optional
+        What a message calls the owner of a wrong value; ``name`` by default.
+    """
+
+    def __init__(
+        self, name: str, signature: inspect.Signature, kind: str = "argument", owner: str | None = None
+    ) -> None:
+        self.name, self.kind, self.owner = name, kind, owner or name
+        self.signature = signature
+        self.parameters = signature.parameters
+        self._by_place = [key for key, one in self.parameters.items() if one.kind is not one.KEYWORD_ONLY]
+
+    def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
+        """Refuse what the signature does not take.
+
+        Parameters
+        ----------
+        values, options
+            What is given by place and by name.
+
+        Raises
+        ------
+        problems.errors.UnknownNameError
+            For an unknown name, with the nearest ones.
+        problems.errors.InputError
+            For values by place that have to be named, one given twice, or one missing.
+        """
+        name, by_place = self.name, self._by_place
+        for option in options:
+            if option not in self.parameters:
+                raise unknown(f"{self.kind} of {name}", option, self.parameters)
+        if len(values) > len(by_place):
+            example = next(
+                key for key in (*self.parameters, "") if key not in by_place and key not in options
+            )
+            raise InputError(
+                f"{name} takes {self._places()} by name, not {shown(values[len(by_place)])}; "
+                f"write it as in {name}({example}=...)."
+            )
+        given = {*by_place[: len(values)], *options}
+        for key in by_place[: len(values)]:
+            if key in options:
+                raise InputError(f"{name} gets {key} twice, by place and by name; give it once.")
+        missing = [key for key, one in self.parameters.items() if one.default is EMPTY and key not in given]
+        if missing:
+            raise InputError(
+                f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...)."
+            )
+
+    def _places(self) -> str:
+        return (
+            f"only {', '.join(self._by_place)} by place and the rest"
+            if self._by_place
+            else f"its {self.kind}s"
+        )
+
+    def value(self, key: str, value: Any) -> Any:
+        """Return the value of one argument in the form in which it is used, or refuse it; see `checked`."""
+        return checked(self.owner, key, value, self.parameters[key].annotation)
+
+    def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> inspect.BoundArguments:
+        """Return all arguments of a call, defaults included, checked.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a name that is not taken or is missing (`check_names`), or a value that is not allowed.
+        """
+        self.check_names(values, options)
+        call = self.signature.bind(*values, **options)
+        call.apply_defaults()
+        for key, value in call.arguments.items():
+            found = self.value(key, value)
+            # A call prints as it was made: e=0, not e=0.0.
+            call.arguments[key] = value if type(value) in (int, float) else found
+        return call
+
+    def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
+        """Return what a call is printed with: ``first``, then what differs from its default."""
+        changed = (
+            key for key, one in self.parameters.items() if one.default is EMPTY or values[key] != one.default
+        )
+        return {key: values[key] for key in (*first, *changed)}
+
+
+@overload
+def checked_arguments(function: Callable[P, R], /) -> Callable[P, R]: ...
+@overload
+def checked_arguments(*, owner: str) -> Callable[[Callable[P, R]], Callable[P, R]]: ...
+def checked_arguments(function: Any = None, /, *, owner: str | None = None) -> Any:
+    """Make a function, or a written ``__init__``, check its arguments by its signature.
+
+    Parameters
+    ----------
+    function : callable
+        An ``__init__`` is called by the name of its class.
+    owner : str, optional
+        What messages call the owner of a wrong value; the function's name by default.
+    """
+    if function is None:
+        return functools.partial(_checking, owner=owner)
+    return _checking(function, None)
+
+
+def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
+    signature = inspect.signature(function)
+    names = list(signature.parameters)
+    bound = int(names[:1] == ["self"])  # a method's own object is no argument of a call
+    own = signature.replace(parameters=list(signature.parameters.values())[bound:])
+
+    @functools.cache
+    def arguments(name: str) -> Arguments:
+        return Arguments(name, own, owner=owner)
+
+    @functools.wraps(function)
+    def wrapper(*values: P.args, **options: P.kwargs) -> R:
+        makes = function.__name__ == "__init__"
+        name = type(values[0]).__name__ if makes else function.__name__
+        call = arguments(name).bind(values[bound:], options)
+        return function(*values[:bound], *call.args, **call.kwargs)  # type: ignore[call-arg]
+
+    return readable(wrapper)
+
+
+def readable(described: Described) -> Described:
+    """Let ``help`` show the names and defaults of a function or class; its docstring has the types."""
+    described.__signature__ = _without_types(inspect.signature(described))
+    return described
+
+
+def _without_types(signature: inspect.Signature) -> inspect.Signature:
+    plain = [
+        one.replace(annotation=EMPTY, default={} if one.default is NOTHING else one.default)
+        for one in signature.parameters.values()
+    ]
+    return signature.replace(parameters=plain, return_annotation=EMPTY)
+
+
+class _Readable:
+    """What ``help`` shows of a class: its options and their defaults; the docstring has the types."""
+
+    def __get__(self, made: object, cls: type) -> inspect.Signature:
+        return _without_types(_signature(cls))
+
+
+class CheckedOptions:
+    """Base of frozen dataclasses whose options are checked by the annotations of their fields.
+
+    Names are checked before ``__init__`` sees them, values after. ``_owner`` is what messages call
+    the owner of a wrong value; the name of the class by default.
+    """
+
+    _owner: ClassVar[str | None] = None
+    __signature__ = _Readable()
+
+    def __new__(cls, *values: Any, **options: Any) -> Self:
+        _of_fields(cls).check_names(values, options)
+        return super().__new__(cls)
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        # copies and pickles are made by __new__ too
+        return (), self._values()
+
+    def _values(self) -> dict[str, Any]:
+        return {key: getattr(self, key) for key in _of_fields(type(self)).parameters}
+
+    def _printed(self) -> dict[str, Any]:
+        return _of_fields(type(self)).printed(self._values())
+
+    def __post_init__(self) -> None:
+        arguments = _of_fields(type(self))
+        for key, value in self._values().items():
+            object.__setattr__(self, key, arguments.value(key, value))
+
+
+def _signature(cls: type) -> inspect.Signature:
+    whole = inspect.signature(cls.__init__)
+    return inspect.Signature(list(whole.parameters.values())[1:])
+
+
+@functools.cache
+def _of_fields(cls: type[CheckedOptions]) -> Arguments:
+    """Return what a dataclass takes; annotations that are text are read where they were written."""
+    signature, known = _signature(cls), get_type_hints(cls, include_extras=True)
+    taken = [one.replace(annotation=known[one.name]) for one in signature.parameters.values()]
+    return Arguments(cls.__name__, signature.replace(parameters=taken), "option", cls._owner)

@@ -11,8 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec
 
-from problems import calls
-from problems.checks import checked
+from problems.checks import Arguments, checked
 from problems.errors import InputError, shown, unknown
 from problems.picture import Picture
 from problems.problem import Problem
@@ -70,7 +69,7 @@ def entry(
 
     What the function returns gets its name, prints as the call that made it, and
     says the rest. Its arguments are checked by their annotations before it runs
-    (`problems.calls.bound`), and refused with an `InputError`; what else must hold, it
+    (`problems.checks.Arguments`), and refused with an `InputError`; what else must hold, it
     checks itself.
 
     Parameters
@@ -112,26 +111,24 @@ def entry(
 
     def decorate(make: Callable[P, Problem]) -> Callable[P, Problem]:
         name = make.__name__
-        signature = inspect.signature(make, eval_str=True)
-        for key, parameter in signature.parameters.items():
+        taken = Arguments(name, inspect.signature(make, eval_str=True))
+        for key, parameter in taken.parameters.items():
             if parameter.kind is not parameter.KEYWORD_ONLY:
                 raise InputError(f"{key} of {name} must be taken by name; write def {name}(*, ...).")
         for key in words.shows:
-            if key not in signature.parameters:
-                raise unknown(f"argument of {name} in shows", key, signature.parameters)
+            if key not in taken.parameters:
+                raise unknown(f"argument of {name} in shows", key, taken.parameters)
 
         @functools.wraps(make)
         def made(*values: P.args, **options: P.kwargs) -> Problem:
-            call = calls.bound(name, signature, values, options)
+            call = taken.bind(values, options)
             problem = make(*call.args, **call.kwargs)
             if not isinstance(problem, Problem):
                 raise InputError(f"{name} must return a problems.Problem, not {shown(problem)}.")
-            arguments = call.arguments
-            changed = [key for key in arguments if arguments[key] != signature.parameters[key].default]
             return problem.entitled(
                 name=name,
                 title=words.title or problem.title,
-                arguments={key: arguments[key] for key in (*words.shows, *changed)},
+                arguments=taken.printed(call.arguments, words.shows),
                 references=words.references,
                 notes=words.notes,
             )

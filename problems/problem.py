@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems import emit
 from problems.analysis import invariants
-from problems.calls import checked_arguments
-from problems.checks import NOTHING, Named
+from problems.checks import NOTHING, Named, checked_arguments
 from problems.errors import InputError, printable, shown
 from problems.systems.base import System, Value
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from problems import calls, catalogue
+from problems import catalogue
+from problems.checks import Arguments
 from problems.entry import Entry
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
@@ -112,7 +113,7 @@ def load(name: str, **arguments: Any) -> Problem:
     """
     make = factory(name)
     if entry(name) is None:  # the others check their own
-        calls.check(name, inspect.signature(make), (), arguments, "argument")
+        Arguments(name, inspect.signature(make)).check_names((), arguments)
     # NumPy's numbers and arrays become Python's, which print as the call that is typed
     plain = {
         key: value.tolist() if isinstance(value, np.generic | np.ndarray) else value

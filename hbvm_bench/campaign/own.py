@@ -29,7 +29,7 @@ from hbvm_bench.campaign.spec import Spec, file_of, parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.reference import solutions
 from integrators.plain import packed_problem, unpacked_problem
-from problems import calls
+from problems.checks import Arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 
@@ -266,7 +266,7 @@ def _called(spec: Spec, place: _Place, module: ModuleType) -> Problem:
         if not any(
             one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in signature.parameters.values()
         ):
-            calls.check(what, signature, (), spec.arguments, "argument")
+            Arguments(what, signature).check_names((), spec.arguments)
     with _one_sentence(Path(str(module.__file__)), f"{spec} cannot be made"):
         found = made(**spec.arguments)
     if not isinstance(found, Problem):

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from integrators.coefficients.legendre import legendre, legendre_integrals
 from integrators.coefficients.tableau import Tableau, tableau
 from integrators.protocol import Array, AsHBVM, MethodBase, offers
-from problems.calls import readable
+from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 
 HOLDS = 1e-11  # for k <= 60, what holds does so to 3e-15, and what does not misses by 1e-4 at least
@@ -40,7 +40,7 @@ HIGHEST = 10  # order up to which the trees are gone through: 719 of order 10
 Tree = tuple["Tree", ...]
 
 
-@readable
+@checked_arguments
 def order_of(method: Tableau | MethodBase) -> int:
     """Return the order of a Runge-Kutta method, checked numerically from its coefficients.
 
@@ -86,7 +86,7 @@ def order_of(method: Tableau | MethodBase) -> int:
     return order
 
 
-@readable
+@checked_arguments
 def stability(method: Tableau | MethodBase, z: ArrayLike) -> NDArray[np.complex128]:
     """Return R(z) of a Runge-Kutta method: y' = lambda y goes over a step into R(h lambda) y.
 

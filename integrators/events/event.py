@@ -3,16 +3,40 @@
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from problems.calls import Called
+from problems.checks import CheckedOptions, Must, refusal
 from problems.errors import InputError, shown
 
 
+def _whole(value: Any) -> int | None:
+    """Return a whole number as an int, also one of NumPy's; ``None`` for anything else."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        return int(value) if isinstance(value, float | np.bool_) and value in (-1.0, 0.0, 1.0) else None
+
+
+class _Count:
+    def checked(self, owner: str, name: str, value: Any) -> bool | int:
+        count = _whole(value)
+        if isinstance(value, float) or count is None or not 0 <= count < 2**63:
+            raise refusal(owner, name, value, "True, False, or a count >= 1")
+        return value
+
+
+class _Direction:
+    def checked(self, owner: str, name: str, value: Any) -> int:
+        found = _whole(value)
+        if found not in (-1, 0, 1):
+            raise refusal(owner, name, value, "1, -1 or 0 (both)")
+        return found
+
+
 @dataclass(frozen=True)
-class Event(Called):
+class Event(CheckedOptions):
     """Where ``g`` vanishes along the trajectory.
 
     Parameters
@@ -42,38 +66,23 @@ class Event(Called):
     Event(g=<function ...>, direction=1, terminal=False, name=None)
     """
 
+    _owner: ClassVar[str | None] = "an event"
+
     g: Callable[..., Any]
     _: KW_ONLY
-    direction: int = 0
-    terminal: bool | int = False
-    name: str | None = None
+    direction: Annotated[int, _Direction()] = 0
+    terminal: Annotated[bool | int, _Count()] = False
+    name: Annotated[str, Must("a text", lambda name: name)] | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.g):
             raise InputError(f"an event needs a function g, not {shown(self.g)}.")
-        if _whole(self.direction) not in (-1, 0, 1):
-            raise InputError(f"direction={shown(self.direction)} of an event must be 1, -1 or 0 (both).")
-        object.__setattr__(self, "direction", _whole(self.direction))
-        last = None if isinstance(self.terminal, float) else _whole(self.terminal)
-        if last is None or not 0 <= last < 2**63:
-            raise InputError(
-                f"terminal={shown(self.terminal)} of an event must be True, False, or a count >= 1."
-            )
-        if self.name is not None and not (isinstance(self.name, str) and self.name):
-            raise InputError(f"name={shown(self.name)} of an event must be a text.")
+        super().__post_init__()
 
     @property
     def last(self) -> int:
         """The occurrence that ends the integration; 0: none."""
         return int(self.terminal)
-
-
-def _whole(value: Any) -> int | None:
-    """Return a whole number as an int, also one of NumPy's; ``None`` for anything else."""
-    try:
-        return operator.index(value)
-    except TypeError:
-        return int(value) if isinstance(value, float | np.bool_) and value in (-1.0, 0.0, 1.0) else None
 
 
 def named(events: Any) -> dict[str, Event]:

@@ -13,13 +13,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Annotated, Any
 
 import numpy as np
 
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM, TOLERANCE
 from integrators.protocol import Array, MethodBase, Status, check_is_problem
-from problems.calls import readable
+from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem
 
@@ -122,8 +123,17 @@ class _Trial:
     steps: int
 
 
-@readable
-def advise(problem: Problem, accuracy: float = 1e-10) -> Advice:
+class _Accuracy:
+    def checked(self, owner: str, name: str, value: Any) -> float:
+        if not isinstance(value, (int, float)) or not 0.0 < value < 1.0:
+            raise InputError(
+                f"the accuracy is a relative error between 0 and 1, not {shown(value)}; 1e-10 is usual."
+            )
+        return value
+
+
+@checked_arguments
+def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) -> Advice:
     """Say which method and step reach an accuracy at the end of a problem, and at what cost.
 
     Parameters
@@ -158,10 +168,6 @@ def advise(problem: Problem, accuracy: float = 1e-10) -> Advice:
     True
     """
     check_is_problem(problem)
-    if not isinstance(accuracy, (int, float)) or not 0.0 < accuracy < 1.0:
-        raise InputError(
-            f"the accuracy is a relative error between 0 and 1, not {shown(accuracy)}; 1e-10 is usual."
-        )
     piece = _Piece(problem)
     goal = SAFETY * accuracy
     found = list(_candidates(piece, goal))

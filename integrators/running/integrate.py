@@ -1,8 +1,8 @@
 """Integrate a problem with a method: the one function most users need."""
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -29,10 +29,9 @@ from integrators.protocol import (
 from integrators.refusals import as_numbers, check_times
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
-from problems import checks, limits
-from problems.calls import readable
-from problems.checks import Must, checked
-from problems.errors import InputError, shown, unknown
+from problems import limits
+from problems.checks import File, Must, Word, checked_arguments
+from problems.errors import InputError, shown
 from problems.problem import Problem, System
 from problems.systems.untraced import Foreign
 
@@ -41,21 +40,23 @@ SECONDS = 60.0  # from one file to the next
 FIRST = 1e-5  # of the interval: the first piece, when nothing is known of its cost ...
 UNSEEN = 1e-3  # ... and where nobody wants to know of it
 PROGRAMS = 8  # kept with each system
+
+
 NotNegative = Annotated[float, Must("a number of seconds, 0 or more", lambda x: x >= 0)]
 
 
-@readable
+@checked_arguments
 def integrate(
     problem: Problem,
     method: MethodBase | None = None,
     times: ArrayLike | None = None,
-    sample: str | None = None,
+    sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     *,
     progress: bool | Report = False,
-    checkpoint: str | os.PathLike[str] | None = None,
-    every_seconds: float = SECONDS,
-    resume: str | os.PathLike[str] | None = None,
+    checkpoint: File | None = None,
+    every_seconds: NotNegative = SECONDS,
+    resume: File | None = None,
 ) -> Solution:
     """Integrate ``problem`` with ``method`` and return the states at ``times``.
 
@@ -116,12 +117,8 @@ def integrate(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
-    if not isinstance(sample, str | None):
-        raise unknown("sampling", sample, SAMPLINGS)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
-    if every_seconds is not SECONDS:
-        every_seconds = checked("integrate", "every_seconds", every_seconds, NotNegative)
     if progress is True:
         with Bar() as bar:
             return integrate(
@@ -136,8 +133,8 @@ def integrate(
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
         belongs = identity(problem, method, grid, sample, wanted)
-        path = None if checkpoint is None else checks.path("integrate", "checkpoint", checkpoint)
-        earlier = None if resume is None else checks.path("integrate", "resume", resume)
+        path = None if checkpoint is None else Path(checkpoint)
+        earlier = None if resume is None else Path(resume)
         if earlier is not None and (earlier != path or earlier.exists()):
             kept = read(earlier, belongs)
         watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)

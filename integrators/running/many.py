@@ -5,7 +5,7 @@ from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,8 +33,7 @@ from integrators.protocol import (
 from integrators.refusals import as_numbers, check_batch, check_times
 from integrators.running.watch import SOON, Bar, Progress, Report
 from integrators.solution import Occurrences
-from problems.calls import readable
-from problems.checks import NOTHING, Named, checked
+from problems.checks import NOTHING, Named, Word, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.systems.base import System
@@ -100,7 +99,7 @@ class Solutions(Trajectories):
         return np.array([status is Status.FINISHED for status in self.status])
 
 
-@readable
+@checked_arguments
 def integrate_many(
     problem: Problem,
     method: MethodBase | None = None,
@@ -108,10 +107,10 @@ def integrate_many(
     starts: ArrayLike | None = None,
     parameters: Named[ArrayLike] = NOTHING,
     times: ArrayLike | None = None,
-    threads: int = 1,
+    threads: Count = 1,
     progress: bool | Report = False,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
-    backend: str | None = None,
+    backend: Annotated[str | None, Word("backend", ["jax"])] = None,
 ) -> Solutions:
     """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
 
@@ -171,9 +170,7 @@ def integrate_many(
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system
-    threads = checked("integrate_many", "threads", threads, Count)
-    given = checked("integrate_many", "parameters", parameters, Named[ArrayLike])
-    values = _values(system, given)
+    values = _values(system, parameters)
     first, n = _number(starts, values)
     grid = check_times([problem.t_end] if times is None else times, problem.t0)
     if starts is None:
@@ -217,7 +214,7 @@ def integrate_many(
 def _program(system: System, method: MethodBase, backend: str | None) -> Program:
     if backend is None:
         return method.compile(system)
-    if not isinstance(backend, str) or backend != "jax":
+    if backend != "jax":
         raise unknown("backend", backend, ["jax"])
     from integrators.plugins.diffrax.many import JaxProgram  # an optional library, and seconds to import
 

@@ -11,19 +11,18 @@ from integrators.running.integrate import integrate
 from integrators.running.watch import Report
 from integrators.solution import Solution
 from problems import Problem
-from problems.calls import readable
-from problems.checks import checked
+from problems.checks import checked_arguments
 from problems.errors import InputError
 
 
-@readable
+@checked_arguments(owner="a section")
 def section(
     problem: Problem,
     method: MethodBase,
     g: Callable[..., Any],
     *,
     direction: int = 1,
-    count: int | None = None,
+    count: Count | None = None,
     t_end: float | None = None,
     progress: bool | Report = False,
 ) -> Solution:
@@ -65,10 +64,9 @@ def section(
     (3, 4)
     """
     check_problem(problem, method)
-    end = checked("a section", "t_end", problem.t_end if t_end is None else t_end, float)
+    end = problem.t_end if t_end is None else float(t_end)
     if end == problem.t0:
         raise InputError(f"t_end={end!r} of a section must be another time than t0={problem.t0!r}.")
-    count = checked("a section", "count", count, Count | None)
     event = Event(g, direction=direction, terminal=count or 0, name="section")
     made = integrate(problem, method, [end], events=event, progress=progress)
     passages = made.events["section"]

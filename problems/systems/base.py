@@ -96,8 +96,9 @@ class System:
         guards: Mapping[str, Callable[..., Any]],
         name: str | None,
     ) -> None:
-        asked = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
-        limits.check(f"a system with {asked}", "COMPONENTS", dim)
+        if dim > limits.limit("COMPONENTS"):
+            asked = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
+            limits.check(f"a system with {asked}", "COMPONENTS", dim)
         if self.kind != "vector_field" and "energy" in invariants:
             raise InputError("the invariant 'energy' is H itself; give the others only.")
         self.dim = dim

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 from problems.calculus.function import Function, LoopTerm, Term, joined, stacked
 from problems.calculus.gradient import gradient
-from problems.calls import checked_arguments
-from problems.checks import NOTHING, Named, at_least
+from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.systems.base import Bodies, System, Value
 from problems.trace.graph import PAR, Loop, Node, P

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 
 from problems.calculus.function import Function
 from problems.calculus.gradient import gradient
-from problems.calls import checked_arguments
-from problems.checks import NOTHING, Named, at_least
+from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError
 from problems.systems.base import System, Value
 from problems.systems.hamiltonian import Hamiltonian

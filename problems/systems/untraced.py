@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.calculus.function import Function
-from problems.calls import checked_arguments
-from problems.checks import NOTHING, Named, at_least
+from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError, shown
 from problems.systems.base import System, Value
 

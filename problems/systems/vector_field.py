@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from problems.calls import checked_arguments
-from problems.checks import NOTHING, Named, at_least
+from problems.checks import NOTHING, Named, at_least, checked_arguments
 from problems.errors import InputError
 from problems.systems.base import System, Value
 from problems.trace import arguments

@@ -199,6 +199,13 @@ integrate(P1, M1, times={0, 1})                              | times must be num
 integrate(P1, M1, times=(i for i in range(3)))               | times must be numbers, not <generator object
 integrate(P1, M1, times=[None, 1])                           | times must be finite numbers
 integrate(P1, M1, times=P1)                                  | times must be numbers, not
+integrate(P1, M1, smaple='side')                             | unknown argument of integrate 'smaple'; did you
+integrate()                                                  | integrate needs problem; give a value as in
+integrate(P1, M1, [0, 1], None, (), True)                    | integrate takes only problem, method, times,
+integrate(P1, M1, method=M1)                                 | integrate gets method twice, by place and by
+integrate_many(P1, M1, thread=2)                             | unknown argument of integrate_many 'thread';
+section(P1, M1, osc, cuont=2)                                | unknown argument of section 'cuont'; did you
+integrators.load('a', problme=P1)                               | unknown argument of load 'problme'; did you
 integrate(P1, M1, sample='sides')                            | unknown sampling 'sides'; did you mean 'side'
 integrate(P1, M1, sample=3)                                  | unknown sampling 3; known: dense, land, side,
 integrate(P1, M1, sample=['side'])                           | unknown sampling ['side']; did you mean
