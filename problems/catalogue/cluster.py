@@ -55,12 +55,10 @@ def cluster(
     """
     limits.check_problem("cluster", 6 * n, n * (n - 1) // 2, n=n)
     random = Random(seed)
-    q = _centred([_in_ball(random) for _ in range(n)])
-    v = _centred([_in_ball(random) for _ in range(n)])
     return Problem(
         gravity.hamiltonian([1.0 / n] * n, name=f"cluster_{n}", softening=softening, linear_momentum=False),
-        q0=[x for row in q for x in row],
-        p0=[x * (0.5 / n) for row in v for x in row],
+        q0=_centred([_in_ball(random) for _ in range(n)]),
+        p0=[x * (0.5 / n) for x in _centred([_in_ball(random) for _ in range(n)])],
         t_end=t_end,
     )
 
@@ -72,6 +70,6 @@ def _in_ball(random: Random) -> list[float]:
             return point
 
 
-def _centred(rows: list[list[float]]) -> list[list[float]]:
+def _centred(rows: list[list[float]]) -> list[float]:
     centre = [math.fsum(row[c] for row in rows) / len(rows) for c in range(3)]
-    return [[x - c for x, c in zip(row, centre, strict=True)] for row in rows]
+    return [x - c for row in rows for x, c in zip(row, centre, strict=True)]

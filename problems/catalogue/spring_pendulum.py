@@ -67,11 +67,7 @@ def spring_pendulum(
         State ``[q1, q2, q3, p1, p2, p3]``, q3 upwards from the support; parameters
         ``m``, ``k``, ``l0``, ``g``; invariants: energy, angular momentum about the vertical.
     """
-    system = Hamiltonian(
-        _energy,
-        dof=3,
-        parameters={"m": m, "k": k, "l0": l0, "g": g},
-        invariants={"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]},
-        name="spring_pendulum",
-    )
+    parameters = {"m": m, "k": k, "l0": l0, "g": g}
+    kept = {"angular_momentum": lambda q, p: q[0] * p[1] - q[1] * p[0]}
+    system = Hamiltonian(_energy, dof=3, parameters=parameters, invariants=kept, name="spring_pendulum")
     return Problem(system, q0=[x, 0.0, z - (l0 + m * g / k)], p0=[0.0, m * vy, 0.0], t_end=t_end)

@@ -96,7 +96,7 @@ class System:
         guards: Mapping[str, Callable[..., Any]],
         name: str | None,
     ) -> None:
-        if dim > limits.limit("COMPONENTS"):
+        if dim > limits.limit("COMPONENTS"):  # what was asked for is written only where it is refused
             asked = f"dim={shown(dim)}" if dof is None else f"dof={shown(dof)}"
             limits.check(f"a system with {asked}", "COMPONENTS", dim)
         if self.kind != "vector_field" and "energy" in invariants:
