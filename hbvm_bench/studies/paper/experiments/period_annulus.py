@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,7 +153,8 @@ def saddle_rate() -> float:
 
 def _period(c: float) -> float:
     """Return when the orbit from (0, c) is back on the positive p axis, by secants over partial steps."""
-    stepper = PERIOD_METHOD.compile(PROBLEM.system).start(np.array([0.0, c]), PROBLEM.par)
+    # Any: a Stepper that has Checkpoints too
+    stepper: Any = PERIOD_METHOD.compile(PROBLEM.system).start(np.array([0.0, c]), PROBLEM.par)
     while True:
         kept = stepper.checkpoint()
         samples = stepper.advance(np.array([stepper.t + 64 * PERIOD_STEP]), sample="steps")
