@@ -29,6 +29,7 @@ from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
 
 LOOK_AHEAD = 2000  # steps of the look ahead, at most
+MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
 NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
 RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
@@ -59,6 +60,7 @@ class AdaptiveStepper(HBVMStepper):
 
     def __init__(self, program: VaryingProgram, y: Array, par: Array, t0: float):
         self._breakpoints = program.breakpoints(par)
+        self._max_steps = program.max_steps
         self._origin = self._goal = t0
         self._reached, self._in_vain = np.empty((0, 1 + y.size)), 1
         self._given: Array | None = None  # sizes to take where they are asked for, of one that looks ahead
@@ -242,6 +244,7 @@ class AdaptiveStepper(HBVMStepper):
             scout = self._scout(self.y + shift * moved * sizes)
             scout._given = scout._context.expected[:] = expected
             scout._context.rescaled = SCALE_LASTS
+            scout._max_steps = min(MOST_COMPARED, self._max_steps or MOST_COMPARED)
             made = scout.advance(times)
             self._charge(scout)
             found.append(made.y)
@@ -261,12 +264,12 @@ class AdaptiveStepper(HBVMStepper):
     def _budget(self, most: int | None = None) -> int:
         """Return how many of ``most`` steps the kernel may take at a time, and of those left."""
         most = min(self._watch.patience if most is None else most, self._pace.steps)
-        if self._program.max_steps is None:
+        if self._max_steps is None:
             return most
-        return max(0, min(most, self._program.max_steps - self._taken))
+        return max(0, min(most, self._max_steps - self._taken))
 
     def _ended(self, steps: int) -> Ended | None:
-        most = self._program.max_steps
+        most = self._max_steps
         if most is not None and self._taken >= most and not self._wants_solver:
             return Status.MAX_STEPS, (
                 f"max_steps={most} steps came to t = {self.t!r} only; give more, or a looser tol."

@@ -220,7 +220,8 @@ SHAPES = [
         1,
         {"r": 1.0},
         _long_growth,
-        lambda times, case: (case.y0[0] * np.exp(case.par.r * times),),
+        # exp(r t) alone overflows
+        lambda times, case: (np.exp(math.log(case.y0[0]) + case.par.r * times),),
         6,
     ),
     _shape(
