@@ -11,9 +11,9 @@ from problems.errors import InputError
 DOCUMENTS = ("README.md", "report.md")  # what a report is read from
 LEAD = (
     "Every report is written by the command that it names; nothing in it is by hand. A text (`report.md` or "
-    "`README.md`) with its figures is committed beside the results that it is made from. The pages, with all "
-    "figures and all rows, are drawn from these results by `make pages`, without running anything; git "
-    "ignores them, but for sitnikov's."
+    "`README.md`) with its figures is committed beside the results that it is made from. The pages, "
+    "`NAME/index.html` with all figures and all rows, are drawn from these results by `make pages`, without "
+    "running anything; git ignores them, but for sitnikov's."
 )
 WIDTH = 360  # pixels of a thumbnail
 LONGEST = 400  # characters of a description
@@ -53,7 +53,6 @@ def _entry(folder: Path) -> list[str]:
     if pictures := re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", "\n".join(lines)):
         alt, source = escape(re.sub(r"\\(.)", r"\1", title), quote=True), f"{folder.name}/{pictures[0]}"
         made.append(f'<a href="{place}"><img src="{source}" width="{WIDTH}" alt="{alt}"></a>')
-    links = [f"[page]({folder.name}/index.html)"] if (folder / "index.html").is_file() else []
     command = next((line.strip("` ") for line in lines if re.match(r"[` ]*hbvm-bench ", line)), "")
-    links += [f"[text]({place})", *([f"made by `{command}`"] if command else [])]
+    links = [f"[text]({place})", *([f"made by `{command}`"] if command else [])]
     return [*made, *([first] if first else []), " · ".join(links)]
