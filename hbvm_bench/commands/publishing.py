@@ -48,9 +48,8 @@ def publish(
     problems.errors.InputError
         If the directory cannot be written.
     """
-    if contents is not None:
-        archive.write(directory / archive.NAME, contents)
-    for path in write(document, directory):
+    beside = None if contents is None else {archive.NAME: archive.packed(contents)}
+    for path in write(document, directory, beside):
         terminal.console(stderr=stderr).print(str(path), style="dim" if stderr else "")
     for part in document.failed:
         terminal.console(stderr=True).print(

@@ -1,5 +1,6 @@
 """Write a document: everything is made first, then every file is put in place whole."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from hbvm_bench.report.document import Document
@@ -14,13 +15,23 @@ def rendered(document: Document) -> dict[str, bytes]:
     return {picture.file: picture.svg.encode() for picture in document.shown} | made
 
 
-def write(document: Document, directory: Path) -> list[Path]:
+def write(document: Document, directory: Path, beside: Mapping[str, bytes] | None = None) -> list[Path]:
     """Write the markdown with its ``figures/``, and the page; return the paths of the first two.
+
+    Parameters
+    ----------
+    document : Document
+        What is written.
+    directory : Path
+        Where to.
+    beside : mapping of str to bytes, optional
+        Other files that belong to it, by name.
 
     Raises
     ------
     problems.errors.InputError
         If the directory cannot be written.
     """
-    write_all({directory / name: content for name, content in rendered(document).items()})
+    files = {**(beside or {}), **rendered(document)}
+    write_all({directory / name: content for name, content in files.items()})
     return [directory / document.name, directory / "index.html"]

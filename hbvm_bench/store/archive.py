@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.reference import solutions
-from hbvm_bench.store.files import atomic, ensure_writable
 from hbvm_bench.store.records import SCHEMA, Record, decoded
 from hbvm_bench.store.store import Index, Store
 from problems import limits
@@ -148,21 +147,8 @@ def table(
     )
 
 
-def write(path: Path, contents: Contents) -> None:
-    """Write an archive; the same contents give the same bytes.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the directory cannot be written.
-    """
-    ensure_writable(path.parent)
-    with atomic(path) as temporary:
-        temporary.write_bytes(packed(contents))
-
-
 def packed(contents: Contents) -> bytes:
-    """Return the bytes of an archive."""
+    """Return the bytes of an archive; the same contents give the same."""
     return lzma.compress(msgspec.json.encode(contents), preset=9 | lzma.PRESET_EXTREME)
 
 

@@ -7,11 +7,12 @@ import tomllib
 import pytest
 
 from hbvm_bench.campaign import file, own
+from hbvm_bench.report import page
 from hbvm_bench.run import checked, loop
 from problems.errors import InputError
 
-WORDS = {"title", "description", "note", "words", "alone", "name"}
-"""Texts for readers, and the name of a thing itself."""
+WORDS = {"title", "description", "note", "words", "alone", "name", "lead", "series"}
+"""Texts for readers, the name of a thing itself, and series: an archive keeps those that are there."""
 
 FREE = {"values", "sweep"}
 """Tables whose keys are the file's own names."""
@@ -90,6 +91,8 @@ def accepted(data, folder):
         made = file.msgspec.convert(data, file.Campaign)
         made = own.opened(made, folder, lambda name: None)
         checked.check(made, loop.plan(made))
+        for block in made.page.blocks:
+            page.find(block)
     except (InputError, file.msgspec.ValidationError):
         return False
     return True

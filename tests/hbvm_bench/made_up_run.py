@@ -9,7 +9,7 @@ import numpy as np
 import problems
 from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry, TimingPlan
 from hbvm_bench.campaign.identity import is_ours, resolve
-from hbvm_bench.measure import raw, reading
+from hbvm_bench.measure import machine, raw, reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.report.page import Results
 from hbvm_bench.store import archive
@@ -141,7 +141,11 @@ def write(store, texts, count, *, missing=0):
                 for key, value in {**values, "distance_max": 1.0, "steps": 100.0 + number}.items()
             }
             cold = Compile(seconds=0.1, cached=False)
-            timing = Timing(rounds=[TimingRound(samples=[values["warm_seconds"]], repeats=2, compile=cold)])
+            timing = Timing(
+                rounds=[TimingRound(samples=[values["warm_seconds"]], repeats=2, compile=cold)],
+                plan=TimingPlan(rounds=1),
+                machine=machine.describe(),
+            )
             record = Record(
                 id=resolved.id,
                 case=resolved.case,
@@ -196,7 +200,7 @@ def results_of(*runs, beside=None):
 def archived(directory, *runs):
     """Put runs that nobody ran into an archive."""
     tables = [archive.table(run.index, run.records, {}) for run in runs]
-    archive.write(directory / archive.NAME, archive.Contents(runs=tables))
+    (directory / archive.NAME).write_bytes(archive.packed(archive.Contents(runs=tables)))
 
 
 if __name__ == "__main__":  # python -m tests.hbvm_bench.made_up_run DIRECTORY CASES

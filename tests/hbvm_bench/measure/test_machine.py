@@ -208,5 +208,5 @@ def test_races_of_several_kinds_are_columns_of_one_table():
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
     goal = "time of Taylor over ours, energy ≤ 1e-13, position ≤ 1e-10"
-    assert f"| Outer Solar System, six bodies, 12 000 years | {goal} | ≥ 10 | 15.0×" in text
+    assert f"| Outer Solar System, six bodies, 12 000 years | {goal} | 2026-11-21 | ≥ 10 | 15.0×" in text
     assert "| Outer Solar System, six bodies, 12 000 years | `Gauss(s=8, h=1.5)` | `Taylor()` |" in text

@@ -30,7 +30,7 @@ def run(tmp_path_factory):
 def test_a_page_from_an_archive_is_the_one_from_its_store(run, tmp_path):
     store, drawn = run
     path = tmp_path / archive.NAME
-    archive.write(path, contents(drawn, [store]))
+    path.write_bytes(archive.packed(contents(drawn, [store])))
     archives = archive.read(path)
     assert archives[0].records() == reading.records(store)
     assert archives[0].index() == store.index()
@@ -38,7 +38,7 @@ def test_a_page_from_an_archive_is_the_one_from_its_store(run, tmp_path):
     assert markdown.markdown(again) == markdown.markdown(drawn)
     assert html.page(again) == html.page(drawn)
     before = path.read_bytes()
-    archive.write(path, contents(again, archives))
+    path.write_bytes(archive.packed(contents(again, archives)))
     assert path.read_bytes() == before
 
 
@@ -64,14 +64,14 @@ def test_columns_of_different_lengths_are_refused(run, tmp_path):
     whole = contents(drawn, [store])
     (table,) = whole.runs
     cut = msgspec.structs.replace(table, columns={**table.columns, "id": table.columns["id"][:-1]})
-    archive.write(tmp_path / archive.NAME, msgspec.structs.replace(whole, runs=[cut]))
+    (tmp_path / archive.NAME).write_bytes(archive.packed(msgspec.structs.replace(whole, runs=[cut])))
     with pytest.raises(InputError, match="no archive"):
         archive.read(tmp_path / archive.NAME)
 
 
 def test_an_archive_makes_a_report_alone(run, tmp_path):
     store, drawn = run
-    archive.write(tmp_path / archive.NAME, contents(drawn, [store]))
+    (tmp_path / archive.NAME).write_bytes(archive.packed(contents(drawn, [store])))
     with pytest.raises(InputError, match="by itself alone"):
         archive.opened([tmp_path, store.directory])
 

@@ -77,7 +77,7 @@ def stopped(directory, sent, sign):
 
 
 def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
-    code, said = stopped(tmp_path, r"\[1/21\]", signal.SIGINT)
+    code, said = stopped(tmp_path, r"\[1/\d+\]", signal.SIGINT)
     assert code == 130
     assert "interrupted" in said
 
@@ -86,7 +86,7 @@ def test_ctrl_c_ends_the_race_at_once_with_130(tmp_path):
 def test_a_race_that_was_killed_goes_on_where_it_was(tmp_path, capsys):
     """Nothing is lost, and nothing is done twice, whether it was measuring or timing."""
     pytest.importorskip("heyoka")
-    stopped(tmp_path, r"\[3/21\]", signal.SIGKILL)
+    stopped(tmp_path, r"\[3/\d+\]", signal.SIGKILL)
     before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cases").glob("*.npz")}
     assert len(before) >= 3
     code, _ = stopped(tmp_path, "round 1", signal.SIGKILL)
