@@ -238,6 +238,7 @@ class Arguments:
         self.name, self.kind, self.owner = name, kind, owner or name
         self.signature = signature
         self.parameters = signature.parameters
+        self._defaults: dict[str, Any] = {}
         self._by_place = [key for key, one in self.parameters.items() if one.kind is not one.KEYWORD_ONLY]
 
     def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
@@ -286,7 +287,12 @@ class Arguments:
 
     def value(self, key: str, value: Any) -> Any:
         """Return the value of one argument in the form in which it is used, or refuse it; see `checked`."""
-        return checked(self.owner, key, value, self.parameters[key].annotation)
+        one = self.parameters[key]
+        if value is not one.default:
+            return checked(self.owner, key, value, one.annotation)
+        if key not in self._defaults:  # a default is checked once, not in every call
+            self._defaults[key] = checked(self.owner, key, value, one.annotation)
+        return self._defaults[key]
 
     def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> inspect.BoundArguments:
         """Return all arguments of a call, defaults included, checked.
