@@ -200,6 +200,7 @@ def results_of(*runs, beside=None):
 def archived(directory, *runs):
     """Put runs that nobody ran into an archive."""
     tables = [archive.table(run.index, run.records, {}) for run in runs]
+    directory.mkdir(parents=True, exist_ok=True)
     (directory / archive.NAME).write_bytes(archive.packed(archive.Contents(runs=tables)))
 
 
