@@ -7,7 +7,7 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
 
-.PHONY: bench pages reports test test-all docs lint format venv lock clean
+.PHONY: bench pages reports test test-all test-aarch64 docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
@@ -23,6 +23,9 @@ test: venv  ## the test suite
 
 test-all: venv  ## with the slow tests: studies that are run whole, and killed in the middle
 	$(BIN)/python -m pytest -m ""
+
+test-aarch64: venv  ## each way through the kernel once on an emulated aarch64, 5 minutes; needs Debian's apt-get and qemu-user-static
+	.ci/aarch64
 
 docs: pages  ## the site: docs/_build/html/index.html
 	@lock="$$(sha256sum < requirements-docs.lock)"; \

@@ -2,8 +2,13 @@
 
 import os
 import signal
+import sys
 
+import pytest
 from hypothesis import settings
+
+from integrators.peers import ONLY_LINUX
+from problems.errors import MissingLibraryError
 
 # What decides whether a change lands is the same every time; at home hypothesis goes on looking.
 settings.register_profile("ci", derandomize=True, deadline=None, print_blob=True)
@@ -12,6 +17,22 @@ settings.load_profile("ci" if os.environ.get("CI") else "home")
 
 # A shell starts background jobs deaf to Ctrl-C, and their children inherit it; some tests send it to a child.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Libraries that have no wheels for this system; elsewhere the tests want every one of them.
+# WITHOUT="heyoka ..." hides more of them, as they are hidden there.
+ABSENT = {*([] if sys.platform == "linux" else ONLY_LINUX), *os.environ.get("WITHOUT", "").split()}
+sys.modules.update(dict.fromkeys(ABSENT))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Skip a test that met a library which this system cannot have."""
+    report = yield
+    error = call.excinfo and call.excinfo.value
+    if isinstance(error, MissingLibraryError) and ABSENT.intersection(str(error).split()):
+        report.outcome, report.longrepr = "skipped", (str(item.path), 0, f"Skipped: {error}")
+    return report
 
 
 # Begun first, so that at the end no core waits for one of them: a file is the work of one process.

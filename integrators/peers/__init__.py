@@ -4,6 +4,7 @@ The modules are named after the libraries; each imports its library by `load`, o
 method is compiled, so importing a module here costs nothing and needs nothing installed.
 """
 
+import sys
 from importlib import import_module
 from types import ModuleType
 
@@ -11,6 +12,9 @@ from problems.errors import MissingLibraryError
 
 UNTRACED = "it needs the field as a formula, not as a function; write it as a VectorField or Hamiltonian."
 """Why libraries that take expressions refuse a `problems.Foreign`."""
+
+ONLY_LINUX = ("heyoka",)
+"""Libraries without wheels for other systems, as the extra ``peers`` says too."""
 
 
 def load(library: str, *modules: str) -> ModuleType:
@@ -31,7 +35,9 @@ def load(library: str, *modules: str) -> ModuleType:
     try:
         found = [import_module(name) for name in modules or (library,)]
     except ImportError as error:
-        raise MissingLibraryError(
-            f'{library} is not installed ({error}); install the peers with pip install "hbvm-bench[peers]".'
-        ) from error
+        if library in ONLY_LINUX and sys.platform != "linux":
+            fix = "it has wheels for Linux only; on this system it must be built from its sources."
+        else:
+            fix = 'install the peers with pip install "hbvm-bench[peers]".'
+        raise MissingLibraryError(f"{library} is not installed ({error}); {fix}") from error
     return found[0]

@@ -12,8 +12,7 @@ from problems.errors import InputError
 
 
 def test_the_default_tolerance_is_the_library_s_own_and_is_not_printed():
-    import heyoka
-
+    heyoka = pytest.importorskip("heyoka")
     x, v = heyoka.make_vars("x", "v")
     assert heyoka.taylor_adaptive([(x, v), (v, -x)], [1.0, 0.0]).tol == EPS == Taylor().tol
     assert repr(Taylor()) == "Taylor()"
