@@ -12,8 +12,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 
 def test_they_follow_the_schema():
-    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-workflows", *FILES]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-workflows"]
+    done = subprocess.run([*command, *FILES], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -27,7 +27,7 @@ def test_they_run_on_every_python_that_is_promised():
 def test_what_they_run_is_there():
     text = "\n".join(file.read_text() for file in FILES)
     targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    assert {target for target in re.findall(r"run: make ([a-z0-9-]+)", text)} <= set(targets)
+    assert set(re.findall(r"run: make ([a-z0-9-]+)", text)) <= set(targets)
     named = re.findall(r"\./(\.github/\S+)|(\.ci/\S+)|\.\./(examples/\S+)|-r (\S+\.lock)", text)
     paths = [path for groups in named for path in groups if path]
     assert len(paths) >= 4

@@ -175,7 +175,7 @@ def test_a_missing_library_is_named_with_its_remedy(method, module, monkeypatch)
 def test_a_library_without_wheels_for_this_system_is_said_to_have_none(monkeypatch):
     monkeypatch.setitem(sys.modules, "heyoka", None)
     monkeypatch.setattr(sys, "platform", "darwin")
-    with pytest.raises(MissingLibraryError, match="heyoka is not installed.*wheels for Linux only"):
+    with pytest.raises(MissingLibraryError, match=r"heyoka is not installed.*wheels for Linux only"):
         Taylor().compile(testing.two_bodies().system)
 
 
