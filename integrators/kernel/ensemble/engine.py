@@ -13,7 +13,7 @@ def _run() -> Any:
     return run
 
 
-run = Engine(_run, "group side budget", *SOURCES)
+run = Engine(_run, "group side budget", *SOURCES, "step/rule")
 """``run(group, side, budget)``: see `integrators.kernel.ensemble.loop`."""
 
 

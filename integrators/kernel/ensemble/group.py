@@ -25,8 +25,7 @@ class Group(Memory):
     weights_low = Array()
     position_weights = Array()
     position_weights_low = Array()
-    falls = Array()  # changes that a number of sweeps must have come to; see `steps.Writer.rule`
-    reach = Real()  # the largest sum of a row of the matrix, by sizes
+    reach = Real()  # the largest sum of a row of the matrix from the diagonal on, by sizes
     h = Array("lanes")
     par = Array("parameters", "lanes")
     velocity = Array("rows", "lanes")  # q' = velocity * p
@@ -40,6 +39,7 @@ class Group(Memory):
     alive = Array("lanes")  # 1: goes on; 0: left, because its equations were not solved
     living = Integer()  # whether any is alive
     sweeps = Array("lanes")  # in which the trajectory took part
+    rate = Array("lanes")  # binary logarithm of the iteration's contraction, as measured
 
     # --- a step ---
     values = Array("k", "rows", "lanes")  # of the field, at the stages

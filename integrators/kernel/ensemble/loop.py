@@ -5,6 +5,7 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import call_steps
+from integrators.kernel.step.rule import FIRST_RATE
 
 group_at = view(Group)
 
@@ -23,7 +24,7 @@ def load(group):
         for d in range(rows):
             group.velocity[lanes * d + lane] = group.all_velocity[rows * i + d]
         group.alive[lane] = 1.0
-        group.sweeps[lane] = 0.0
+        group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
     for i in range(group.k * rows * lanes):
         group.values[i] = 0.0
     group.n = group.sample = 0
@@ -73,6 +74,7 @@ def part_step(group, side, sample):
         side.time_low[lane] = lost + fma(n, h, -elapsed)
         side.h[lane] = part
         side.alive[lane], side.sweeps[lane] = group.alive[lane], 0.0
+        side.rate[lane] = group.rate[lane]  # not that of another partial step
     side.n = 0
     length = group.part_places[sample]
     place = group.k * group.k * length

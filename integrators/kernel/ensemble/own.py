@@ -18,7 +18,7 @@ from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST
 from integrators.kernel.step.kinks import arrived, at_end
 from integrators.kernel.step.loop import reset
-from integrators.kernel.step.rule import SMALLEST
+from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.vary import (
     BUSY,
     FUTILE,
@@ -80,7 +80,7 @@ def load(group, lane):
     if group.times[group.count - 1] < group.start_time:
         ctx.next_length = -ctx.next_length
     clear(group, lane)
-    group.sweeps[lane] = 0.0
+    group.sweeps[lane], group.rate[lane] = 0.0, FIRST_RATE
     group.mark[lane] = group.start_time
     group.made[lane] = 0
     write(group, lane, ctx)

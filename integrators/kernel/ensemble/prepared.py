@@ -10,10 +10,9 @@ from integrators.kernel import tables
 from integrators.kernel.context import width_of_blocks
 from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.group import Group
-from integrators.kernel.ensemble.steps import MOST, Form, compile_steps
+from integrators.kernel.ensemble.steps import Form, compile_steps
 from integrators.kernel.native import binary
 from integrators.kernel.native.memory import Numbers, aligned
-from integrators.kernel.step.rule import FALL, LEAST
 from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
@@ -76,10 +75,8 @@ class Lanes:
         """The tables that do not depend on the step."""
         a = self._constants.arrays
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
-        # Falls as steep as so many equal ones from 1 to 1e-15; see `integrators.kernel.step.iterate`.
-        falls = 3.0 * LEAST * FALL ** (1.0 / np.maximum(np.arange(MOST + 1), 1))
         extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
-        found = {name: a[name] for name in names} | {"falls": falls, "extrapolation": extrapolation}
+        found = {name: a[name] for name in names} | {"extrapolation": extrapolation}
         found |= {"into_modes": a["into_modes"], "recurrence": tables.recurrence(self._constants.modes)}
         return {name: _aligned(values) for name, values in found.items()}
 
@@ -178,10 +175,9 @@ def lanes_of(
 def _reach(matrix: Numbers) -> Numbers:
     """Return how far a change of the values moves the stages at most, for a matrix or for several.
 
-    In the next sweep a stage meets the changes at itself and at those after it only, which is less. But a
-    bound by these alone ends iterations early: energies of Henon and Heiles drifted by 2e-19 per step.
+    In the next sweep a stage meets the changes at itself and at those after it: the others have moved it.
     """
-    return np.abs(matrix).sum(axis=-1).max(axis=-1)
+    return np.abs(np.triu(matrix)).sum(axis=-1).max(axis=-1)
 
 
 def _aligned(values: Numbers) -> Numbers:

@@ -21,17 +21,15 @@ from integrators.kernel.ensemble.group import Group
 from integrators.kernel.ensemble.writer import Index, Writer
 from integrators.kernel.native import binary, field, store
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
+from integrators.kernel.simd.operations import where
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import (
     FLOOR,
     LARGE,
-    LEAST,
+    LOG_REST,
+    LOG_REST_VARYING,
     NOTHING,
-    PATIENCE,
-    ROUNDING,
     SMALLEST,
-    STAGNATION,
-    STEEP,
     TOLERANCE,
 )
 from problems import emit
@@ -153,7 +151,9 @@ class Steps(Writer):
             self.each(k * rows, lambda i: self.put(self.get(kept, i), self.values, i))
         alive = self.get(self.array(slots["alive"]))
         self.alive = self.variable(self.bits, alive.compare("!=", 0.0))
-        self.sweeps = self.variable(self.kind, self.get(self.array(slots["sweeps"])).value)
+        self.sweeps, self.rate = (
+            self.variable(self.kind, self.get(self.array(slots[name])).value) for name in ("sweeps", "rate")
+        )
         taken = self.variable(INTEGER, ir.Constant(INTEGER, 0))
         loop, end = self.function.append_basic_block("step"), self.function.append_basic_block("done")
         b.branch(loop)
@@ -168,7 +168,8 @@ class Steps(Writer):
         if self.unrolled:
             self.each(k * rows, lambda i: self.put(self.get(self.values, i), kept, i))
         self.put(self.one.where(b.load(self.alive), 0.0), self.array(slots["alive"]))
-        self.put(Value(b, b.load(self.sweeps)), self.array(slots["sweeps"]))
+        for variable, name in ((self.sweeps, "sweeps"), (self.rate, "rate")):
+            self.put(Value(b, b.load(variable)), self.array(slots[name]))
         b.store(b.zext(self.any(b.load(self.alive)), INTEGER), self.word(slots["living"]))
         b.ret_void()
         return text_of(self.module)
@@ -337,7 +338,8 @@ class Steps(Writer):
         none = ir.Constant(self.bits, [0] * form.lanes)
         self.last, self.best = self.variable(self.kind, infinite), self.variable(self.kind, infinite)
         self.stalled = self.variable(self.kind, self.zero.value)
-        self.final, self.again = self.variable(self.bits, none), self.variable(self.bits, none)
+        self.left = self.variable(self.kind, infinite)  # sweeps still to be made; infinite: that is not known
+        self.again = self.variable(self.bits, none)
         self.active = self.variable(self.bits, b.load(self.alive))
         self.tried = self.variable(INTEGER, ir.Constant(INTEGER, 0))
         loop, end = self.function.append_basic_block("sweep"), self.function.append_basic_block("solved")
@@ -382,10 +384,10 @@ class Steps(Writer):
         """Apply the stopping rule, in every lane by itself.
 
         What is judged is the change that the next sweep would make of the stages, beside
-        their block: bounded by that of the values. As in `integrators.kernel.step.iterate`,
-        an iteration ends when that is at most 1e-16, one sweep after it falls so steeply that
-        it is going to be, or when it does not decrease and rounding accounts for it.
+        their block: bounded by that of the values.
         """
+        from integrators.kernel.step.stopping import further, judge, left_over, stagnates  # imports numba
+
         b, form = self.b, self.form
         change, floored = (self.variable(self.kind, self.zero.value) for _ in range(2))
 
@@ -396,39 +398,44 @@ class Steps(Writer):
                 b.store(Value(b, b.load(top)).larger(size).value, top)
 
         self.each_row(largest)
-        load = lambda variable: Value(b, b.load(variable))  # noqa: E731
-        strict, last, best, stalled = load(change), load(self.last), load(self.best), load(self.stalled)
+
+        def load(variable: Any) -> Value:
+            return Value(b, b.load(variable))
+
+        strict, best, rate, left = load(change), load(self.best), load(self.rate), load(self.left)
         tried = b.add(b.load(self.tried), ir.Constant(INTEGER, 1))
         b.store(tried, self.tried)
         active = b.load(self.active)
         sweeps = load(self.sweeps)
         b.store((sweeps + 1.0).where(active, sweeps).value, self.sweeps)
 
-        falling = strict.compare("<", best)
-        fall = self.number(self.array(Group.slots["falls"]), tried)
-        steep = b.and_(falling, last.compare("<", 1.0))
-        for condition in (
-            strict.compare("<=", last * STEEP),
-            (strict * strict).compare("<=", last * LEAST),
-            b.fcmp_ordered("<=", strict.value, fall.value),
-        ):
-            steep = b.and_(steep, condition)
-        stalled = self.zero.where(falling, stalled + 1.0)
-        allowed = self.zero.of(STAGNATION).where(stalled.compare(">=", float(PATIENCE)), ROUNDING)
-        stopped = b.and_(b.not_(falling), load(floored).compare("<", allowed))
-        solved = b.or_(strict.compare("<=", TOLERANCE), b.or_(b.load(self.final), stopped))
-        finite = strict.compare("<", INFINITY)
-        solved = b.and_(solved, finite)
-        b.store(steep, self.final)
-        b.store(strict.value, self.last)
-        b.store(best.where(best.compare("<=", strict), strict).value, self.best)
-        b.store(stalled.value, self.stalled)
+        count = Value(b, splat(b, b.sitofp(tried, DOUBLE), form.lanes))
+        best, stalled, rate, converged, rest = judge(
+            strict, load(self.last), best, load(self.stalled), rate, count, TOLERANCE, 0.0
+        )
+        over = converged | stagnates(load(floored), stalled)
+        log_rest = LOG_REST_VARYING if form.varying else LOG_REST
+        more = where(over, further(left_over(converged, rest, best), rate, log_rest), INFINITY)
+        undecided = left >= INFINITY
+        left = where(undecided, more, left - 1.0)
+        finite = strict < INFINITY
+        solved = ((left <= 0.0) & finite).value
+        rate = where(undecided, rate, load(self.rate)).where(active, load(self.rate))
+        news = (
+            (self.last, strict),
+            (self.best, best),
+            (self.stalled, stalled),
+            (self.rate, rate),
+            (self.left, left),
+        )
+        for variable, value in news:
+            b.store(value.value, variable)
 
         ends = (AGAIN,) if form.varying else (AGAIN, MOST)
         over = [b.icmp_signed("==", tried, ir.Constant(INTEGER, n)) for n in ends]
         all_of_them, none = (ir.Constant(active.type, [bit] * form.lanes) for bit in (1, 0))
         late = [b.select(flag, all_of_them, none) for flag in over]
-        gives_up = b.not_(finite)
+        gives_up = b.not_(finite.value)
         for mask in late:
             gives_up = b.or_(gives_up, mask)
         failing = b.and_(b.and_(active, b.not_(solved)), gives_up)
@@ -448,9 +455,9 @@ class Steps(Writer):
         anew = b.and_(failing, b.not_(b.load(self.again)))
         b.store(b.or_(b.load(self.again), anew), self.again)
         infinite = self.zero.of(INFINITY)
-        for variable, value in ((self.last, infinite), (self.best, infinite), (self.stalled, self.zero)):
-            b.store(value.where(anew, Value(b, b.load(variable))).value, variable)
-        b.store(b.and_(b.load(self.final), b.not_(anew)), self.final)
+        for variable in (self.last, self.best, self.left):
+            b.store(infinite.where(anew, Value(b, b.load(variable))).value, variable)
+        b.store(self.zero.where(anew, Value(b, b.load(self.stalled))).value, self.stalled)
         self.each(
             form.k * form.rows,
             lambda i: self.put(self.zero.where(anew, self.get(self.values, i)), self.values, i),

@@ -20,7 +20,7 @@ from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, largest, put, splat8, spread
 from integrators.kernel.step.begin import FARTHEST, INFINITY, prepare, start_elsewhere
 from integrators.kernel.step.rule import STAGNATION
-from integrators.kernel.step.size import is_rounding
+from integrators.kernel.step.stopping import is_rounding
 
 MOST_CORRECTIONS = 40
 MOST_BLENDED = 250

@@ -20,7 +20,8 @@ from numba.core.typing import templates
 from numba.core.typing.templates import AbstractTemplate, signature
 from numba.extending import models, register_model
 
-from integrators.kernel.simd.emit import llvm_call, splat, vector
+from integrators.kernel.simd import operations
+from integrators.kernel.simd.emit import DOUBLE, INTEGER, llvm_call, splat, vector
 
 # What numba makes of a decorated function has another signature than the function.
 intrinsic = cast(Any, extending.intrinsic)
@@ -160,13 +161,34 @@ def two_sum(typing, a, b):
     return signature(types.UniTuple(a, 2), a, a), generate
 
 
-@intrinsic
-def binary_log(typing, x):
-    """Return log2(x) of a number x > 0, too small by up to 0.09: its bits read as an integer."""
+# --- operations of `integrators.kernel.simd.operations`, on numbers ----------------------------------
 
-    def generate(context, builder, sig, args):
-        bits = builder.sitofp(builder.bitcast(args[0], ir.IntType(64)), ir.DoubleType())
-        scaled = builder.fmul(bits, ir.Constant(ir.DoubleType(), 2.0**-52))
-        return builder.fsub(scaled, ir.Constant(ir.DoubleType(), 1023.0))
 
-    return signature(types.float64, types.float64), generate
+def _on_numbers(operation: Any, kinds: list[Any], result: Any, emit: Any) -> None:
+    """Give an operation a meaning on numbers."""
+
+    class Template(AbstractTemplate):
+        def generic(self, args: Any, kws: Any) -> Any:
+            return None if kws or len(args) != len(kinds) else signature(result, *kinds)
+
+    infer_global(operation)(Template)
+    lower_builtin(operation, *kinds)(lambda context, builder, sig, args: emit(builder, *args))
+
+
+def _choice(symbol: str) -> Any:
+    return lambda b, x, y: b.select(b.fcmp_ordered(symbol, x, y), x, y)
+
+
+def _log(builder: Any, x: Any) -> Any:
+    bits = builder.sitofp(builder.bitcast(x, INTEGER), DOUBLE)
+    scaled = builder.fmul(bits, ir.Constant(DOUBLE, 2.0**-52))
+    return builder.fsub(scaled, ir.Constant(DOUBLE, 1023.0))
+
+
+_ONE, _TWO = [types.float64], [types.float64] * 2
+_on_numbers(operations.where, [types.boolean, *_TWO], types.float64, lambda b, c, x, y: b.select(c, x, y))
+_on_numbers(operations.opposite, [types.boolean], types.boolean, lambda b, c: b.not_(c))
+_on_numbers(operations.least, _TWO, types.float64, _choice("<"))
+_on_numbers(operations.greatest, _TWO, types.float64, _choice(">"))
+_on_numbers(operations.size, _ONE, types.float64, intrinsic_call("fabs"))
+_on_numbers(operations.binary_log, _ONE, types.float64, _log)

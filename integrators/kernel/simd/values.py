@@ -7,6 +7,31 @@ from llvmlite import ir
 from integrators.kernel.simd.emit import INTEGER, llvm_call, vector
 
 
+class Condition:
+    """Where something holds in a vector under construction."""
+
+    def __init__(self, builder: Any, value: Any):
+        self.builder, self.value = builder, value
+
+    def __and__(self, other: "Condition") -> "Condition":
+        return Condition(self.builder, self.builder.and_(self.value, other.value))
+
+    def __or__(self, other: "Condition") -> "Condition":
+        return Condition(self.builder, self.builder.or_(self.value, other.value))
+
+    def opposite(self) -> "Condition":
+        return Condition(self.builder, self.builder.not_(self.value))
+
+    def choose(self, x: "Value | float", y: "Value | float") -> "Value":
+        """Return x where the condition holds, else y."""
+        kind = vector(self.value.type.count)
+        x, y = (
+            z if isinstance(z, Value) else Value(self.builder, ir.Constant(kind, [float(z)] * kind.count))
+            for z in (x, y)
+        )
+        return x.where(self.value, y)
+
+
 class Value:
     """A vector under construction, with the operators that formulas need."""
 
@@ -34,6 +59,15 @@ class Value:
 
     def __rsub__(self, other: float) -> "Value":
         return self._make(self.builder.fsub(self._of(other), self.value))
+
+    def __radd__(self, other: float) -> "Value":
+        return self + other
+
+    def __rmul__(self, other: float) -> "Value":
+        return self * other
+
+    def __rtruediv__(self, other: float) -> "Value":
+        return self._make(self.builder.fdiv(self._of(other), self.value))
 
     def __mul__(self, other: "Value | float") -> "Value":
         return self._make(self.builder.fmul(self.value, self._of(other)))
@@ -66,8 +100,24 @@ class Value:
     def compare(self, symbol: str, other: "Value | float") -> Any:
         return self.builder.fcmp_ordered(symbol, self.value, self._of(other))
 
+    def __lt__(self, other: "Value | float") -> Condition:
+        return Condition(self.builder, self.compare("<", other))
+
+    def __le__(self, other: "Value | float") -> Condition:
+        return Condition(self.builder, self.compare("<=", other))
+
+    def __gt__(self, other: "Value | float") -> Condition:
+        return Condition(self.builder, self.compare(">", other))
+
+    def __ge__(self, other: "Value | float") -> Condition:
+        return Condition(self.builder, self.compare(">=", other))
+
     def integers(self) -> Any:
         return self.builder.bitcast(self.value, ir.VectorType(INTEGER, self.count))
+
+    def bits(self) -> "Value":
+        """Return the bits, read as an integer, as a number."""
+        return self._make(self.builder.sitofp(self.integers(), vector(self.count)))
 
     def whole(self, number: int) -> Any:
         return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)

@@ -7,8 +7,9 @@ formed; the state is a compensated pair whose error enters the stages.
 
 from integrators.kernel.context import RUNNING
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import binary_log, fma, two_sum
+from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
+from integrators.kernel.simd.operations import binary_log
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through

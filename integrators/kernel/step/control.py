@@ -3,7 +3,7 @@
 from math import log
 
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import binary_log
+from integrators.kernel.simd.operations import binary_log
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)

@@ -1,61 +1,39 @@
-"""The stopping rule of the fixed-point iteration, and what follows from how it ended."""
-
-from math import log2
+"""How an iteration of one trajectory ends, by the stopping rule, and what follows from it."""
 
 from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RUNNING
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import binary_log
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
-from integrators.kernel.step.rule import FALL, LEAST, PATIENCE, ROUNDING, STAGNATION, STEEP
-from integrators.kernel.step.size import change, is_rounding, take_sizes
+from integrators.kernel.step.rule import ROUNDING
+from integrators.kernel.step.size import change, take_sizes
+from integrators.kernel.step.stopping import further, judge, left_over, stagnates
 from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
 MAX_ITERATIONS = 200
-LOG_TRUSTED, LOG_STEEP = log2(1e-11), log2(STEEP)
-LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
-FASTEST, SLOWEST = -10.0, -1.0  # contraction, as far as it is believed
-MOST_EXTRA = 16  # sweeps of `polish`
 
 
 @compiled
 def test(ctx, strict):
-    """Apply the stopping rule to the change of the last sweep; `Context.outcome` says what came of it.
-
-    The iteration has converged when the change, relative to its block, is at most the tolerance, or
-    when it has stopped decreasing where rounding accounts for it, or when it is small and falls so
-    steeply that the rest is known. Then `polish` takes it on.
-    """
+    """Apply the stopping rule to the change of the last sweep; `Context.outcome` says what came of it."""
     last, ctx.last = ctx.last, strict
     ctx.tests += 1
     if ctx.age == 0:
         take_sizes(ctx)
-    size = binary_log(max(strict, LEAST))
-    rate = size - binary_log(last)
-    # From 1 on, a change is no part of a size: a block was 0, or there was no change before.
-    follows = last < 1.0
-    if follows and (strict > ROUNDING or rate < ctx.rate):  # if it is rounding, it falls that fast at least
-        ctx.rate = min(max(rate, FASTEST), SLOWEST)
+    best, stalled, ctx.rate, converged, rest = judge(
+        strict, last, ctx.best, ctx.stalled, ctx.rate, ctx.tried, ctx.tolerance, ctx.tolerance
+    )
     if not strict < INFINITY:
         # Growing changes overflow in the end; a NaN out of the blue is the field's own.
         restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
-    elif strict <= ctx.tolerance:
-        polish(ctx, ctx.tolerance)
-    elif strict < ctx.best:
-        ctx.best, ctx.stalled = strict, 0
-        steep = follows and rate <= LOG_STEEP and size <= LOG_TRUSTED
-        if steep and ctx.tried * (size - LOG_PROMISE) <= LOG_FALL:
-            polish(ctx, strict)
-        elif ctx.tried >= MAX_ITERATIONS:
-            restart(ctx, DIVERGED)
-    else:
-        ctx.stalled += 1
-        if is_rounding(change(ctx, ctx.floored), ctx.stalled >= PATIENCE):
-            if ctx.best <= STAGNATION:
-                polish(ctx, ctx.best)
-            else:  # a block that is nothing beside the others, and may be growing
-                ctx.outcome = DONE
-        elif ctx.tried >= MAX_ITERATIONS:
-            restart(ctx, DIVERGED)
+        return
+    ctx.best, ctx.stalled = best, int(stalled)
+    if converged or (stalled > 0.0 and stagnates(change(ctx, ctx.floored), stalled)):
+        left = left_over(converged, rest, best)
+        if left > 0.0:
+            polish(ctx, left)
+        else:
+            ctx.outcome = DONE
+    elif ctx.tried >= MAX_ITERATIONS:
+        restart(ctx, DIVERGED)
 
 
 @compiled
@@ -63,10 +41,9 @@ def polish(ctx, change):
     """Iterate until next to nothing is left of a change, without a test, and let the step be solved.
 
     The last evaluation is at the newest stages: the field's values have the error of the
-    stages that they were taken at. What is left there acts on the energy in the same direction in every step.
+    stages that they were taken at.
     """
-    more = int((ctx.log_rest - binary_log(change)) / ctx.rate)
-    sweep_to_the_end(ctx, min(max(more, 0), MOST_EXTRA))
+    sweep_to_the_end(ctx, int(further(change, ctx.rate, ctx.log_rest)))
     ctx.outcome = DONE
 
 

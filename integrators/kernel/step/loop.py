@@ -9,8 +9,9 @@ from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
+from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
-from integrators.kernel.step.vary import CLOSE, FIRST_RATE, ready, remaining, take
+from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
 context = view(Context)
 

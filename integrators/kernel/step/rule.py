@@ -1,6 +1,6 @@
-"""The numbers of the rule that ends the fixed-point iteration: of one trajectory, and of those in lanes.
+"""The numbers of the rules: what ends the fixed-point iteration, sizes of blocks, parts of the interval.
 
-`integrators.kernel.step.iterate` and `integrators.kernel.ensemble.steps` apply it.
+`integrators.kernel.step.stopping` has the rule of the iteration.
 """
 
 from math import log2
@@ -29,6 +29,7 @@ FALL = 1e15
 # 3e-15 3 to 8e-18. At loose tolerances it is seen: a pendulum's energy grows by 2.3e-18 in each step of
 # HBVM(12, 6) at 1e-8, and not with 3e-19, which excites fast oscillations at rest, though.
 LOG_REST, LOG_REST_VARYING = log2(3e-19), log2(3e-17)
+FIRST_RATE = log2(0.01)  # contraction (binary logarithm) before any is measured
 
 # --- sizes of blocks, which changes are relative to -------------------------------------------------
 

@@ -7,16 +7,10 @@ its group, so there are two measures: `strict`, by the block's own size, and `fl
 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
-from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, ROUNDING, SMALLEST, STAGNATION
+from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, SMALLEST
 from integrators.kernel.step.stages import offset
 
 SIZES_LAST = 8  # steps for which the sizes of the blocks are good
-
-
-@compiled
-def is_rounding(floored, patient):
-    """Whether rounding accounts for a change that does not decrease; ``patient``: not for the first time."""
-    return floored < (STAGNATION if patient else ROUNDING)
 
 
 @compiled

@@ -19,7 +19,8 @@ from integrators.kernel.context import (
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import binary_log, two_sum
+from integrators.kernel.simd.lanes import two_sum
+from integrators.kernel.simd.operations import binary_log
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
@@ -39,7 +40,7 @@ from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import crosses, keep_end, kink, undo
-from integrators.kernel.step.rule import FUTILE_PART, ROUNDING, SCALE_LASTS
+from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -52,7 +53,7 @@ BUSY = 18.0
 LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
 MOST_UNTESTED = 12
 MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
-FIRST_RATE, LEAST_RATE, MOST_RATE = log2(0.01), log2(1e-4), log2(0.9)
+LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
 HOPE = log2(0.7)  # where the last change was nothing, the contraction may be this part of what was thought
 # The implicit solver takes over after so many steps in a row that the iteration keeps from growing where the
 # errors would allow so much longer ones. Its steps cost one or two of 18 sweeps through memory, and ten of
