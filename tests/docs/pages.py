@@ -18,6 +18,7 @@ CELL = re.compile(
 TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```", re.MULTILINE | re.DOTALL)
 CARD = re.compile(r"^:link: (\S+)$", re.MULTILINE)
 DOC = re.compile(r"\{doc\}`(?:[^`<]*<)?([^`>]+)>?`")
+FIGURE = re.compile(r"^```\{figure\} (\S+)", re.MULTILINE)
 LINK = re.compile(r"\]\(<?([^)\s>]+)>?\)|(?:href|src)=\"([^\"]+)\"")
 HEADING = re.compile(r"^#{1,6} +(.*?) *$", re.MULTILINE)
 
@@ -30,8 +31,9 @@ def sources() -> list[Path]:
 
 def links(path: Path) -> list[str]:
     """Return where links and pictures of a page lead, as they are written, without other sites."""
-    prose = re.sub(r"`[^`\n]*`", "", FENCE.sub("", path.read_text(encoding="utf-8")))
-    found = [markdown or html for markdown, html in LINK.findall(prose)]
+    text = path.read_text(encoding="utf-8")
+    prose = re.sub(r"`[^`\n]*`", "", FENCE.sub("", text))
+    found = [markdown or html for markdown, html in LINK.findall(prose)] + FIGURE.findall(text)
     return [target for target in found if not re.match(r"[a-z]+:", target)]
 
 
