@@ -13,6 +13,7 @@ from integrators.kernel.simd.emit import DOUBLE, splat
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import NOTHING, SMALLEST
 
+INFINITY = float("inf")
 COEFFICIENTS = 8  # that a step is judged by; see `Context.estimators`
 BORDERS = range(10, 12)  # rows there that extrapolate to the start and to the end of the step
 
@@ -142,52 +143,39 @@ class Control:
         return apart.where(apart.compare(">", most), 0.0)
 
     def aim(self) -> None:
-        """Set the `factor` of the next step's length to this one's; see `longer` and `accepts`."""
+        """Set the `factor` of the next step's length to this one's; see `integrators.kernel.step.control`."""
         from integrators.kernel.step.control import (
             APPROACH,
-            CAUTION,
-            HELD,
-            LOG_2,
-            LOG_SHRINK,
-            RECOIL,
-            SAFETY,
-            SHRINK,
-            TINY,
-            TRUST,
+            as_errors_allow,
+            as_iterations_allow,
+            bounded,
+            log_of_order,
+            log_ratio,
+            room_for_longer,
         )
         from integrators.kernel.step.vary import GROW, HELD_BACK
 
         w, b = self.w, self.w.b
-        x = self.h / self.row("length_behind").absolute()
-        change = (x - 1.0) * 2.0 / (x + 1.0)
-
-        def logarithm(x: Value) -> Value:
-            bits = b.sitofp(x.max(TINY).integers(), w.kind)
-            return (Value(b, bits) * 2.0**-52 - 1023.0) * LOG_2
-
-        def factor(aim: Value, here: Value, before: Value) -> Value:
-            found = aim - here
-            trend = (change + before) - here
-            longer = (found * CAUTION).max(found - HELD) + trend.where(trend.compare("<", 0.0), trend * TRUST)
-            return (found * RECOIL).where(found.compare("<", 0.0), longer)
-
-        limited = self.number("allowed_defect").compare("<", float("inf"))
-        self.error = self.number("error_power") * logarithm(self.error)
-        self.defect = self.number("defect_power") * logarithm(self.defect)
-        aims = self.number("error_aim"), self.number("defect_aim")
-        by_error = factor(aims[0], self.error, self.row("error_behind"))
-        by_defect = factor(aims[1], self.defect, self.row("defect_behind"))
-        wanted = least(by_error, by_defect).where(limited, by_error)
-        root = wanted * 0.125 + 1.0
-        fourth = (root * root) * (root * root)
-        found = least(fourth * fourth * SAFETY, w.zero.of(GROW)).max(SHRINK)
-        found = found.where(wanted.compare(">", LOG_SHRINK), SHRINK)
-        sweeps = Value(b, b.load(w.sweeps))
+        limited = self.number("allowed_defect") < INFINITY
+        error_aim, defect_aim = self.number("error_aim"), self.number("defect_aim")
+        self.error = log_of_order(self.error, self.number("error_power"))
+        self.defect = log_of_order(self.defect, self.number("defect_power"))
+        factor = as_errors_allow(
+            self.error,
+            self.row("error_behind"),
+            error_aim,
+            self.defect,
+            self.row("defect_behind"),
+            defect_aim,
+            limited,
+            log_ratio(self.h / self.row("length_behind").absolute()),
+        )
         self.limit = self.row("length_limit") * APPROACH
-        found = least(found, (self.number("busy") / (sweeps - self.row("before"))).max(0.5))
-        self.factor = least(found, self.limit / self.h)
-        room = aims[0] - self.error
-        room = least(room, aims[1] - self.defect).where(limited, room)
+        iterations = Value(b, b.load(w.sweeps)) - self.row("before")
+        self.factor = as_iterations_allow(
+            bounded(factor, GROW), self.number("busy"), iterations, self.h, self.limit
+        )
+        room = room_for_longer(self.error, error_aim, self.defect, defect_aim, limited)
         kept = b.and_(room.compare("<=", self.number("worth")), self.visible)
         self.free = b.or_(self.factor.compare(">=", HELD_BACK), kept)
 
@@ -237,8 +225,3 @@ class Control:
                 w.put(w.get(source, d).where(good, w.get(now, d)), now, d)
 
             w.each(count, move)
-
-
-def least(x: Value, y: Value) -> Value:
-    """Return the smaller of two."""
-    return x.where(x.compare("<", y), y)

@@ -15,7 +15,7 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_steps
 from integrators.kernel.step.begin import FARTHEST, INFINITY
-from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.control import SHORTEST, defect_power, error_power
 from integrators.kernel.step.kinks import arrived, at_end
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
@@ -239,8 +239,7 @@ def share(group, ctx):
     """Let a group know what its steps are judged by."""
     group.estimators = ctx.estimators
     group.allowed_error, group.allowed_defect = ctx.allowed_error, ctx.allowed_defect
-    group.error_power = 1.0 / (2.0 * ctx.error_degree + 1.0)
-    group.defect_power = 1.0 / (2.0 * ctx.k - 1.0)
+    group.error_power, group.defect_power = error_power(ctx.error_degree), defect_power(ctx.k)
     group.error_aim, group.defect_aim = ctx.error_aim, ctx.defect_aim
     group.error_decay, group.defect_decay = ctx.error_decay, ctx.defect_decay
     group.least_slope, group.doubt, group.busy = ctx.least_slope, ctx.doubt, BUSY

@@ -24,12 +24,9 @@ from integrators.kernel.simd.emit import DOUBLE, INTEGER, splat, text_of
 from integrators.kernel.simd.operations import where
 from integrators.kernel.simd.values import Value
 from integrators.kernel.step.rule import (
-    FLOOR,
-    LARGE,
     LOG_REST,
     LOG_REST_VARYING,
     NOTHING,
-    SMALLEST,
     TOLERANCE,
 )
 from problems import emit
@@ -231,7 +228,10 @@ class Steps(Writer):
 
         The size of a block is the largest at the start of the step and, about, at its end.
         """
+        from integrators.kernel.step.size import inverse_sizes  # imports numba
+
         form = self.form
+        least = NOTHING if form.varying else 0.0
         reach = Value(self.b, splat(self.b, self.b.load(self.word(Group.slots["reach"], DOUBLE)), form.lanes))
 
         def own(d: Index) -> Value:
@@ -257,11 +257,8 @@ class Steps(Writer):
 
             def invert(block: Index, first: int = first, width: int = width, largest: Any = largest) -> None:
                 start = self.at(block, width, first)
-                size = self.get(self.size, start)
-                if form.varying:
-                    size = size.max(Value(self.b, self.b.load(largest)) * NOTHING)
-                floor = size.max(Value(self.b, self.b.load(largest)) * FLOOR)
-                inverses = [(self.one / x).where(x.compare(">", SMALLEST), LARGE) for x in (size, floor)]
+                top = Value(self.b, self.b.load(largest))
+                inverses = inverse_sizes(self.get(self.size, start), top, least, self.zero, self.zero)
                 for i in range(width):
                     d = self.at(start, 1, i)
                     weight = reach if form.unit else self.get(self.factor, d).absolute() * reach

@@ -2,8 +2,8 @@
 
 from math import log
 
-from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.operations import binary_log
+from integrators.kernel.native.jit import for_both_widths
+from integrators.kernel.simd.operations import binary_log, greatest, least, where
 
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
@@ -22,7 +22,7 @@ INFINITY = float("inf")
 TINY = 1e-300  # an estimated error of 0 counts as this
 
 
-@compiled
+@for_both_widths
 def log_factor(aim, estimate, behind, change):
     """Return the logarithm of the next step's length relative to this one's, from estimated errors.
 
@@ -41,32 +41,85 @@ def log_factor(aim, estimate, behind, change):
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
-    if factor < 0.0:
-        return RECOIL * factor
-    factor = max(CAUTION * factor, factor - HELD)
-    if behind < INFINITY:
-        trend = change + behind - estimate
-        factor += trend if trend < 0.0 else TRUST * trend
-    return factor
+    trend = change + behind - estimate
+    trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
+    return where(factor < 0.0, RECOIL * factor, greatest(CAUTION * factor, factor - HELD) + trend)
 
 
-@compiled
-def log_size(x):
-    """Return the logarithm of a number > 0, too small by up to 0.06: enough where an order divides it."""
-    return LOG_2 * binary_log(x)
+@for_both_widths
+def error_power(degree):
+    """Return one over the order of the error that is estimated by the coefficient of a degree."""
+    return 1.0 / (2.0 * degree + 1.0)
 
 
-@compiled
+@for_both_widths
+def defect_power(k):
+    """Return one over the order of the quadrature's error with k nodes, as it is estimated."""
+    return 1.0 / (2.0 * k - 1.0)
+
+
+@for_both_widths
+def log_of_order(error, power):
+    """Return the logarithm of an estimated error divided by its order, whose inverse is ``power``.
+
+    The logarithm is too small by up to 0.06: enough where an order divides it.
+    """
+    return power * (LOG_2 * binary_log(greatest(error, TINY)))
+
+
+@for_both_widths
 def log_ratio(x):
     """Return the logarithm of a number near 1: within 6e-4 between 0.83 and 1.2, 0.03 between 0.5 and 2."""
     return 2.0 * (x - 1.0) / (x + 1.0)
 
 
-@compiled
+@for_both_widths
+def as_errors_allow(error, error_behind, error_aim, defect, defect_behind, defect_aim, limited, change):
+    """Return the logarithm of the next step's length relative to this one's, as the estimates allow.
+
+    Parameters
+    ----------
+    error, error_behind, error_aim : float
+        Of this step, of the step before, and to aim at; see `log_factor`.
+    defect, defect_behind, defect_aim : float
+        The same for the quadrature's error,
+    limited : bool
+        if that is limited too.
+    change : float
+        Logarithm of this step's length relative to that of the step before.
+    """
+    by_error = log_factor(error_aim, error, error_behind, change)
+    by_defect = log_factor(defect_aim, defect, defect_behind, change)
+    return where(limited, least(by_defect, by_error), by_error)
+
+
+@for_both_widths
+def room_for_longer(error, error_aim, defect, defect_aim, limited):
+    """Return the logarithm of how much longer a step might have been for its estimated errors."""
+    room = error_aim - error
+    return where(limited, least(defect_aim - defect, room), room)
+
+
+@for_both_widths
 def bounded(factor, grow):
     """Return the factor of a step's length that belongs to a logarithm, within its bounds."""
-    if not factor > LOG_SHRINK:  # a NaN too
-        return SHRINK
     root = 1.0 + 0.125 * factor  # exp(factor) is its eighth power: within 1 % for lengths up to 1.4 times
     fourth = (root * root) * (root * root)
-    return max(SHRINK, min(grow, SAFETY * (fourth * fourth)))
+    longer = greatest(least(SAFETY * (fourth * fourth), grow), SHRINK)
+    return where(factor > LOG_SHRINK, longer, SHRINK)  # a NaN too
+
+
+@for_both_widths
+def as_iterations_allow(factor, busy, iterations, length, limit):
+    """Return the factor of a step's length that is good enough, made smaller for the sake of the iteration.
+
+    Parameters
+    ----------
+    factor : float
+        What the errors allow.
+    busy, iterations : float
+        Iterations to aim at, at most, and those of this step.
+    length, limit : float
+        Of this step, by size, and of the next one at most.
+    """
+    return least(least(factor, greatest(busy / iterations, 0.5)), limit / length)

@@ -5,8 +5,9 @@ the row itself. Rounding of the field may hide a block that is small beside the 
 its group, so there are two measures: `strict`, by the block's own size, and `floored`.
 """
 
-from integrators.kernel.native.jit import compiled
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import get, larger, largest, splat8, spread
+from integrators.kernel.simd.operations import greatest, where
 from integrators.kernel.step.rule import FLOOR, LARGE, NOTHING, SMALLEST
 from integrators.kernel.step.stages import offset
 
@@ -54,22 +55,43 @@ def enter_size(ctx, d, value):
     ctx.largest[g] = max(ctx.largest[g], value)
 
 
+@for_both_widths
+def inverse(size):
+    """Return 1 / size; whatever moves a block of no size is a large change, and then it has a size."""
+    return where(size > SMALLEST, 1.0 / size, LARGE)
+
+
+@for_both_widths
+def inverse_sizes(size, largest, least, expected, absolute):
+    """Return the inverse of a block's size, by both measures.
+
+    Parameters
+    ----------
+    size, largest : float
+        Of the block, and of the largest in its group.
+    least : float
+        Part of the largest that a block counts as.
+    expected : float
+        What it is known to reach; 0: nothing is known.
+    absolute : float
+        Size below which its errors do not matter.
+    """
+    own = greatest(greatest(size, least * largest), expected)
+    return inverse(own), inverse(greatest(greatest(own, FLOOR * largest), absolute))
+
+
 @compiled
 def invert_sizes(ctx, strict, floored):
     """Write the inverse sizes of all rows, by both measures; return whether all blocks have a size."""
     known = True
-    nothing = NOTHING if ctx.varying else 0.0
+    least = NOTHING if ctx.varying else 0.0
     for d in range(ctx.rows):
         b = ctx.block[d]
-        largest = ctx.largest[ctx.group[b]]
-        own = max(ctx.size[b], nothing * largest)
-        if ctx.rescaled:
-            own = max(own, ctx.expected[b])
-        floor = max(max(own, FLOOR * largest), ctx.absolute[b])
+        expected = ctx.expected[b] if ctx.rescaled else 0.0
+        strict[d], floored[d] = inverse_sizes(
+            ctx.size[b], ctx.largest[ctx.group[b]], least, expected, ctx.absolute[b]
+        )
         known = known and ctx.size[b] > SMALLEST
-        # Whatever moves a block of no size is a large change; and then it has a size: look again.
-        strict[d] = 1.0 / own if own > SMALLEST else LARGE
-        floored[d] = 1.0 / floor if floor > SMALLEST else LARGE
     return known
 
 

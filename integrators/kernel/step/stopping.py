@@ -11,7 +11,11 @@ from integrators.kernel.step.rule import FALL, LEAST, PATIENCE, ROUNDING, STAGNA
 
 LOG_TRUSTED, LOG_STEEP = log2(1e-11), log2(STEEP)
 LOG_PROMISE, LOG_FALL = log2(3.0 * LEAST), log2(FALL)
-FASTEST, SLOWEST = -10.0, -1.0  # contraction, as far as it is believed
+# Contraction, as far as it is believed. A slower one would ask for up to 40 evaluations more, which change
+# nothing: the stages are doubles, and do not move any more when their changes are below rounding. The energy
+# of oscillators with contractions of .4 to .8, 35 to 95 iterations a step,
+# drifts by 2e-18 to 7e-17 in each step, and as much, in another direction, with 60 evaluations more.
+FASTEST, SLOWEST = -10.0, -1.0
 MOST_EXTRA = 16.0  # evaluations without a test after the last one, at most
 
 

@@ -29,11 +29,14 @@ from integrators.kernel.step.control import (
     SAFETY,
     SHORTEST,
     SHRINK,
-    TINY,
+    as_errors_allow,
+    as_iterations_allow,
     bounded,
-    log_factor,
+    defect_power,
+    error_power,
+    log_of_order,
     log_ratio,
-    log_size,
+    room_for_longer,
 )
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import commit, finish
@@ -127,24 +130,25 @@ def iterate(ctx):
 
 
 @compiled
-def longer(ctx, error, defect, grow):
+def aim(ctx, error, defect, grow):
     """Return the next step's length relative to this one's, from what is estimated for this one."""
     if not error < INFINITY:
         return SHRINK
-    h = ctx.h
-    behind = ctx.length_behind
-    change = log_ratio(h / behind) if behind != 0.0 else 0.0
-    power = 1.0 / (2.0 * ctx.error_degree + 1.0)
-    here = power * log_size(max(error, TINY))
-    before = ctx.error_behind if behind != 0.0 else INFINITY
-    factor = log_factor(ctx.error_aim, here, before, change)
-    ctx.error_ahead = here
-    if ctx.allowed_defect < INFINITY:
-        power = 1.0 / (2.0 * ctx.k - 1.0)
-        here = power * log_size(max(defect, TINY))
-        before = ctx.defect_behind if behind != 0.0 else INFINITY
-        factor = min(factor, log_factor(ctx.defect_aim, here, before, change))
-        ctx.defect_ahead = here
+    h, behind = ctx.h, ctx.length_behind
+    known = behind != 0.0
+    error = log_of_order(error, error_power(ctx.error_degree))
+    defect = log_of_order(defect, defect_power(ctx.k))
+    ctx.error_ahead, ctx.defect_ahead = error, defect
+    factor = as_errors_allow(
+        error,
+        ctx.error_behind if known else INFINITY,
+        ctx.error_aim,
+        defect,
+        ctx.defect_behind if known else INFINITY,
+        ctx.defect_aim,
+        ctx.allowed_defect < INFINITY,
+        log_ratio(h / behind) if known else 0.0,
+    )
     return bounded(factor, grow)
 
 
@@ -158,9 +162,9 @@ def log_worth(ctx):
 @compiled
 def watch(ctx, factor):
     """Count the steps in a row that only the fixed-point iteration keeps from being much longer."""
-    room = ctx.error_aim - ctx.error_ahead
-    if ctx.allowed_defect < INFINITY:
-        room = min(room, ctx.defect_aim - ctx.defect_ahead)
+    room = room_for_longer(
+        ctx.error_ahead, ctx.error_aim, ctx.defect_ahead, ctx.defect_aim, ctx.allowed_defect < INFINITY
+    )
     worth = log_worth(ctx)
     held_back = factor < HELD_BACK
     if held_back and room <= worth and ctx.rows <= MOST_ROWS:
@@ -295,7 +299,7 @@ def accepts(ctx, outcome, iterations, implicit):
                 error = INFINITY
             ctx.border_ahead = NOTHING
             ctx.undone = 0
-    factor = longer(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
+    factor = aim(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
     unseen = outcome == DONE and ctx.blind and abs(h) > ctx.longest_blind
     if unseen:
         factor = ctx.longest_blind / abs(h)
@@ -307,8 +311,7 @@ def accepts(ctx, outcome, iterations, implicit):
         limit = ctx.length_limit * APPROACH
         ctx.length_limit = limit
         busy = ctx.busy_implicit if implicit else BUSY
-        factor = min(factor, max(busy / iterations, 0.5))
-        factor = min(factor, limit / abs(h))
+        factor = as_iterations_allow(factor, busy, iterations, abs(h), limit)
         if implicit and 1.0 < factor < STEADY:
             factor = 1.0
         elif implicit == 0 and ctx.strategy != FIXED_POINT:
