@@ -282,10 +282,12 @@ class Context(Memory):
     kinks = Integer()  # places where steps were rejected for that
     kink_end = Real()  # where the first such step at the last place would have ended
     doubt_end = Real()  # where the last step would have ended that failed or looked like one with a kink
-    # The field where steps meet, which no node sees; see `step.kinks`. Blocks of four rows: at the start of
-    # the step ahead, then at its end, as its polynomial says; the same of the step behind.
-    borders = Array(2, "padded")
-    borders_behind = Array(2, "padded")
+    # The field where steps meet, which no node sees; see `step.kinks`. At the end of the step ahead, as its
+    # polynomial says, eight partial sums a row; the same of the step behind.
+    borders = Array(8, "padded")
+    borders_behind = Array(8, "padded")
+    gaps = Array("rows")  # how far that is from what the polynomial of the step ahead says
+    apart = Integer()  # 1: for one of them that is more than for a smooth field
     lasts = Array("rows")  # the larger of the last two coefficients of a row,
     lasts_behind = Array("rows")  # and in the step behind
     border = Integer()  # what is known of the step behind: START, NOTHING, EXTRAPOLATED, SEEN

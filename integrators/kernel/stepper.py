@@ -338,15 +338,17 @@ class HBVMStepper(ABC):
             other parameters; the stepper stays where it is.
         """
         self._identity.check(checkpoint, Checkpoint)
-        if checkpoint.words.size != len(self._places):
+        arrays = [getattr(self._context, name) for name in self._kept]
+        sizes = len(self._places), [array.shape for array in arrays]
+        if (checkpoint.words.size, [array.shape for array in checkpoint.arrays]) != sizes:
             raise InputError(
                 "this checkpoint is of another version of hbvm-bench, whose steps depend on other numbers; "
                 "restore it with that version, or begin anew."
             )
         self._context.words[self._places] = checkpoint.words
         self._set_step(self._context.h)
-        for name, array in zip(self._kept, checkpoint.arrays, strict=True):
-            getattr(self._context, name)[:] = array
+        for array, kept in zip(arrays, checkpoint.arrays, strict=True):
+            array[:] = kept
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
         self._uncounted = self._context.steps - checkpoint.taken

@@ -13,10 +13,10 @@ from integrators.kernel.context import DIVERGED, DONE, EXTRAPOLATED, FIXED_POINT
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_steps
+from integrators.kernel.simd.memory import call_steps, put, splat8
 from integrators.kernel.step.begin import FARTHEST, INFINITY
 from integrators.kernel.step.control import SHORTEST, defect_power, error_power
-from integrators.kernel.step.kinks import arrived, at_end
+from integrators.kernel.step.kinks import arrived, end_behind
 from integrators.kernel.step.loop import reset
 from integrators.kernel.step.rule import FIRST_RATE, SMALLEST
 from integrators.kernel.step.vary import (
@@ -164,7 +164,8 @@ def catch_up(group, lane, ctx):
     for d in range(group.dim):
         ctx.state[place(ctx, d)] = group.state[group.lanes * d + lane]
     for d in range(group.rows):
-        ctx.borders_behind[at_end(d)] = group.ends[group.lanes * d + lane]
+        put(ctx.borders_behind, 8 * d, splat8(0.0))
+        ctx.borders_behind[8 * d] = group.ends[group.lanes * d + lane]
         ctx.lasts_behind[d] = group.lasts[group.lanes * d + lane]
     ctx.border = EXTRAPOLATED
 
@@ -208,7 +209,7 @@ def step(group, lane, ctx):
         group.state[group.lanes * d + lane] = group.next_state[group.lanes * d + lane]
         group.error[group.lanes * d + lane] = group.next_error[group.lanes * d + lane]
     for d in range(group.rows):
-        group.ends[group.lanes * d + lane] = ctx.borders_behind[at_end(d)]
+        group.ends[group.lanes * d + lane] = end_behind(ctx, d)
         group.lasts[group.lanes * d + lane] = ctx.lasts_behind[d]
     write(group, lane, ctx)
     if group.member[lane] >= 0 and (ctx.slow >= HELD_BACK_STEPS or vanishes(ctx) or crawls(group, lane, ctx)):

@@ -126,6 +126,8 @@ class Memory:
 
     def __init_subclass__(cls) -> None:
         own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
+        if twice := sorted(own.keys() & cls.slots.keys()):
+            raise TypeError(f"{cls.__name__} declares again what its base has: {', '.join(twice)}.")
         for place, slot in enumerate(own.values(), len(cls.slots)):
             slot.place = place
         cls.slots = {**cls.slots, **own}

@@ -17,6 +17,9 @@ SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is neg
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
 BESIDE_NOTHING = 1e3
+OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
+# Rows of the estimators: what the polynomial of the step says of the field at its ends.
+AT_START, AT_END = 10, 11
 ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
 
 
@@ -33,6 +36,62 @@ def coefficient(ctx, row, which):
     for chunk in range(chunks):
         result = fma(get(table, 8 * chunk), get(values, i + offset(ctx, chunk)), result)
     return result
+
+
+@compiled
+def take_coefficients(ctx):
+    """Set what is known of the field from its values in the solved step, row by row."""
+    found = ctx.estimates
+    for d in range(ctx.rows):
+        first = coefficient(ctx, d, 0), coefficient(ctx, d, 1), coefficient(ctx, d, 2), coefficient(ctx, d, 3)
+        last = coefficient(ctx, d, 4), coefficient(ctx, d, 5), coefficient(ctx, d, 6), coefficient(ctx, d, 7)
+        put(found, 8 * d, abs(sums(*first, *last)))
+
+
+@compiled
+def of_two(table, which, low, high):
+    """As `coefficient`, of two times eight values."""
+    return fma(get(table, 16 * which + 8), high, get(table, 16 * which) * low)
+
+
+@compiled
+def take_coefficients_of_two(ctx):
+    """As `take_coefficients`, for two times eight stages: the same sums, with each value loaded once."""
+    found, table, values = ctx.estimates, ctx.estimators, ctx.values
+    for d in range(ctx.rows):
+        x, y = get(values, 16 * d), get(values, 16 * d + 8)
+        first = of_two(table, 0, x, y), of_two(table, 1, x, y), of_two(table, 2, x, y), of_two(table, 3, x, y)
+        last = of_two(table, 4, x, y), of_two(table, 5, x, y), of_two(table, 6, x, y), of_two(table, 7, x, y)
+        put(found, 8 * d, abs(sums(*first, *last)))
+
+
+@compiled
+def is_gap(ctx, d):
+    """Whether the polynomials of two steps are farther apart where they meet than for a smooth field."""
+    return ctx.gaps[d] > OUTSIDE * (ctx.lasts[d] + ctx.lasts_behind[d])
+
+
+@compiled
+def compare_ends(ctx):
+    """Compare the field at the start of the solved step with that at the end of the step behind.
+
+    As their polynomials say. It is done last, since the length of the next step has not to wait for it.
+    """
+    found, borders, behind, gaps = ctx.estimates, ctx.borders, ctx.borders_behind, ctx.gaps
+    lasts, lasts_behind = ctx.lasts, ctx.lasts_behind
+    table, values, two = ctx.estimators, ctx.values, ctx.route == 16
+    apart = False
+    for d in range(ctx.rows):
+        if two:
+            x, y = get(values, 16 * d), get(values, 16 * d + 8)
+            start, end = of_two(table, AT_START, x, y), of_two(table, AT_END, x, y)
+        else:
+            start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
+        put(borders, 8 * d, end)
+        gaps[d] = far = abs(total(start - get(behind, 8 * d)))
+        lasts[d] = last = max(found[8 * d + 6], found[8 * d + 7])
+        apart |= far > OUTSIDE * (last + lasts_behind[d])
+    ctx.apart = 1 if apart else 0
 
 
 @compiled
@@ -107,12 +166,11 @@ def estimate(ctx):
     jump, they are about 1. No step is good enough then by the block's own size, and `Context.expected`, that
     which it will reach, takes its place until `Context.borrowed` is 0 again.
     """
-    rows, h = ctx.rows, abs(ctx.h)
-    found = ctx.estimates
-    for d in range(rows):
-        first = coefficient(ctx, d, 0), coefficient(ctx, d, 1), coefficient(ctx, d, 2), coefficient(ctx, d, 3)
-        last = coefficient(ctx, d, 4), coefficient(ctx, d, 5), coefficient(ctx, d, 6), coefficient(ctx, d, 7)
-        put(found, 8 * d, abs(sums(*first, *last)))
+    h = abs(ctx.h)
+    if ctx.route == 16:
+        take_coefficients_of_two(ctx)
+    else:
+        take_coefficients(ctx)
     doubtful = measure_blocks(ctx)
     if ctx.crossed:
         doubtful = True
@@ -128,13 +186,14 @@ def estimate(ctx):
     allowed, allowed_defect, negligible = ctx.allowed_error, ctx.allowed_defect, ctx.negligible
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
-    ctx.kinked = ctx.borrowed = 0
+    kinked = borrowed = 0
+    rescaled, slopes, absolute = ctx.rescaled, ctx.slope, ctx.absolute
     for b in range(ctx.block_count):
-        slope = max(ctx.slope[b], ctx.least_slope * steepest[group[b]])
+        slope = max(slopes[b], ctx.least_slope * steepest[group[b]])
         if slope > 0.0:
             own, size = own_size(ctx, b), block_size(ctx, b)
             missing, unseen, high = ctx.missing[b], ctx.unseen[b], ctx.abrupt[b]
-            if slope > ctx.slope[b] and high <= UNSEEN * steepest[group[b]]:
+            if slope > slopes[b] and high <= UNSEEN * steepest[group[b]]:
                 high = 0.0
             most, most_unseen = INFINITY, INFINITY
             if doubtful and high > 0.0:
@@ -142,20 +201,22 @@ def estimate(ctx):
                 if ctx.kinks > 0 and h * max(high, max(missing, unseen)) <= slight * size:
                     most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
                 elif h * high > negligible * size and not narrow:
-                    ctx.kinked = 1
+                    kinked = 1
             part = h / slope / size
             block_error = min(most, squared(h, missing, slope, size, part))
             error = max(error, block_error)
-            if ctx.absolute[b] > own:
-                size = max(own, ctx.expected[b]) if ctx.rescaled else own
+            if absolute[b] > own:
+                size = max(own, ctx.expected[b]) if rescaled else own
                 part = h / slope / size
             block_defect = min(most_unseen, squared(h, unseen, slope, size, part))
             defect = max(defect, block_defect)
-            if ctx.rescaled:
+            if rescaled:
                 times = size / own
                 fits = block_error * times <= allowed and block_defect * times <= allowed_defect
                 if not fits or (doubtful and h * high > negligible * own):
-                    ctx.borrowed = 1
+                    borrowed = 1
+    ctx.kinked, ctx.borrowed = kinked, borrowed
+    compare_ends(ctx)
     return error, defect
 
 

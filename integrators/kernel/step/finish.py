@@ -129,6 +129,12 @@ def commit(ctx):
     ctx.state, ctx.next_state = ctx.next_state, ctx.state
     ctx.error, ctx.next_error = ctx.next_error, ctx.error
     ctx.n += 1
+    count_step(ctx)
+
+
+@compiled
+def count_step(ctx):
+    """Keep the books of a step whose end is the state now."""
     ctx.steps += 1
     ctx.length = ctx.h
     ctx.solved = UNSOLVED

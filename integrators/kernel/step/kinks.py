@@ -2,12 +2,18 @@
 
 from integrators.kernel.context import EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START, UNSOLVED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_field, put, sums
+from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import CLOSE, RETREAT, SHRINK
-from integrators.kernel.step.estimate import NARROWEST, block_size, coefficient, estimate
-
-OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
+from integrators.kernel.step.estimate import (
+    AT_START,
+    NARROWEST,
+    OUTSIDE,
+    block_size,
+    coefficient,
+    estimate,
+    is_gap,
+)
 
 
 @compiled
@@ -19,20 +25,31 @@ def kink(ctx, ends):
     they do not agree, or there has been a kink, or a step may just have been rejected for one, the field
     is evaluated at both ends. `Context.undone` says whether the jump is in the step behind.
     """
-    t, h = ctx.t0, ctx.h
     ctx.border_ahead = NOTHING
     if ctx.kinked == 0:
         if ctx.line or not (ends and (ctx.doubt < INFINITY or ctx.crossed)):
             return False
-        extrapolate(ctx)
-        suspect = ctx.crossed or ctx.kinks > 0 or (t - ctx.doubt_end) * h < 0.0
-        if not (suspect or jumps(ctx)):
+        ctx.border_ahead = EXTRAPOLATED
+        suspect = ctx.crossed or ctx.kinks > 0 or (ctx.t0 - ctx.doubt_end) * ctx.h < 0.0
+        if not (suspect or ctx.apart):
             if ctx.border == EXTRAPOLATED:
                 ctx.border = SEEN
             return False
-        if not differs_at_an_end(ctx):
-            return ctx.undone == 1
-    count(ctx, t, h)
+        return jumps_at_an_end(ctx, suspect)
+    count(ctx, ctx.t0, ctx.h)
+    return True
+
+
+@compiled
+def jumps_at_an_end(ctx, suspect):
+    """Whether the field jumps where steps meet: by their polynomials or, if suspected, by its values."""
+    if not (suspect or jumps(ctx)):
+        if ctx.border == EXTRAPOLATED:
+            ctx.border = SEEN
+        return False
+    if not differs_at_an_end(ctx):
+        return ctx.undone == 1
+    count(ctx, ctx.t0, ctx.h)
     return True
 
 
@@ -82,44 +99,23 @@ def count(ctx, t, h):
 
 
 @compiled
-def extrapolate(ctx):
-    """Set the field at both ends of the solved step as its polynomial says."""
-    rows, found = ctx.rows, ctx.estimates
-    for d in range(0, rows, 4):
-        starts = coefficient(ctx, d, 10), coefficient(ctx, d + 1, 10), coefficient(ctx, d + 2, 10)
-        ends = coefficient(ctx, d, 11), coefficient(ctx, d + 1, 11), coefficient(ctx, d + 2, 11)
-        both = sums(*starts, coefficient(ctx, d + 3, 10), *ends, coefficient(ctx, d + 3, 11))
-        put(ctx.borders, 2 * d, both)
-    for d in range(rows):
-        ctx.lasts[d] = max(found[8 * d + 6], found[8 * d + 7])
-    ctx.border_ahead = EXTRAPOLATED
-
-
-@compiled
 def jumps(ctx):
     """Whether the step behind and the solved step do not agree about the field where they meet."""
     if ctx.border <= NOTHING:
         return False
-    lasts, before = ctx.lasts, ctx.lasts_behind
     # Unseen for no longer than the parts of both steps beyond their last and first node.
     least = ctx.negligible / (ctx.nodes[0] * (abs(ctx.h) + abs(ctx.length_behind)))
     for d in range(ctx.rows):
-        far = abs(ctx.borders[at_start(d)] - ctx.borders_behind[at_end(d)])
-        if far > OUTSIDE * (lasts[d] + before[d]) and far > least * block_size(ctx, ctx.block[d]):
+        far = ctx.gaps[d]
+        if is_gap(ctx, d) and far > least * block_size(ctx, ctx.block[d]):
             return True
     return False
 
 
 @compiled
-def at_start(d):
-    """Return where `Context.borders` has the start's value of row d."""
-    return 8 * (d // 4) + d % 4
-
-
-@compiled
-def at_end(d):
-    """Return where `Context.borders` has the end's value of row d."""
-    return at_start(d) + 4
+def end_behind(ctx, d):
+    """Return what the polynomial of the step behind says of row d of the field at its end."""
+    return total(get(ctx.borders_behind, 8 * d))
 
 
 @compiled
@@ -136,10 +132,10 @@ def differs_at_an_end(ctx):
     for lane in range(1, lanes):
         times[lane] = t + ctx.h
     for d in range(rows):
-        after = 8 * (d // 4) + 4 + d % 4 if second else d
-        stages[lanes * d] = ctx.row_state[d]
+        place = 8 * (d // 4) + 4 + d % 4 if second else d
+        stages[lanes * d] = ctx.state[place]
         for lane in range(1, lanes):
-            stages[lanes * d + lane] = ctx.next_state[after]
+            stages[lanes * d + lane] = ctx.next_state[place]
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.evaluations += 2
     begins = ctx.border == START
@@ -148,8 +144,8 @@ def differs_at_an_end(ctx):
     least = ctx.negligible / (h * ctx.nodes[0])
     undone = 0
     for d in range(rows):
-        before = 0.0 if begins else abs(values[lanes * d] - ctx.borders[at_start(d)])
-        after = 0.0 if breaks else abs(values[lanes * d + 1] - ctx.borders[at_end(d)])
+        before = 0.0 if begins else abs(values[lanes * d] - total(coefficient(ctx, d, AT_START)))
+        after = 0.0 if breaks else abs(values[lanes * d + 1] - total(get(ctx.borders, 8 * d)))
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
         smooth = 0.0 if ctx.crossed else OUTSIDE * ctx.lasts[d]
@@ -175,7 +171,7 @@ def finite(far):
 @compiled
 def misses(ctx, d, value):
     """Whether the polynomial of the step behind is far from the field's value at its end, in row d."""
-    far = finite(abs(value - ctx.borders_behind[at_end(d)]))
+    far = finite(abs(value - end_behind(ctx, d)))
     least = ctx.negligible / (abs(ctx.length_behind) * ctx.nodes[0])
     return far > OUTSIDE * ctx.lasts_behind[d] and far > least * block_size(ctx, ctx.block[d])
 
@@ -187,10 +183,8 @@ def keep_end_of_part(ctx, side):
     if ctx.line or ctx.implicit or not ctx.doubt < INFINITY:
         return
     estimate(side)
-    extrapolate(side)
-    for i in range(2 * ctx.padded):
-        ctx.borders_behind[i] = side.borders[i]
     for d in range(ctx.rows):
+        put(ctx.borders_behind, 8 * d, get(side.borders, 8 * d))
         ctx.lasts_behind[d] = side.lasts[d]
     ctx.border = SEEN
 

@@ -33,14 +33,17 @@ def repeat(ctx, target, budget):
 def approach(ctx, t, budget):
     """Take steps of varying length to the last one before t; return the outcome, and what is left to do."""
     while True:
-        if remaining(ctx, t) == 0.0:
+        rest, begin = remaining(ctx, t), ctx.t0
+        if rest == 0.0:
             if arrived(ctx):
                 return DONE, budget
             continue
         outcome = ready(ctx)
         if outcome != DONE:
             return outcome, budget
-        rest, h = abs(remaining(ctx, t)), abs(ctx.h)
+        if ctx.t0 != begin:  # the step behind was undone
+            rest = remaining(ctx, t)
+        rest, h = abs(rest), abs(ctx.h)
         inside = rest < h - CLOSE * abs(t)
         if (ctx.look or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
             continue

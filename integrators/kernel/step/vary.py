@@ -39,7 +39,7 @@ from integrators.kernel.step.control import (
     room_for_longer,
 )
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
-from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import crosses, keep_end, kink, undo
@@ -65,6 +65,7 @@ HOPE = log2(0.7)  # where the last change was nothing, the contraction may be th
 HELD_BACK_STEPS = 8
 HELD_BACK = 1.2
 GAIN, GAIN_LIGHT, GAIN_PER_ROW, MOST_ROWS = 3.0, 6.0, 0.1, 64
+LEAST_WORTH = log(GAIN)  # `log_worth` is larger; no logarithm is taken where this tells enough
 MOST_HELD_BACK_STEPS = 4096  # twice as many each time that it has gained nothing
 # A step that is too long may fail, or look like one with a kink; so many in a row have one, and are cut to
 # find it.
@@ -165,11 +166,14 @@ def watch(ctx, factor):
     room = room_for_longer(
         ctx.error_ahead, ctx.error_aim, ctx.defect_ahead, ctx.defect_aim, ctx.allowed_defect < INFINITY
     )
-    worth = log_worth(ctx)
-    held_back = factor < HELD_BACK
-    if held_back and room <= worth and ctx.rows <= MOST_ROWS:
-        room = log(ctx.error_decay) - log_decay(ctx)
-    ctx.slow = ctx.slow + 1 if held_back and room > worth else 0
+    slow = 0
+    if factor < HELD_BACK:
+        much = room > LEAST_WORTH and room > log_worth(ctx)
+        if not much and ctx.rows <= MOST_ROWS:
+            decay = log_decay(ctx)
+            much = decay < 0.0 and log(ctx.error_decay) - decay > log_worth(ctx)
+        slow = ctx.slow + 1 if much else 0
+    ctx.slow = slow
 
 
 @compiled
@@ -234,12 +238,11 @@ def ready(ctx):
     while True:
         h = within(ctx, ctx.next_length)
         too_short = not abs(h) > SHORTEST * abs(ctx.t0)
-        futile = too_short or ctx.attempts >= FUTILE
-        futile |= ctx.attempts > 0 and abs(h) < FUTILE_PART * ctx.interval
-        futile |= ctx.attempts > 1 and ctx.longest < INFINITY and crawls(ctx, h)
-        if futile and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
-            ctx.length = 0.0
-            return UNSCALED
+        if (too_short or ctx.attempts > 0) and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
+            futile = too_short or ctx.attempts >= FUTILE or abs(h) < FUTILE_PART * ctx.interval
+            if futile or (ctx.attempts > 1 and ctx.longest < INFINITY and crawls(ctx, h)):
+                ctx.length = 0.0
+                return UNSCALED
         if too_short:
             return failure
         before = ctx.iterations
@@ -342,9 +345,9 @@ def take(ctx):
     """Take the step ahead, which is solved."""
     t, low = two_sum(ctx.t0, ctx.h)
     keep_end(ctx)
-    commit(ctx)
-    ctx.next_state, ctx.behind_state = ctx.behind_state, ctx.next_state
-    ctx.next_error, ctx.behind_error = ctx.behind_error, ctx.next_error
+    ctx.behind_state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, ctx.behind_state
+    ctx.behind_error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, ctx.behind_error
+    count_step(ctx)
     ctx.n = ctx.restful = 0
     if ctx.asks < 0:
         ctx.asks = ctx.asks + 1 if ctx.asks < -1 else 1
