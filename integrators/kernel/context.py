@@ -51,6 +51,11 @@ KINKS_KEPT = 64
 # which are compared with those of the next; that they are right, SEEN. At a START it may jump.
 START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
 
+# Legendre coefficients of the field that a step is judged by: gamma_0 .. gamma_3, that before and that of
+# `Context.error_degree`, the last two that k nodes see, two from the middle. Then the field at a step's ends.
+GAMMA_0, GAMMA_1, GAMMA_2, GAMMA_3, BEFORE_ERROR, AT_ERROR, BEFORE_LAST, LAST = range(8)
+MIDDLE, AFTER_MIDDLE, AT_START, AT_END = range(8, 12)
+
 STAGE = ("calls", "padded", "lanes")  # shape of stage memory
 
 
@@ -232,14 +237,12 @@ class Context(Memory):
     allowed_error = Real()  # the estimated local error of a step, relative, at most
     allowed_defect = Real()  # the same of the quadrature; infinite: any
     error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
-    # b_l P_j(c_l) for ten j: 0 .. 3, the two up to `error_degree`, the last two, two from the middle; then
-    # what extrapolates to the start and to the end of the step.
-    estimators = Array()
-    estimates = Array(8, "rows")  # the first eight of these coefficients of the field, row by row
-    extent = Array("block_count")  # of blocks: their size in the step that is estimated,
-    slope = Array("block_count")  # their largest coefficient,
-    missing = Array("block_count")  # that of the error,
-    unseen = Array("block_count")  # that of the defect,
+    estimators = Array()  # b_l P_j(c_l), a row for each of GAMMA_0 .. AT_END
+    estimates = Array(8, "rows")  # the coefficients GAMMA_0 .. LAST of the field, row by row
+    scale = Array("block_count")  # of blocks: their size in the step that is estimated,
+    slope = Array("block_count")  # the largest coefficient of their field,
+    gamma_error = Array("block_count")  # gamma_s, which the error is estimated by,
+    gamma_last = Array("block_count")  # gamma_{k-1}, which the defect is estimated by,
     abrupt = Array("block_count")  # and the largest that does not fall off as a smooth field's do
     steepest = Array("block_count")  # slope in each group
     absolute = Array("block_count")  # the absolute tolerance of blocks, divided by the relative one

@@ -181,7 +181,7 @@ class AdaptiveStepper(HBVMStepper):
         ctx = self._context
         ahead = math.copysign(1.0, ctx.next_length)
         expected = self._expected(ahead) if self._given is None else self._given
-        if not (expected > LARGER * ctx.extent).any():
+        if not (expected > LARGER * ctx.scale).any():
             ctx.expected[:] = 0.0
             self._in_vain *= 2
             ctx.asks = -self._in_vain
@@ -203,7 +203,7 @@ class AdaptiveStepper(HBVMStepper):
             self._charge(scout)
         sizes = known[:, 1:].max(axis=0, initial=0.0)
         expected = self._of_blocks(sizes)
-        if (expected > LARGER * self._context.extent).any():
+        if (expected > LARGER * self._context.scale).any():
             growth = self._growth(known[-1, 0], sizes, expected)
             expected *= min(1.0, max(1.0, NOISE / self._program.tol) / growth)
         return expected

@@ -8,14 +8,26 @@ looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemb
 
 from typing import Any
 
+from integrators.kernel.context import (
+    AT_END,
+    AT_ERROR,
+    AT_START,
+    BEFORE_ERROR,
+    BEFORE_LAST,
+    GAMMA_0,
+    GAMMA_1,
+    GAMMA_2,
+    GAMMA_3,
+    LAST,
+)
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.simd.emit import DOUBLE, splat
-from integrators.kernel.simd.values import Value
-from integrators.kernel.step.rule import NOTHING, SMALLEST
+from integrators.kernel.simd.operations import greatest, where
+from integrators.kernel.simd.values import Condition, Value
+from integrators.kernel.step.rule import SMALLEST
 
 INFINITY = float("inf")
-COEFFICIENTS = 8  # that a step is judged by; see `Context.estimators`
-BORDERS = range(10, 12)  # rows there that extrapolate to the start and to the end of the step
+MEASURED = "size", "moved", "strict", "floored"  # rooms that the iteration does not need any more
 
 
 class Control:
@@ -50,20 +62,23 @@ class Control:
         return found
 
     def judge(self) -> None:
-        """Set `error`, `defect`, whether blocks are `certain` and `visible`: see `estimate` and `watch`."""
-        from integrators.kernel.step.estimate import ALIKE, UNSEEN
+        """Set `error`, `defect`, where blocks are `certain` and `visible`; see `estimate`."""
+        from integrators.kernel.step import estimate as rules  # imports numba, which compiling needs anyhow
+        from integrators.kernel.step.kinks import gap_allowed
 
         w, b = self.w, self.w.b
         error, defect = (w.variable(w.kind, w.zero.value) for _ in range(2))
         none = w.zero.compare("!=", 0.0)
-        doubtful, visible, changes = (w.variable(w.bits, none) for _ in range(3))
-        unseen_for = (self.h + self.row("length_behind").absolute()) * self.number("outermost")
+        doubtful, visible, changing = (w.variable(w.bits, none) for _ in range(3))
+        most_apart = gap_allowed(
+            self.number("negligible"), self.number("outermost"), self.h, self.row("length_behind").absolute()
+        )
 
         def raise_to(variable: Any, value: Value) -> None:
-            b.store(Value(b, b.load(variable)).larger(value).value, variable)
+            b.store(greatest(value, Value(b, b.load(variable))).value, variable)
 
-        def note(variable: Any, condition: Any) -> None:
-            b.store(b.or_(b.load(variable), condition), variable)
+        def note(variable: Any, condition: Condition) -> None:
+            b.store(b.or_(b.load(variable), condition.value), variable)
 
         for first, blocks, width in w.form.groups:
             largest, steepest = (w.variable(w.kind, w.zero.value) for _ in range(2))
@@ -72,75 +87,74 @@ class Control:
 
             def measure(block: Any, first: int = first, width: int = width, tops: Any = tops) -> None:
                 start = w.at(block, width, first)
-                extent = slope = missing = unseen = gap = w.zero
+                scale = slope = gamma_error = gamma_last = gap = w.zero
                 for i in range(width):
                     d = w.at(start, 1, i)
-                    f = self.coefficients(d)
-                    low = f[1].larger(f[2]).larger(f[3])
-                    high = f[6].larger(f[7])
-                    note(doubtful, high.compare(">", self.number("doubt") * low))
-                    note(changes, low.larger(high).compare(">", f[0] * ALIKE))
-                    own = f[0].larger(low)
-                    changing = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
-                    extent, slope = extent.larger(changing + self.h * own), slope.larger(own)
-                    missing = missing.larger(f[5].larger(self.number("error_decay") * f[4]))
-                    unseen = unseen.larger(f[7].larger(self.number("defect_decay") * f[6]))
-                    gap = gap.larger(self.gap(d, f[6].larger(f[7])))
+                    found = self.coefficients(d)
+                    low = rules.lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
+                    high = greatest(found[BEFORE_LAST], found[LAST])
+                    note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
+                    note(changing, rules.changes(low, high, found[GAMMA_0]))
+                    own = greatest(found[GAMMA_0], low)
+                    moved = w.get(w.state, w.at(1, w.form.rows, d) if w.form.second else d).absolute()
+                    scale, slope = greatest(scale, moved + self.h * own), greatest(slope, own)
+                    here = rules.next_coefficient(
+                        found[AT_ERROR], found[BEFORE_ERROR], self.number("error_decay")
+                    )
+                    last = rules.next_coefficient(
+                        found[LAST], found[BEFORE_LAST], self.number("defect_decay")
+                    )
+                    gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
+                    gap = greatest(gap, self.gap(d, high))
                 w.put(gap, w.array(Group.slots["gaps"]), start)
-                rows = w.size, w.moved, w.strict, w.floored
-                for value, room in zip((extent, slope, missing, unseen), rows, strict=True):
-                    w.put(value, room, start)
-                raise_to(tops[0], extent)
+                for name, value in zip(MEASURED, (scale, slope, gamma_error, gamma_last), strict=True):
+                    w.put(value, getattr(w, name), start)
+                raise_to(tops[0], scale)
                 raise_to(tops[1], slope)
 
             w.each(blocks, measure)
             top, steep = Value(b, b.load(largest)), Value(b, b.load(steepest))
-            note(doubtful, top.compare("<", SMALLEST))
+            note(doubtful, top < SMALLEST)
 
             def compare(block: Any, first: int = first, width: int = width, tops: Any = (top, steep)) -> None:
                 start = w.at(block, width, first)
-                size = w.get(w.size, start).larger(tops[0] * NOTHING)
-                slope = w.get(w.moved, start).larger(self.number("least_slope") * tops[1])
-                missing, unseen = w.get(w.strict, start), w.get(w.floored, start)
-                inverse, moves = w.one / size, slope.compare(">", 0.0)
-                part = self.h / slope
-                for value, worst in ((missing, error), (unseen, defect)):
-                    raise_to(worst, ((value * inverse) * (value * part)).where(moves, 0.0))
-                note(visible, (self.h * missing).compare(">", size * UNSEEN))
-                jump = w.get(w.array(Group.slots["gaps"]), start) * unseen_for
-                note(doubtful, jump.compare(">", size * self.number("negligible")))
+                scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
+                scale = rules.size_in_step(scale, tops[0])
+                slope = rules.slope_beside(slope, tops[1], self.number("least_slope"))
+                for gamma, worst in ((gamma_error, error), (gamma_last, defect)):
+                    raise_to(worst, where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0))
+                note(visible, rules.is_visible(self.h, gamma_error, scale))
+                note(doubtful, w.get(w.array(Group.slots["gaps"]), start) > most_apart * scale)
 
             w.each(blocks, compare)
         self.error, self.defect = (Value(b, b.load(worst)) for worst in (error, defect))
-        self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changes))
+        self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changing))
         self.visible = b.load(visible)
 
-    def coefficients(self, d: Any, which: range = range(COEFFICIENTS)) -> list[Value]:
-        """Return the sizes of the Legendre coefficients of row d of the field by which steps are judged.
+    def coefficients(self, d: Any) -> list[Value]:
+        """Return the sizes of the field's coefficients `GAMMA_0` .. `LAST` in row d."""
+        return [self.coefficient(d, which).absolute() for which in range(LAST + 1)]
 
-        Or its values at `BORDERS`.
-        """
+    def coefficient(self, d: Any, which: int) -> Value:
+        """Return what an estimator makes of the values of row d."""
         w, k = self.w, self.w.form.k
-        table, found = w.table(Group.slots["estimators"]), []
-        for j in which:
-            total = w.zero
-            for i in range(k):
-                value = w.get(w.values, w.at(i, w.form.rows, d))
-                total = w.number(table, -(-k // 8) * 8 * j + i).fma(value, total)
-            found.append(total.absolute() if j < COEFFICIENTS else total)
-        return found
+        table, total = w.table(Group.slots["estimators"]), w.zero
+        for i in range(k):
+            value = w.get(w.values, w.at(i, w.form.rows, d))
+            total = w.number(table, -(-k // 8) * 8 * which + i).fma(value, total)
+        return total
 
     def gap(self, d: Any, last: Value) -> Value:
         """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
-        from integrators.kernel.step.kinks import OUTSIDE
+        from integrators.kernel.step.estimate import is_gap
 
         w, slots = self.w, Group.slots
-        start, end = self.coefficients(d, BORDERS)
+        start, end = self.coefficient(d, AT_START), self.coefficient(d, AT_END)
         w.put(end, w.array(slots["ends_ahead"]), d)
         w.put(last, w.array(slots["lasts_ahead"]), d)
-        apart = (start - w.get(w.array(slots["ends"]), d)).absolute()
-        most = (last + w.get(w.array(slots["lasts"]), d)) * OUTSIDE
-        return apart.where(apart.compare(">", most), 0.0)
+        behind, last_behind = (w.get(w.array(slots[name]), d) for name in ("ends", "lasts"))
+        apart = (start - behind).absolute()
+        return where(is_gap(apart, last, last_behind), apart, 0.0)
 
     def aim(self) -> None:
         """Set the `factor` of the next step's length to this one's; see `integrators.kernel.step.control`."""
@@ -181,7 +195,7 @@ class Control:
 
     def take(self) -> None:
         """Take the step, and aim at the next one, in the lanes where that is all."""
-        from integrators.kernel.step.control import SHORTEST  # imports numba, which compiling needs anyhow
+        from integrators.kernel.step.control import SHORTEST, is_good
 
         w, b = self.w, self.w.b
         slots = Group.slots
@@ -189,8 +203,9 @@ class Control:
         good = self.all(
             b.load(w.alive),
             self.certain,
-            self.error.compare("<=", self.number("allowed_error")),
-            self.defect.compare("<=", self.number("allowed_defect")),
+            is_good(
+                self.error, self.number("allowed_error"), self.defect, self.number("allowed_defect")
+            ).value,
         )
         self.aim()
         length = w.h * self.factor

@@ -47,6 +47,12 @@ def log_factor(aim, estimate, behind, change):
 
 
 @for_both_widths
+def is_good(error, allowed, defect, allowed_defect):
+    """Whether a step is good enough by its estimated errors."""
+    return (error <= allowed) & (defect <= allowed_defect)
+
+
+@for_both_widths
 def error_power(degree):
     """Return one over the order of the error that is estimated by the coefficient of a degree."""
     return 1.0 / (2.0 * degree + 1.0)

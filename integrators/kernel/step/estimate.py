@@ -2,9 +2,24 @@
 
 from math import log
 
-from integrators.kernel.native.jit import compiled
+from integrators.kernel.context import (
+    AFTER_MIDDLE,
+    AT_END,
+    AT_ERROR,
+    AT_START,
+    BEFORE_ERROR,
+    BEFORE_LAST,
+    GAMMA_0,
+    GAMMA_1,
+    GAMMA_2,
+    GAMMA_3,
+    LAST,
+    MIDDLE,
+)
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, splat8, sums, total
+from integrators.kernel.simd.operations import greatest, least, size, where
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
 from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, SMALLEST
@@ -12,14 +27,11 @@ from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 
 UNSEEN = 1e-13  # part of a block that rounding accounts for in a step that the fixed-point iteration solves
-SQUARABLE = 1e150  # the square of a larger number, or of one below its inverse, has no double
 SLIGHT = 1e-3  # part of the error allowed that a kink counts as where it is negligible
 NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any more
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
 BESIDE_NOTHING = 1e3
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
-# Rows of the estimators: what the polynomial of the step says of the field at its ends.
-AT_START, AT_END = 10, 11
 ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
 
 
@@ -41,11 +53,20 @@ def coefficient(ctx, row, which):
 @compiled
 def take_coefficients(ctx):
     """Set what is known of the field from its values in the solved step, row by row."""
-    found = ctx.estimates
     for d in range(ctx.rows):
-        first = coefficient(ctx, d, 0), coefficient(ctx, d, 1), coefficient(ctx, d, 2), coefficient(ctx, d, 3)
-        last = coefficient(ctx, d, 4), coefficient(ctx, d, 5), coefficient(ctx, d, 6), coefficient(ctx, d, 7)
-        put(found, 8 * d, abs(sums(*first, *last)))
+        low = (
+            coefficient(ctx, d, GAMMA_0),
+            coefficient(ctx, d, GAMMA_1),
+            coefficient(ctx, d, GAMMA_2),
+            coefficient(ctx, d, GAMMA_3),
+        )
+        high = (
+            coefficient(ctx, d, BEFORE_ERROR),
+            coefficient(ctx, d, AT_ERROR),
+            coefficient(ctx, d, BEFORE_LAST),
+            coefficient(ctx, d, LAST),
+        )
+        put(ctx.estimates, 8 * d, abs(sums(*low, *high)))
 
 
 @compiled
@@ -60,15 +81,32 @@ def take_coefficients_of_two(ctx):
     found, table, values = ctx.estimates, ctx.estimators, ctx.values
     for d in range(ctx.rows):
         x, y = get(values, 16 * d), get(values, 16 * d + 8)
-        first = of_two(table, 0, x, y), of_two(table, 1, x, y), of_two(table, 2, x, y), of_two(table, 3, x, y)
-        last = of_two(table, 4, x, y), of_two(table, 5, x, y), of_two(table, 6, x, y), of_two(table, 7, x, y)
-        put(found, 8 * d, abs(sums(*first, *last)))
+        low = (
+            of_two(table, GAMMA_0, x, y),
+            of_two(table, GAMMA_1, x, y),
+            of_two(table, GAMMA_2, x, y),
+            of_two(table, GAMMA_3, x, y),
+        )
+        high = (
+            of_two(table, BEFORE_ERROR, x, y),
+            of_two(table, AT_ERROR, x, y),
+            of_two(table, BEFORE_LAST, x, y),
+            of_two(table, LAST, x, y),
+        )
+        put(found, 8 * d, abs(sums(*low, *high)))
 
 
-@compiled
-def is_gap(ctx, d):
-    """Whether the polynomials of two steps are farther apart where they meet than for a smooth field."""
-    return ctx.gaps[d] > OUTSIDE * (ctx.lasts[d] + ctx.lasts_behind[d])
+@for_both_widths
+def is_gap(apart, last, last_behind):
+    """Whether the polynomials of two steps are farther apart where they meet than for a smooth field.
+
+    Parameters
+    ----------
+    apart : float
+    last, last_behind : float
+        The last coefficients of the steps.
+    """
+    return apart > OUTSIDE * (last + last_behind)
 
 
 @compiled
@@ -89,29 +127,86 @@ def compare_ends(ctx):
             start, end = coefficient(ctx, d, AT_START), coefficient(ctx, d, AT_END)
         put(borders, 8 * d, end)
         gaps[d] = far = abs(total(start - get(behind, 8 * d)))
-        lasts[d] = last = max(found[8 * d + 6], found[8 * d + 7])
-        apart |= far > OUTSIDE * (last + lasts_behind[d])
+        lasts[d] = last = greatest(found[8 * d + BEFORE_LAST], found[8 * d + LAST])
+        apart |= is_gap(far, last, lasts_behind[d])
     ctx.apart = 1 if apart else 0
 
 
 @compiled
 def stays(ctx, d, last):
     """Whether the last coefficient of a row is as large, beside those from the middle, as at a kink."""
-    middle = max(abs(total(coefficient(ctx, d, 8))), abs(total(coefficient(ctx, d, 9))))
+    middle = greatest(
+        size(total(coefficient(ctx, d, MIDDLE))), size(total(coefficient(ctx, d, AFTER_MIDDLE)))
+    )
     return last > ctx.slowest_decay * middle
+
+
+@for_both_widths
+def lowest(gamma_1, gamma_2, gamma_3):
+    """Return the largest of the coefficients of a row that a step resolves first, but for its mean."""
+    return greatest(greatest(gamma_1, gamma_2), gamma_3)
+
+
+@for_both_widths
+def is_doubtful(low, high, doubt):
+    """Whether the last coefficients of a row do not fall off well enough beside the low ones."""
+    return high > doubt * low
+
+
+@for_both_widths
+def changes(low, high, gamma_0):
+    """Whether a row of the field has not the same value at all nodes."""
+    return greatest(low, high) > ALIKE * gamma_0
+
+
+@for_both_widths
+def next_coefficient(here, before, decay):
+    """Return a coefficient, or what the one before, of the other parity, tells of it where that is more."""
+    return greatest(here, decay * before)
+
+
+@for_both_widths
+def slope_beside(slope, steepest, part):
+    """Return what the field of a block counts as, at least a part of the steepest in its group."""
+    return greatest(slope, part * steepest)
+
+
+@for_both_widths
+def size_in_step(scale, largest):
+    """Return the size of a block in the step that is estimated, unless that is next to nothing.
+
+    Parameters
+    ----------
+    scale, largest : float
+        Of the block, and the largest in its group.
+    """
+    return greatest(greatest(scale, NOTHING * largest), SMALLEST)
+
+
+@for_both_widths
+def local_error(h, gamma, slope, scale):
+    """Return ``h gamma^2 / (slope scale)``, the error of a coefficient that is left out; see `estimate`."""
+    error = (gamma * (1.0 / scale)) * (gamma * (h / slope))
+    return where(error >= 0.0, error, INFINITY)  # of infinite coefficients, a NaN
+
+
+@for_both_widths
+def is_visible(h, gamma, scale):
+    """Whether a coefficient is more than rounding accounts for."""
+    return h * gamma > UNSEEN * scale
 
 
 @compiled
 def note_what_stays(ctx):
     """Note for each block the largest last coefficient that is as large as at a kink; 0: none."""
-    found, abrupt = ctx.estimates, ctx.abrupt
+    abrupt = ctx.abrupt
     for d in range(ctx.rows):
-        i = 8 * d
-        low = max(max(found[i + 1], found[i + 2]), found[i + 3])
-        high = max(found[i + 6], found[i + 7])
-        if high > ctx.doubt * low and stays(ctx, d, found[i + 7]):
+        found = ctx.estimates + 8 * d
+        low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
+        high = greatest(found[BEFORE_LAST], found[LAST])
+        if is_doubtful(low, high, ctx.doubt) and stays(ctx, d, found[LAST]):
             b = ctx.block[d]
-            abrupt[b] = max(abrupt[b], high)
+            abrupt[b] = greatest(abrupt[b], high)
 
 
 @compiled
@@ -124,7 +219,7 @@ def momentum(ctx, d):
 @compiled
 def own_size(ctx, b):
     """Return the size of a block in the step that is estimated, unless that is next to nothing."""
-    return max(max(ctx.extent[b], NOTHING * ctx.largest[ctx.group[b]]), SMALLEST)
+    return size_in_step(ctx.scale[b], ctx.largest[ctx.group[b]])
 
 
 @compiled
@@ -132,14 +227,6 @@ def block_size(ctx, b):
     """Return the size that a block's errors are relative to: its own, or one that is known from elsewhere."""
     size = max(own_size(ctx, b), ctx.absolute[b])
     return max(size, ctx.expected[b]) if ctx.rescaled else size
-
-
-@compiled
-def squared(h, missing, slope, size, part):
-    """Return h missing^2 / (slope size); ``part`` is h / slope / size."""
-    if missing < SQUARABLE and missing * SQUARABLE > 1.0:
-        return part * missing**2
-    return h * (missing / size) * (missing / slope)
 
 
 @compiled
@@ -175,43 +262,37 @@ def estimate(ctx):
     if ctx.crossed:
         doubtful = True
         for b in range(ctx.block_count):
-            ctx.abrupt[b] = max(ctx.missing[b], ctx.unseen[b])
+            ctx.abrupt[b] = greatest(ctx.gamma_error[b], ctx.gamma_last[b])
     elif doubtful:
         note_what_stays(ctx)
-    group, largest, steepest = ctx.group, ctx.largest, ctx.steepest
-    for b in range(ctx.block_count):
-        g = group[b]
-        largest[g] = max(largest[g], ctx.extent[b])
-        steepest[g] = max(steepest[g], ctx.slope[b])
+    group, steepest = ctx.group, ctx.steepest
     allowed, allowed_defect, negligible = ctx.allowed_error, ctx.allowed_defect, ctx.negligible
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
     kinked = borrowed = 0
     rescaled, slopes, absolute = ctx.rescaled, ctx.slope, ctx.absolute
     for b in range(ctx.block_count):
-        slope = max(slopes[b], ctx.least_slope * steepest[group[b]])
+        slope = slope_beside(slopes[b], steepest[group[b]], ctx.least_slope)
         if slope > 0.0:
-            own, size = own_size(ctx, b), block_size(ctx, b)
-            missing, unseen, high = ctx.missing[b], ctx.unseen[b], ctx.abrupt[b]
+            own, scale = own_size(ctx, b), block_size(ctx, b)
+            gamma_error, gamma_last, high = ctx.gamma_error[b], ctx.gamma_last[b], ctx.abrupt[b]
             if slope > slopes[b] and high <= UNSEEN * steepest[group[b]]:
                 high = 0.0
-            most, most_unseen = INFINITY, INFINITY
+            most, most_defect = INFINITY, INFINITY
             if doubtful and high > 0.0:
                 slight = BESIDE_NOTHING * negligible if narrow else negligible
-                if ctx.kinks > 0 and h * max(high, max(missing, unseen)) <= slight * size:
-                    most, most_unseen = SLIGHT * allowed, SLIGHT * allowed_defect
-                elif h * high > negligible * size and not narrow:
+                if ctx.kinks > 0 and h * max(high, max(gamma_error, gamma_last)) <= slight * scale:
+                    most, most_defect = SLIGHT * allowed, SLIGHT * allowed_defect
+                elif h * high > negligible * scale and not narrow:
                     kinked = 1
-            part = h / slope / size
-            block_error = min(most, squared(h, missing, slope, size, part))
-            error = max(error, block_error)
+            block_error = least(most, local_error(h, gamma_error, slope, scale))
+            error = greatest(error, block_error)
             if absolute[b] > own:
-                size = max(own, ctx.expected[b]) if rescaled else own
-                part = h / slope / size
-            block_defect = min(most_unseen, squared(h, unseen, slope, size, part))
-            defect = max(defect, block_defect)
+                scale = max(own, ctx.expected[b]) if rescaled else own
+            block_defect = least(most_defect, local_error(h, gamma_last, slope, scale))
+            defect = greatest(defect, block_defect)
             if rescaled:
-                times = size / own
+                times = scale / own
                 fits = block_error * times <= allowed and block_defect * times <= allowed_defect
                 if not fits or (doubtful and h * high > negligible * own):
                     borrowed = 1
@@ -222,27 +303,34 @@ def estimate(ctx):
 
 @compiled
 def measure_blocks(ctx):
-    """Set the blocks' extents and coefficients; return whether one does not fall off well enough."""
-    h, found, doubt = abs(ctx.h), ctx.estimates, ctx.doubt
+    """Set the blocks' scales and coefficients; return whether one does not fall off well enough."""
+    h, doubt = abs(ctx.h), ctx.doubt
     error_decay, defect_decay = ctx.error_decay, ctx.defect_decay
-    extent, slopes, missed, unseen = ctx.extent, ctx.slope, ctx.missing, ctx.unseen
+    scale, slopes, gamma_error, gamma_last = ctx.scale, ctx.slope, ctx.gamma_error, ctx.gamma_last
+    group, top, steepest = ctx.group, ctx.largest, ctx.steepest
     for b in range(ctx.block_count):
-        extent[b] = slopes[b] = missed[b] = unseen[b] = ctx.abrupt[b] = 0.0
+        scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.abrupt[b] = 0.0
     for g in range(ctx.group_count):
-        ctx.largest[g] = ctx.steepest[g] = 0.0
-    doubtful, changes = False, False
+        top[g] = steepest[g] = 0.0
+    doubtful, changing = False, False
     for d in range(ctx.rows):
-        b, i = ctx.block[d], 8 * d
-        low = max(max(found[i + 1], found[i + 2]), found[i + 3])
-        slope = max(found[i], low)
-        high = max(found[i + 6], found[i + 7])
-        doubtful |= high > doubt * low
-        changes |= max(low, high) > ALIKE * found[i]
-        extent[b] = max(extent[b], abs(momentum(ctx, d)) + h * slope)
-        slopes[b] = max(slopes[b], slope)
-        missed[b] = max(missed[b], max(found[i + 5], error_decay * found[i + 4]))
-        unseen[b] = max(unseen[b], max(found[i + 7], defect_decay * found[i + 6]))
-    ctx.blind = 0 if changes else 1
+        b, found = ctx.block[d], ctx.estimates + 8 * d
+        low = lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
+        high = greatest(found[BEFORE_LAST], found[LAST])
+        slope = greatest(found[GAMMA_0], low)
+        doubtful |= is_doubtful(low, high, doubt)
+        changing |= changes(low, high, found[GAMMA_0])
+        scale[b] = greatest(scale[b], size(momentum(ctx, d)) + h * slope)
+        slopes[b] = greatest(slopes[b], slope)
+        error = next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], error_decay)
+        defect = next_coefficient(found[LAST], found[BEFORE_LAST], defect_decay)
+        gamma_error[b] = greatest(gamma_error[b], error)
+        gamma_last[b] = greatest(gamma_last[b], defect)
+    for b in range(ctx.block_count):
+        g = group[b]
+        top[g] = greatest(top[g], scale[b])
+        steepest[g] = greatest(steepest[g], slopes[b])
+    ctx.blind = 0 if changing else 1
     return doubtful
 
 
@@ -256,17 +344,17 @@ def log_decay(ctx):
     steps = min(3, ctx.error_degree - 1)
     if steps < 1:
         return 0.0
-    h, found = abs(ctx.h), ctx.estimates
+    h = abs(ctx.h)
     slowest = -INFINITY
     for b in range(ctx.block_count):
-        if h * ctx.missing[b] > UNSEEN * block_size(ctx, b):
+        if is_visible(h, ctx.gamma_error[b], block_size(ctx, b)):
             return 0.0
     for d in range(ctx.rows):
-        b, i = ctx.block[d], 8 * d
-        last = found[i + 3]
+        b, found = ctx.block[d], ctx.estimates + 8 * d
+        last = found[GAMMA_3]
         if steps == 3:
-            last = max(last, ctx.error_decay * found[i + 2])
-        if h * last > UNSEEN * block_size(ctx, b):
+            last = next_coefficient(last, found[GAMMA_2], ctx.error_decay)
+        if is_visible(h, last, block_size(ctx, b)):
             slowest = max(slowest, log(last / ctx.slope[b]) / steps)
     return max(slowest, log(TINY))
 

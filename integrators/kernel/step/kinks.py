@@ -1,12 +1,11 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
-from integrators.kernel.context import EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START, UNSOLVED
-from integrators.kernel.native.jit import compiled
+from integrators.kernel.context import AT_START, EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START, UNSOLVED
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
 from integrators.kernel.step.control import CLOSE, RETREAT, SHRINK
 from integrators.kernel.step.estimate import (
-    AT_START,
     NARROWEST,
     OUTSIDE,
     block_size,
@@ -98,16 +97,26 @@ def count(ctx, t, h):
         place[1] = h
 
 
+@for_both_widths
+def gap_allowed(negligible, outermost, h, length_behind):
+    """Return how far the polynomials of two steps may be apart where they meet, beside the size of a block.
+
+    The field is not seen for no longer than the parts of both steps beyond their last and first node,
+    ``outermost`` of each.
+    """
+    return negligible / (outermost * (h + length_behind))
+
+
 @compiled
 def jumps(ctx):
     """Whether the step behind and the solved step do not agree about the field where they meet."""
     if ctx.border <= NOTHING:
         return False
-    # Unseen for no longer than the parts of both steps beyond their last and first node.
-    least = ctx.negligible / (ctx.nodes[0] * (abs(ctx.h) + abs(ctx.length_behind)))
+    most = gap_allowed(ctx.negligible, ctx.nodes[0], abs(ctx.h), abs(ctx.length_behind))
     for d in range(ctx.rows):
         far = ctx.gaps[d]
-        if is_gap(ctx, d) and far > least * block_size(ctx, ctx.block[d]):
+        apart = is_gap(far, ctx.lasts[d], ctx.lasts_behind[d])
+        if apart and far > most * block_size(ctx, ctx.block[d]):
             return True
     return False
 

@@ -20,7 +20,7 @@ from integrators.kernel.context import (
 )
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import two_sum
-from integrators.kernel.simd.operations import binary_log
+from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
     APPROACH,
@@ -34,6 +34,7 @@ from integrators.kernel.step.control import (
     bounded,
     defect_power,
     error_power,
+    is_good,
     log_of_order,
     log_ratio,
     room_for_longer,
@@ -283,47 +284,77 @@ def accepts(ctx, outcome, iterations, implicit):
     If it is, `Context.length_after` is the length of the step after it; else `Context.next_length` is that
     of the next attempt.
     """
-    t, h = ctx.t0, ctx.h
-    allowed, allowed_defect = ctx.allowed_error, ctx.allowed_defect
-    error, defect = INFINITY, INFINITY
-    ctx.undone = 0
-    if outcome == DONE:
-        ctx.crossed = 1 if crosses(ctx) else 0
-        error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
-        fits = error <= allowed and defect <= allowed_defect
-        if implicit == 0:
-            if ctx.kinked:
-                ctx.doubts += 1
-                ctx.doubt_end = t + h
-            if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
-                error = INFINITY
-        else:
-            if ctx.crossed and (ctx.kinked or fits) and kink(ctx, fits):
-                error = INFINITY
-            ctx.border_ahead = NOTHING
-            ctx.undone = 0
+    error, defect = estimate_attempt(ctx, outcome, implicit)
     factor = aim(ctx, error, defect, GROW if ctx.attempts == 0 else 1.0)
-    unseen = outcome == DONE and ctx.blind and abs(h) > ctx.longest_blind
-    if unseen:
-        factor = ctx.longest_blind / abs(h)
-    elif error <= allowed and defect <= allowed_defect:
-        if ctx.rescaled:
-            ctx.rescaled = SCALE_LASTS if ctx.borrowed else ctx.rescaled - 1
-        if ctx.doubts >= SURE and ctx.kinks:
-            ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
-        limit = ctx.length_limit * APPROACH
-        ctx.length_limit = limit
-        busy = ctx.busy_implicit if implicit else BUSY
-        factor = as_iterations_allow(factor, busy, iterations, abs(h), limit)
-        if implicit and 1.0 < factor < STEADY:
-            factor = 1.0
-        elif implicit == 0 and ctx.strategy != FIXED_POINT:
-            watch(ctx, factor)
-        length = h * (factor if implicit else on_table(ctx, factor))
-        if ctx.blind and abs(length) > ctx.longest_blind:
-            length = ctx.longest_blind if h > 0.0 else -ctx.longest_blind
-        ctx.length_after = length
-        return True
+    if outcome == DONE and ctx.blind and abs(ctx.h) > ctx.longest_blind:
+        reject(ctx, outcome, ctx.longest_blind / abs(ctx.h), implicit)
+        return False
+    if not is_good(error, ctx.allowed_error, defect, ctx.allowed_defect):
+        reject(ctx, outcome, factor, implicit)
+        return False
+    follow(ctx, factor, iterations, implicit)
+    return True
+
+
+@compiled
+def estimate_attempt(ctx, outcome, implicit):
+    """Return the estimated errors of the attempted step; infinite: it failed, or has a kink that matters."""
+    ctx.undone = 0
+    if outcome != DONE:
+        return INFINITY, INFINITY
+    ctx.crossed = 1 if crosses(ctx) else 0
+    error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
+    fits = is_good(error, ctx.allowed_error, defect, ctx.allowed_defect)
+    if implicit:
+        if ctx.crossed and (ctx.kinked or fits) and kink(ctx, fits):
+            error = INFINITY
+        ctx.border_ahead = NOTHING
+        ctx.undone = 0
+        return error, defect
+    if ctx.kinked:
+        ctx.doubts += 1
+        ctx.doubt_end = ctx.t0 + ctx.h
+    if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
+        error = INFINITY
+    return error, defect
+
+
+@compiled
+def follow(ctx, factor, iterations, implicit):
+    """Set the length of the step after the attempted one, which is good enough.
+
+    Parameters
+    ----------
+    ctx : Context
+    factor : float
+        That length relative to this one's, as the errors allow.
+    iterations : int
+        Of this step.
+    implicit : int
+        Whether the implicit solver made it.
+    """
+    h = ctx.h
+    if ctx.rescaled:
+        ctx.rescaled = SCALE_LASTS if ctx.borrowed else ctx.rescaled - 1
+    if ctx.doubts >= SURE and ctx.kinks:
+        ctx.length_limit = INFINITY  # what the iteration allowed was for the kink
+    ctx.length_limit = ctx.length_limit * APPROACH
+    busy = ctx.busy_implicit if implicit else BUSY
+    factor = as_iterations_allow(factor, busy, iterations, abs(h), ctx.length_limit)
+    if implicit and 1.0 < factor < STEADY:
+        factor = 1.0
+    elif implicit == 0 and ctx.strategy != FIXED_POINT:
+        watch(ctx, factor)
+    length = h * (factor if implicit else on_table(ctx, factor))
+    if ctx.blind and abs(length) > ctx.longest_blind:
+        length = ctx.longest_blind if h > 0.0 else -ctx.longest_blind
+    ctx.length_after = length
+
+
+@compiled
+def reject(ctx, outcome, factor, implicit):
+    """Set the length of the next attempt, this one's times a factor at most."""
+    h = ctx.h
     if implicit:
         ctx.implicit_steps -= 1
     if outcome == DONE:
@@ -334,10 +365,9 @@ def accepts(ctx, outcome, iterations, implicit):
         ctx.length_limit = RETREAT * abs(h)
         if outcome in (DIVERGED, SCATTERED):
             factor = RETREAT
-    ctx.next_length = h * min(factor, SAFETY)
+    ctx.next_length = h * least(factor, SAFETY)
     ctx.rejections += 1
     ctx.attempts += 1
-    return False
 
 
 @compiled
