@@ -29,6 +29,8 @@ PER_STEP = 10.0
 Measured there with ``HBVM(k=8, s=7, tol=1e-12)``: at most 0.1.
 """
 
+LOOKED_AT = 2000  # states of a solution, or of all of an ensemble, at which conserved quantities are compared
+
 TINY = 1e-280
 """Size of a start below which the digits that a step adds have no normal double.
 
@@ -70,11 +72,15 @@ def warnings(problem: Problem, caveat: str | None, extra: Mapping[str, Any]) -> 
     )
 
 
+Losses = dict[str, tuple[float, float, float]]
+"""By the name of what is conserved: the first time at which it had changed, by how much, and its size."""
+
+
 def lost_invariants(
-    system: System, conserved: Mapping[str, float], start: tuple[float, Array], end: tuple[float, Array],
+    system: System, conserved: Mapping[str, float], starts: Array, times: Array, states: Array,
     par: Array, steps: NDArray[np.int64],
-) -> list[tuple[str, ...]]:  # fmt: skip
-    """Return, for each of n trajectories, the sentences on what should be as at its start and is not.
+) -> list[Losses]:  # fmt: skip
+    """Return, for each of n trajectories, what should be as at its start and is not.
 
     Parameters
     ----------
@@ -82,43 +88,58 @@ def lost_invariants(
         What was integrated.
     conserved : mapping of str to float
         What the method conserves, see `integrators.protocol.MethodBase.conserved`.
-    start, end : tuple of float and ndarray (n, dim)
-        Time and states; NaN for a trajectory that did not arrive.
+    starts : ndarray, shape (n, dim)
+        Where they began.
+    times, states : ndarray, shapes (m,) and (n, m, dim)
+        Where they came; NaN where a trajectory did not arrive. The last state, and some before it: two
+        thousand in all.
     par : ndarray, shape (n, n_par)
         Parameters.
     steps : ndarray of int, shape (n,)
         Steps taken.
     """
-    said: list[tuple[str, ...]] = [()] * len(par)
-    for name, per_step in conserved.items():
+    found: list[Losses] = [{} for _ in par]
+    promised = [name for name in conserved if not any(r.flags & T for r in system.invariants[name].roots)]
+    if not promised or not times.size:
+        return found
+    every = -(-times.size // max(1, LOOKED_AT // len(par)))
+    times, states = times[::-1][::every][::-1], states[:, ::-1][:, ::every][:, ::-1]
+    owner = np.repeat(np.arange(len(par)), times.size)
+    before, after = starts[owner].T, states.reshape(owner.size, -1).T
+
+    def values(function: Function, columns: Array, which: Any) -> list[DD]:
+        return evaluate(function, 0.0, *map(np.ascontiguousarray, (columns, par[owner[which]].T)))
+
+    for name in promised:
         invariant = system.invariants[name]
-        if any(node.flags & T for node in invariant.roots):
-            continue
-
-        def values(function: Function, at: tuple[float, Array], which: Any = slice(None)) -> list[DD]:
-            columns = np.ascontiguousarray(at[1][which].T)
-            return evaluate(function, at[0], columns, np.ascontiguousarray(par[which].T))
-
         with np.errstate(all="ignore"):
-            first, last = (values(invariant, at) for at in (start, end))
+            first = [DD(x.hi[owner], x.lo[owner]) for x in evaluate(invariant, 0.0, starts.T, par.T)]
+            last = values(invariant, after, slice(None))
             change = np.linalg.norm([(b - a).rounded() for a, b in zip(first, last, strict=True)], axis=0)
             size = np.linalg.norm([a.rounded() for a in first], axis=0)
-            limit = np.maximum(LOST, PER_STEP * per_step * steps)
+            limit = np.maximum(LOST, PER_STEP * conserved[name] * steps)[owner]
             lost = np.flatnonzero((change > limit * size) & np.isfinite(change))
             if lost.size and name == "energy":
                 # Terms that cancel are rounded at their own size.
-                for at in (start, end):
-                    slopes = values(system.gradient(invariant), at, lost)
-                    terms = np.abs([slope.rounded() for slope in slopes] * at[1][lost].T).sum(axis=0)
+                for columns in (before[:, lost], after[:, lost]):
+                    slopes = values(system.gradient(invariant), columns, lost)
+                    terms = np.abs([slope.rounded() for slope in slopes] * columns).sum(axis=0)
                     size[lost] = np.fmax(size[lost], terms)
                 lost = lost[change[lost] > limit[lost] * size[lost]]
-        for i in lost:
-            said[i] += (
-                f"{name} has changed by {change[i]:.1e} (its size is {size[i]:.1e}), though the method "
-                "conserves it: the field may have a pulse or a bump that is narrower than the steps; "
-                "give breakpoints or max_step.",
-            )
-    return said
+        for i in lost[::-1]:
+            loss = float(times[i % times.size]), float(change[i]), float(size[i])
+            found[owner[i]][name] = loss
+    return found
+
+
+def of_losses(losses: Losses) -> tuple[str, ...]:
+    """Return the sentences on what has changed though the method conserves it."""
+    return tuple(
+        f"{name} has changed by {change:.1e} (its size is {size:.1e}; first seen at t = {t!r}), though "
+        "the method conserves it: the field may have a pulse or a bump that is narrower than the steps; "
+        "give breakpoints or max_step."
+        for name, (t, change, size) in losses.items()
+    )
 
 
 def unseen(problem: Problem, why: str | None) -> str | None:

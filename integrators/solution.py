@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from integrators.caveats import lost_invariants, warnings
+from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, warnings
 from integrators.plain import (
     doubles,
     packed,
@@ -33,7 +33,6 @@ from problems.problem import Problem
 FORMAT = 1  # of files
 ROUNDING = 1e-14  # relative to its largest size, how far a component may be from a sample that is met
 FAR, MOST_AT_ONCE = 4, 1024  # intervals between samples: not gone through for nothing, and at a time
-LOOKED_AT = 2000  # states of which the errors are printed, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,11 +220,14 @@ class Solution:
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
         conserved = {} if extra.get("sample") == "dense" else self.method.conserved(problem.system)
-        if not self.t.size or not conserved:
-            return said
-        start, end = (problem.t0, problem.y0[None]), (float(self.t[-1]), self.y[-1:])
-        steps = np.array([self.stats.steps])
-        return said + lost_invariants(problem.system, conserved, start, end, problem.par[None], steps)[0]
+        lost = lost_invariants(
+            problem.system, conserved, problem.y0[None], self.t, self.y[None], problem.par[None],
+            np.array([self.stats.steps]),
+        )[0]  # fmt: skip
+        for name, loss in extra.get("losses", {}).items():  # what was seen at checkpoints
+            if name not in lost or abs(loss[0] - problem.t0) < abs(lost[name][0] - problem.t0):
+                lost[name] = loss
+        return said + of_losses(lost)
 
     def invariants(self) -> dict[str, Array]:
         """Return the problem's invariants along the trajectory, by name."""
@@ -440,6 +442,9 @@ def _stats(stored: Any) -> Stats:
     for t, h in stats.extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
         _of(float, t)
         _of(float, h)
+    for t, change, size in _of(dict, stats.extra.get("lost", {})).values():
+        for number in (t, change, size):
+            _of(float, number)
     _of(str, stats.extra.get("checkpoint", ""))
     _of(int, stats.extra.get("implicit", {"steps": 0})["steps"])
     return stats

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
+from integrators.caveats import Losses, lost_invariants
 from integrators.events.event import Event, named
 from integrators.events.finder import Ending, Finder, started_with_events
 from integrators.protocol import (
@@ -20,6 +21,7 @@ from integrators.protocol import (
     KeptError,
     MethodBase,
     Program,
+    Samples,
     Samplings,
     Status,
     UserError,
@@ -145,11 +147,13 @@ def integrate(
     if grid.size and offers(stepper, Destination):
         stepper.destination = end
     t, y, made = [grid[:0]], [np.empty((0, problem.system.dim))], 0
+    lost: Losses = {}
     here, status, reason, before = problem.t0, Status.FINISHED, "", None
     if kept is not None:
         stepper.restore(kept["stepper"])
         t, y, made = [kept["t"]], [kept["y"]], kept["made"]
         here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
+        lost = kept.get("losses", lost)
         if wanted:
             stepper.search.load(kept["search"])
 
@@ -169,11 +173,13 @@ def integrate(
                 made += count if sample == "steps" else samples.t.size
             if watch is not None:
                 stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
+                if watch.due and samples.t.size and sample != "dense":
+                    lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
                     t, y = [np.concatenate(t)], [np.concatenate(y)]
                     watch.keep(
                         {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": made, "here": here}
-                        | {"status": status, "reason": reason, "stats": stats}
+                        | {"status": status, "reason": reason, "stats": stats, "losses": lost}
                         | ({"search": stepper.search.save()} if wanted else {})
                     )
                 watch.look(here, stats.steps)
@@ -192,6 +198,8 @@ def integrate(
         stats.extra = {**stats.extra, "field": problem.system.written}
     if watch is not None and watch.failure:
         stats.extra = {**stats.extra, "checkpoint": watch.failure}
+    if lost:
+        stats.extra = {**stats.extra, "losses": lost}
     if sample == "dense":  # the polynomials conserve nothing
         stats.extra = {**stats.extra, "sample": sample}
     reached = np.concatenate(t)
@@ -209,6 +217,14 @@ def integrate(
         error=error,
     )
     return _with_events(solution, stepper.search) if wanted else solution
+
+
+def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) -> Losses:
+    """Return what the method conserves and has lost at the last of some states."""
+    return lost_invariants(
+        problem.system, method.conserved(problem.system), problem.y0[None], samples.t[-1:],
+        samples.y[None, -1:], problem.par[None], np.array([steps]),
+    )[0]  # fmt: skip
 
 
 def _compiled(method: MethodBase, system: System) -> tuple[Program, float | None]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators import registry
-from integrators.caveats import lost_invariants, warnings
+from integrators.caveats import lost_invariants, of_losses, warnings
 from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
 from integrators.events.members import follow
@@ -89,9 +89,11 @@ class Solutions(Trajectories):
         """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
-        start, end = (problem.t0, self.starts), (float(self.t[-1]), self.y[:, -1])
-        lost = lost_invariants(problem.system, conserved, start, end, self.par, self.steps)
-        return [warnings(problem, caveat, self.extra.get(i, {})) + said for i, said in enumerate(lost)]
+        lost = lost_invariants(problem.system, conserved, self.starts, self.t, self.y, self.par, self.steps)
+        return [
+            warnings(problem, caveat, self.extra.get(i, {})) + of_losses(losses)
+            for i, losses in enumerate(lost)
+        ]
 
     @property
     def arrived(self) -> Any:

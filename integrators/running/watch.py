@@ -97,10 +97,15 @@ class Watch:
         """Whether there is a file to write."""
         return self._path is not None
 
+    @property
+    def due(self) -> bool:
+        """Whether it is time to write the file."""
+        return self.keeps and perf_counter() - self._written >= self._every
+
     def keep(self, kept: dict[str, Any]) -> None:
         """Take note of what the continuation depends on, and write the file if it is time."""
         self._kept = kept
-        if perf_counter() - self._written >= self._every:
+        if self.due:
             self.write()
 
     def look(self, t: float, steps: int) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from integrators import HBVM, Gauss, LineIntegral, integrate, integrate_many
+from integrators import HBVM, Gauss, LineIntegral, integrate, integrate_many, load
 from problems import Hamiltonian, Problem, VectorField
 
 from .fault import sentence
@@ -13,6 +13,9 @@ BUMP = Hamiltonian(
     lambda q, p, m: p[0] ** 2 / 2 + q[0] ** 2 / 2 - 0.2 * m.exp(-((q[0] - 1.3) ** 2) * 4e10), dof=1
 )
 """An oscillator that crosses a narrow well: a force no node sees."""
+
+LEDGE = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + q[0] ** 2 / 2 + 0.2 * m.tanh(1e6 * (q[0] - 1.0)), dof=1)
+"""An oscillator with a step in its potential: what is lost on the way up comes back on the way down."""
 
 VALLEY = Hamiltonian(lambda q, p, m: p[0] ** 2 / 2 + m.abs(q[0]), dof=1)
 
@@ -48,7 +51,8 @@ def test_no_false_alarm_on_the_catalogue(method):
         if method.accepts(problem) is not None:
             continue
         end = problem.t0 + min(problem.t_end - problem.t0, 70.0)
-        assert integrate(problem, method, [end]).warnings == (), name
+        times = np.linspace(problem.t0, end, 200)
+        assert integrate(problem, method, times).warnings == (), name
 
 
 def test_an_energy_that_nearly_cancels_is_measured_by_its_terms():
@@ -59,6 +63,30 @@ def test_an_energy_that_nearly_cancels_is_measured_by_its_terms():
     )  # fmt: skip
     solution = integrate(problem, HBVM(), [50.0])
     assert solution.warnings == ()
+
+
+@pytest.mark.parametrize("times", [[1.5, 2.9], [0.1, 1.5, 2.9, 3.0]], ids=str)
+def test_an_energy_that_comes_back_is_told_with_the_time_at_which_it_was_gone(times):
+    # No warning before: at the end the energy is as at the start.
+    problem = Problem(LEDGE, q0=[0.0], p0=[2.0], t_end=3.0)
+    solution = integrate(problem, HBVM(), times)
+    assert solution.errors()["energy"][-1] < 1e-10  # measured 2e-16
+    (warning,) = solution.warnings
+    sentence(warning, r"energy has changed by 4.0e-01 \(.*; first seen at t = 1.5\)")
+    made = integrate_many(problem, HBVM(), starts=[[0.0, 2.0], [0.0, 0.9]], times=times)
+    assert made.warnings == [(warning,), ()]
+
+
+def test_an_energy_that_comes_back_is_seen_at_a_checkpoint(tmp_path):
+    problem, kept = Problem(LEDGE, q0=[0.0], p0=[2.0], t_end=2.9), tmp_path / "kept"
+    options = {"checkpoint": kept, "every_seconds": 0.0}
+    solution = integrate(problem, HBVM(), [2.9], **options)
+    (warning,) = solution.warnings
+    sentence(warning, r"energy has changed by 4.0e-01 \(.*; first seen at t = (0.[5-9]|[12].)")
+    assert integrate(problem, HBVM(), [2.9]).warnings == ()  # seen by nobody without it
+    assert integrate(problem, HBVM(), [2.9], resume=kept).warnings == (warning,)
+    solution.save(tmp_path / "solution.npz")
+    assert load(tmp_path / "solution.npz").warnings == (warning,)
 
 
 def test_dense_samples_conserve_nothing_and_are_not_judged():
