@@ -35,7 +35,6 @@ SEPARATE = {
         "about": ("advise", "engines", "inspect"),
         "doctor": ("doctor", "warm"),
         "paper": ("paper",),
-        "plugins": ("plugins",),
         "reports": ("gallery", "report"),
         "run": ("run",),
         "stores": ("compare", "export", "merge"),

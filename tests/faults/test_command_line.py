@@ -206,14 +206,6 @@ merge a b --out c                                          | the directory 'a' d
 merge . . --out c                                          | merge needs two runs or more, as in: hbvm-bench
 merge nowhere --out c                                      | merge needs two runs or more, as in: hbvm-bench
 merge /dev/null /dev/null --out c                          | merge needs two runs or more, as in: hbvm-bench
-plugins                                                    | Missing argument 'host'
-plugins nosuch                                             | unknown host 'nosuch'; known: diffrax, rebound,
-plugins scipy --rounds 0                                   | plugins needs rounds >= 1 and a finite span >
-plugins scipy --rounds a                                   | Invalid value for '--rounds': Input should be a
-plugins leak --span -1                                     | plugins needs rounds >= 1 and a finite span >
-plugins leak --span nan                                    | plugins needs rounds >= 1 and a finite span >
-plugins leak --span a                                      | Invalid value for '--span': Input should be a
-plugins leak --span inf                                    | plugins needs rounds >= 1 and a finite span >
 report                                                     | give at least one run, as in runs/sitnikov, or
 report nowhere                                             | the directory 'nowhere' does not exist; make
 report .                                                   | the directory '.' has no results; make some

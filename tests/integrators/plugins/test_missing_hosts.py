@@ -14,7 +14,7 @@ class Blocker:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
 sys.meta_path.insert(0, Blocker())
-import integrators, problems, integrators.plugins, hbvm_bench.studies.plugins.costs
+import integrators, problems, integrators.plugins
 import integrators.plugins.scipy
 assert integrators.integrate(problems.load("kepler"), integrators.HBVM(k=4, s=2, h=0.1)).status == "finished"
 try:

@@ -1,10 +1,12 @@
-"""What our methods cost inside other libraries: a plugin, the native kernel and the host's own, in turn.
+"""The tables of the plugins' pages: ``python docs/plugins/costs.py scipy | diffrax | rebound | leak``.
 
-This is no campaign: a row is a call of another library's solver, with our method in it, and not a method
-that the bench runs. Every row is compiled and run once before it is timed; then all rows run one after
-the other, several rounds of it, so that what else the machine does meets them all.
+What our methods cost inside other libraries: a plugin, the native kernel and the host's own, in turn. A row
+is a call of another library's solver with our method in it, and not a method that the bench runs, so that it
+is no campaign. Every row is compiled and run once before it is timed; then all rows run one after the other,
+several rounds of it, so that what else the machine does meets them all.
 """
 
+import argparse
 import gc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,11 +19,12 @@ from numpy.typing import NDArray
 
 import integrators
 import problems
-from hbvm_bench.measure.measured import position_error
+from hbvm_bench.measure import machine
+from hbvm_bench.measure.measured import POSITION, position_error
 from hbvm_bench.measure.timing import interleaved
+from hbvm_bench.report.markdown import printed
 from hbvm_bench.summaries.table import Table
 from problems.catalogue.pendulum import exact_state
-from problems.errors import unknown
 from problems.problem import Problem
 
 Array = NDArray[np.float64]
@@ -58,10 +61,8 @@ def measure(host: str, rounds: int) -> list[Cost]:
     Raises
     ------
     problems.errors.InputError
-        If it is none of these, or is not installed.
+        If it is not installed.
     """
-    if host not in HOSTS:
-        raise unknown("host", host, HOSTS)
     problem, reference, rows = HOSTS[host]()
     first = [run() for _, run in rows]
 
@@ -298,3 +299,24 @@ def leak(span: float, parts: int = 10) -> Iterator[tuple[float, dict[str, float]
             (i + 1) * span / parts,
             {name: float(problem.errors(y[None])["energy"][0]) for name, y in states.items()},
         )
+
+
+def main() -> None:
+    """Print what a page shows."""
+    parser = argparse.ArgumentParser(description="The tables of the plugins' pages.")
+    parser.add_argument("host", choices=[*HOSTS, "leak"])
+    parser.add_argument("--rounds", type=int, default=5, help="how often each row is timed")
+    parser.add_argument("--span", type=float, default=1e5, help="time units of the leak")
+    asked = parser.parse_args()
+    if asked.host == "leak":
+        print("| t | DOP853 | HBVM |\n|--:|--:|--:|")
+        for t, errors in leak(asked.span):
+            print(f"| {t:.0f} | {errors['DOP853']:.2e} | {errors['HBVM']:.2e} |", flush=True)
+        return
+    print(printed(table(measure(asked.host, asked.rounds))))
+    print(f"\n{POSITION} Here those are its start and its end.")
+    print(f"\n{machine.sentence(machine.describe(measure=True))}")
+
+
+if __name__ == "__main__":
+    main()

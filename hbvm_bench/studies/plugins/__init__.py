@@ -1,1 +1,0 @@
-"""What our methods cost inside other libraries."""
