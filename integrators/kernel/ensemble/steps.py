@@ -4,7 +4,6 @@ Every number of a step is a vector, with one trajectory in each lane, so that th
 no sum over lanes. Stages come one after another; each uses the values that the field has had at the stages
 before it in the same sweep (Gauss and Seidel). The arithmetic is that of `integrators.kernel.step`:
 nodes, weights and the state are sums of two doubles, and what is at the size of the state is added last.
-But a step's increment is rounded here, which `integrators.kernel.step.finish` does without.
 
 A trajectory whose iteration has ended keeps its values while the others iterate on: what happens
 in a lane depends on nothing in the others.
@@ -464,6 +463,8 @@ class Steps(Writer):
 
     def finish(self) -> None:
         """Set the state at the end, as a sum of two doubles; the displacement is formed first."""
+        from integrators.kernel.step.finish import added, moved_by  # imports numba
+
         b, form = self.b, self.form
         alive = self.variable(self.bits, b.load(self.alive))
         ends = [(self.state, self.state), (self.error, self.error)]
@@ -471,35 +472,35 @@ class Steps(Writer):
             ahead = [self.array(Group.slots[name]) for name in ("next_state", "next_error")]
             ends = [(ahead[0], self.state), (ahead[1], self.error)]
 
-        def mean(d: Index, high: Any, low: Any) -> Value:
-            total = None
+        def half(d: Index, high: Any, low: Any, nodes: range) -> Value:
+            total = self.zero
             for table in (low, high):
-                for j in range(form.k):
-                    weight, value = self.number(table, j), self.get(self.values, self.at(j, form.rows, d))
-                    total = weight * value if total is None else weight.fma(value, total)
-            assert total is not None
+                for j in nodes:
+                    total = self.number(table, j).fma(self.get(self.values, self.at(j, form.rows, d)), total)
             return total
 
-        def add(d: Index, before: Value, small: Value) -> None:
-            new, lost = before.two_sum(small)
+        def mean(d: Index, high: Any, low: Any) -> tuple[Value, Value]:
+            middle = form.k // 2
+            return half(d, high, low, range(middle)).two_sum(half(d, high, low, range(middle, form.k)))
+
+        def keep(d: Index, new: Value, lost: Value) -> None:
             good = b.and_(b.load(alive), (new - new).compare("==", 0.0))
             b.store(good, self.alive)
             for value, base, now in ((new, *ends[0]), (lost, *ends[1])):
                 self.put(value.where(good, self.get(now, d)), base, d)
 
         def row(d: Index) -> None:
-            impulse = self.h * mean(d, self.weights, self.weights_low)
-            error = self.get(self.error, d)
+            state, error = self.get(self.state, d), self.get(self.error, d)
+            force = mean(d, self.weights, self.weights_low)
             if not form.second:
-                add(d, self.get(self.state, d), impulse + error)
+                keep(d, *added(state, error, self.h, *force))
                 return
             kh = self.h * self.get(self.velocity, d)
-            u, u_low = self.drift(d, kh)
-            moved, lost = self.get(self.state, d).two_sum(u)
-            kick = kh * (self.h * mean(d, self.position_weights, self.position_weights_low))
+            drift = self.drift(d, kh)
             momentum = self.at(1, form.rows, d)
             p, p_error = self.get(self.state, momentum), self.get(self.error, momentum)
-            add(d, moved, (kick + (u_low + error)) + lost)
-            add(momentum, p, impulse + p_error)
+            kick = mean(d, self.position_weights, self.position_weights_low)
+            keep(d, *moved_by(state, error, *drift, self.h, kh, *kick))
+            keep(momentum, *added(p, p_error, self.h, *force))
 
         self.each_row(row)

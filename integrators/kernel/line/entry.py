@@ -8,6 +8,7 @@ from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.finish import added
 from integrators.kernel.step.stages import place
 
 context = view(LineContext)
@@ -69,9 +70,6 @@ def end(ctx):
         if several:
             mean, lost = two_sum(mean, -correction(ctx, d))
             low += lost
-        term = h * mean
-        whole, lost = two_sum(state[d], term)
-        small = lost + (fma(h, mean, -term) + h * low + error[d])
-        ctx.next_state[d], ctx.next_error[d] = two_sum(whole, small)
+        ctx.next_state[d], ctx.next_error[d] = added(state[d], error[d], h, mean, low)
         damage += ctx.next_state[d] * 0.0
     return DONE if damage == 0.0 else NOT_FINITE

@@ -22,6 +22,7 @@ from numba.extending import models, register_model
 
 from integrators.kernel.simd import operations
 from integrators.kernel.simd.emit import DOUBLE, INTEGER, llvm_call, splat, vector
+from integrators.kernel.simd.operations import fma, two_sum
 
 # What numba makes of a decorated function has another signature than the function.
 intrinsic = cast(Any, extending.intrinsic)
@@ -126,11 +127,6 @@ for _function, _name in (
 # --- explicit operations --------------------------------------------------------------------------
 
 
-def fma(x: Any, y: Any, z: Any) -> Any:
-    """Return ``x * y + z`` rounded once; numba code only."""
-    raise NotImplementedError("fma exists in compiled code only.")
-
-
 @infer_global(fma)
 class _Fma(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
@@ -151,14 +147,16 @@ def added(builder: Any, x: Any, y: Any) -> tuple[Any, Any]:
     return s, builder.fadd(builder.fsub(x, builder.fsub(s, part)), builder.fsub(y, part))
 
 
-@intrinsic
-def two_sum(typing, a, b):
-    """Return s, e with s = fl(a + b) and s + e = a + b, of numbers or lanes (Knuth)."""
+@infer_global(two_sum)
+class _TwoSum(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        kinds = arguments_for(args)
+        return signature(types.UniTuple(kinds[0], 2), *kinds)
 
-    def generate(context, builder, sig, args):
-        return context.make_tuple(builder, sig.return_type, added(builder, *args))
 
-    return signature(types.UniTuple(a, 2), a, a), generate
+@lower_builtin(two_sum, types.VarArg(types.Any))
+def _two_sum(context, builder, sig, args):
+    return context.make_tuple(builder, sig.return_type, added(builder, *args))
 
 
 # --- operations of `integrators.kernel.simd.operations`, on numbers ----------------------------------

@@ -37,3 +37,13 @@ def size(x: Any) -> Any:
 def binary_log(x: Any) -> Any:
     """Return log2(x) of a number x > 0, too small by up to 0.09: its bits read as an integer."""
     return x.bits() * 2.0**-52 - 1023.0
+
+
+def fma(x: Any, y: Any, z: Any) -> Any:
+    """Return ``x * y + z`` rounded once."""
+    return x.fma(y, z)
+
+
+def two_sum(x: Any, y: Any) -> Any:
+    """Return s, e with s = fl(x + y) and s + e = x + y (Knuth)."""
+    return x.two_sum(y)

@@ -7,9 +7,9 @@ the errors of all sums and products makes the walk a fifth smaller, and steps of
 """
 
 from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINITE, UNSOLVED
-from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_rests, swap, total
+from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.stages import offset
 
 
@@ -55,11 +55,38 @@ def means(ctx, d):
     )  # fmt: skip
 
 
-@compiled
+@for_both_widths
 def times(factor, x, rest):
     """Return a factor times x + rest, as a number and a rest."""
     product = factor * x
     return product, fma(factor, rest, fma(factor, x, -product))
+
+
+@for_both_widths
+def added(state, error, h, mean, rest):
+    """Return the state after an increment of h times a mean + rest, and what it lacks.
+
+    Parameters
+    ----------
+    state, error : float
+        A component before the step, and what it lacks.
+    """
+    increment, rest = times(h, mean, rest)
+    moved, lost = two_sum(state, increment)
+    return two_sum(moved, error + (rest + lost))
+
+
+@for_both_widths
+def moved_by(state, error, drift, drift_low, h, factor, mean, rest):
+    """As `added`, of what also drifts, by drift + drift_low, and whose increment has another factor.
+
+    Positions are moved like that in the second-order form, with the factor h q' / p.
+    """
+    drifted, left = two_sum(state, drift)
+    increment, rest = times(h, mean, rest)
+    increment, rest = times(factor, increment, rest)
+    moved, lost = two_sum(drifted, increment)
+    return two_sum(moved, ((drift_low + error) + left) + (rest + lost))
 
 
 @compiled
@@ -102,21 +129,15 @@ def finish(ctx):
             z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
             drift = kh * z
             drift_low = fma(kh, e, fma(kh, z, -drift))
-            moved, lost = two_sum(z, swap(drift))
             force, rest = impulses(ctx, 4 * i)
-            force, rest = times(splat8(h), force, rest)
-            force, rest = times(get(kick, 8 * i), force, rest)
-            moved, more = two_sum(moved, force)
-            new, lost = two_sum(moved, ((swap(drift_low) + e) + lost) + (rest + more))
+            new, lost = moved_by(z, e, swap(drift), swap(drift_low), splat8(h), get(kick, 8 * i), force, rest)
             put(next_state, 8 * i, new)
             put(next_error, 8 * i, lost)
             damage += new * 0.0
     else:
         for i in range((rows + 7) // 8):
             mean, rest = means(ctx, 8 * i)
-            mean, rest = times(splat8(h), mean, rest)
-            moved, more = two_sum(get(state, 8 * i), mean)
-            new, lost = two_sum(moved, get(error, 8 * i) + (rest + more))
+            new, lost = added(get(state, 8 * i), get(error, 8 * i), splat8(h), mean, rest)
             put(next_state, 8 * i, new)
             put(next_error, 8 * i, lost)
             damage += new * 0.0
