@@ -26,9 +26,10 @@ always, WHFast and the leapfrog never, so that each of these has one row.
 
 Every row has the same number of settings on every problem, declared before the run in
 hbvm_bench/campaign/shipped/race.toml. The fastest setting that is accurate enough is picked afterwards, by
-the same rule for every row. A ratio, and with it a goal, compares the fastest of all our settings with the
-fastest of all the peer's, in rounds that did not choose them; ours, and IAS15's, are therefore picked from
-twice as many as the others'.
+the same rule for every row. A ratio, and with it a goal, compares families, in rounds that did not choose
+the settings, and from the same number of settings of each: of a family with two rows, ours and IAS15,
+every second setting of either row takes part, counted in the order of declaration. The
+rule does not look at results.
 
 Energy is never ranked without position: a setting counts only if both errors are small enough. A run
 that leaves the trajectory which a symmetry prescribes is void.
@@ -76,6 +77,12 @@ def machines(results: Results) -> list[Note]:
 
 
 @block
+def overview(results: Results) -> Table:
+    """Return the fastest setting on every problem, and all methods relative to it."""
+    return tables.overview(of(results))
+
+
+@block
 def ratios(results: Results) -> Table:
     """Return the peers' best times over ours."""
     return tables.headline(of(results))
@@ -104,7 +111,7 @@ def behind(results: Results) -> Table:
 def contests(results: Results) -> list[Section]:
     """Return the section of each problem."""
     races = of(results)
-    navs = short([race.title for race in races])
+    navs = tables.short([race.title for race in races])
     return [section(race, results.look, nav) for race, nav in zip(races, navs, strict=True)]
 
 
@@ -127,15 +134,6 @@ def run_again(results: Results) -> Section:
     races = sorted(of(results), key=lambda race: race.started)
     days = ", ".join(sorted({race.started[:10] for race in races}))
     return again(commands(races), days, races[-1].machine, races[-1].run.versions)
-
-
-def short(titles: Sequence[str]) -> list[str]:
-    """Return as much of every title as tells it from the others: what is before its first or second comma."""
-    begun = [title.split(",")[0] for title in titles]
-    return [
-        one if begun.count(one) == 1 else ",".join(title.split(",")[:2])
-        for one, title in zip(begun, titles, strict=True)
-    ]
 
 
 def section(race: Race, look: Mapping[str, Look], nav: str) -> Section:

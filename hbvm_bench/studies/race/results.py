@@ -95,19 +95,40 @@ class Race:
         """The families in the order of declaration."""
         return list(dict.fromkeys(row.family for row in self.rows))
 
+    @cached_property
+    def competing(self) -> dict[str, list[Record]]:
+        """The settings of each family that are compared with other families: as many of each.
+
+        Of a family with a fixed and an adaptive step size, which has declared twice as many as the others,
+        every second one of either kind takes part, counted in the order of declaration.
+        """
+        rows: dict[str, list[list[Record]]] = {}
+        for row, records in self.rows.items():
+            rows.setdefault(row.family, []).append(records)
+        single = max((len(mine[0]) for mine in rows.values() if len(mine) == 1), default=0)
+        every = {family: len(mine) if sum(map(len, mine)) > single else 1 for family, mine in rows.items()}
+        return {
+            family: [record for records in mine for record in records[:: every[family]]]
+            for family, mine in rows.items()
+        }
+
     @property
     def goals(self) -> list[Verdict]:
         """The verdicts on what was asked for."""
-        found = verdicts(self.run.index.campaign, self.run.records)
-        return [one for one in found if name_of(one.entry) == self.key]
+        compared = [record for records in self.competing.values() for record in records]
+        return verdicts(self.run.index.campaign, compared)
 
     def of(self, who: str | Row) -> list[Record]:
-        """Return the settings of a family, with fixed and with own steps, or of one of its rows."""
+        """Return all settings of a family, or of one of its rows."""
         return self.rows.get(who, []) if isinstance(who, Row) else standings.among(self.records, who)
 
     def best(self, who: str | Row, energy: float, position: float) -> Record | None:
-        """Return the fastest setting of a family or a row with errors at most these, if there is one."""
-        return standings.best(self.of(who), {ENERGY: energy, POSITION: position})
+        """Return the fastest setting with errors at most these, if there is one.
+
+        Of a row it is chosen from all settings, of a family from those that compete.
+        """
+        able = self.of(who) if isinstance(who, Row) else self.competing.get(who, [])
+        return standings.best(able, {ENERGY: energy, POSITION: position})
 
     def at(self, family: str, energy: float, position: float) -> Comparison:
         """Compare the best settings of a peer and of ours at one accuracy."""

@@ -7,18 +7,20 @@ import pytest
 
 from hbvm_bench.campaign.file import name_of
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.campaign.shorter import chosen
+from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.commands.studies import race_as_data
 from hbvm_bench.report.figures.style import looks
+from hbvm_bench.report.markdown import printed
 from hbvm_bench.report.page import gather, page_of
 from hbvm_bench.report.write import write
 from hbvm_bench.store import archive
 from hbvm_bench.store.archive import opened
 from hbvm_bench.studies.race import report, results, tables
 from hbvm_bench.studies.race.figures import work_precision
+from hbvm_bench.summaries import standings
 from problems.errors import InputError
 from tests.hbvm_bench.made_up_run import results_of
-from tests.hbvm_bench.studies.race.conftest import record, save
+from tests.hbvm_bench.studies.race.conftest import made_up, record, save
 
 REPORTS = Path(__file__).parents[4] / "reports"
 
@@ -147,5 +149,27 @@ def test_a_quick_run_has_the_best_known_setting_of_every_family():
         for race in races:
             short = msgspec.structs.replace(chosen(results.declared(), [race.key]), quick=True)
             there = {resolve(case).case.method for case in short.cases()}
-            best = [race.best(family, *race.asked) for family in race.families]
+            within = dict(zip(results.ERRORS, race.asked, strict=True))
+            best = [standings.best(race.of(family), within) for family in race.families]
             assert {one.case.method for one in best if one is not None} <= there
+
+
+def test_families_are_compared_by_as_many_settings_each():
+    campaign = chosen(results.declared(), ["outer_solar_system"])
+    (entry,) = campaign.entries()
+    records = [record(case.method, 0.01, 1e-14, 1e-12) for case in campaign.cases()]
+    found = results.Race(entry, made_up().run, records)
+    assert {family: len(of) for family, of in found.competing.items()} == dict.fromkeys(found.families, 16)
+    for family in ("", "IAS15"):
+        kinds = [row for row in found.rows if row.family == family]
+        assert [one for row in kinds for one in found.rows[row][::2]] == found.competing[family]
+    quick = quick_run(campaign)
+    records = [record(case.method, 0.01, 1e-14, 1e-12) for case in quick.cases()]
+    found = results.Race(entry, made_up().run, records)
+    assert {family: len(of) for family, of in found.competing.items()} == dict.fromkeys(found.families, 6)
+
+
+def test_the_table_of_the_readme_is_that_of_the_stored_results():
+    races = results.of(gather(opened([REPORTS / "race"])))
+    table = printed(replace(tables.overview(races), title="", note=""))
+    assert table in (REPORTS.parent / "README.md").read_text(encoding="utf-8"), table
