@@ -82,7 +82,7 @@ def overview(races: Sequence[Race]) -> Table:
     shown = ("HBVM", "Gauss", *(f for f in FAMILIES if f != OURS))
     rows = []
     for race, title in zip(races, short([race.title for race in races]), strict=True):
-        within = dict(zip(ERRORS, race.asked, strict=True))
+        within: dict[str, float] = dict(zip(ERRORS, race.asked, strict=True))
         able = {one: standings.among(race.records, one) for one in ("HBVM", "Gauss")} | race.competing
         best = {name: standings.best(able.get(name, []), within) for name in shown}
         first = standings.best([one for one in best.values() if one is not None], within)
