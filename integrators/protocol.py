@@ -48,7 +48,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     `integrate_many`. `PreparedBatches`: ``prepare_batch`` does all of it that is not integrating, so that
     the bench can time the rest. `Threads`: with ``threaded`` it takes ``threads=``. `PieceSize`: ``piece`` is
     the number of trajectories that it is best given first.
-16. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
+16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has, so that `integrate`
+    can ask for all of them at once and Ctrl-C loses few.
+17. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
     plugins then know its coefficients.
 """
 
@@ -88,6 +90,7 @@ __all__ = [
     "Status",
     "Stepper",
     "Threads",
+    "TimeLimit",
     "Trajectories",
     "UserError",
     "offers",
@@ -402,6 +405,19 @@ class Interruptible(Protocol):
     stop: threading.Event | None
 
 
+class TimeLimit(Protocol):
+    """A stepper whose ``advance`` comes back with a part of the samples when it has taken its time.
+
+    Attributes
+    ----------
+    time_limit : float
+        Seconds after which ``advance`` returns the samples that it has, if there are any, as
+        ``FINISHED``; called with the other times it goes on as if it had not come back. Infinite at first.
+    """
+
+    time_limit: float
+
+
 class EventStepper(Protocol):
     """A stepper that looks for events in its steps, as `Events.with_events` starts it.
 
@@ -503,7 +519,7 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Batches, PreparedBatches, Threads, PieceSize, AsHBVM,
+    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, AsHBVM,
 )  # fmt: skip
 """All of them."""
 
@@ -610,16 +626,16 @@ def check_system(method: MethodBase, system: System) -> None:
 
 def check_is_problem(problem: Problem) -> None:
     """Raise `problems.errors.InputError` for what is no problem, such as a system without a start."""
+    if isinstance(problem, Problem):
+        return
     if isinstance(problem, System):
         raise InputError(
             f"problem must be a Problem, not {shown(problem)}, a system without a start; "
             "give problems.Problem(system, y0=..., t_end=...)."
         )
-    if not isinstance(problem, Problem):
-        raise InputError(
-            f"problem must be a Problem, not {shown(problem)}; "
-            "make one with problems.load or problems.Problem."
-        )
+    raise InputError(
+        f"problem must be a Problem, not {shown(problem)}; make one with problems.load or problems.Problem."
+    )
 
 
 def check_problem(problem: Problem, method: MethodBase) -> None:

@@ -154,6 +154,14 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
     return found
 
 
+def _allows_everything(annotation: Any) -> bool:
+    """Whether `checked` returns any value as it is."""
+    if get_origin(annotation) in (Union, UnionType):
+        kinds = [option for option in get_args(annotation) if option is not NoneType]
+        return len(kinds) > 1 or _allows_everything(kinds[0])
+    return get_origin(annotation) not in (Annotated, Literal) and annotation not in _KINDS
+
+
 def refusal(owner: str, name: str, value: Any, words: str) -> InputError:
     """Return the error for a value that is not what ``words`` say."""
     return InputError(f"{name}={shown(value)} of {owner} must be {words}.")
@@ -240,6 +248,8 @@ class Arguments:
         self.parameters = signature.parameters
         self._defaults: dict[str, Any] = {}
         self._by_place = [key for key, one in self.parameters.items() if one.kind is not one.KEYWORD_ONLY]
+        self._needed = [key for key, one in self.parameters.items() if one.default is EMPTY]
+        self._free = {key for key, one in self.parameters.items() if _allows_everything(one.annotation)}
 
     def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
         """Refuse what the signature does not take.
@@ -268,11 +278,11 @@ class Arguments:
                 f"{name} takes {self._places()} by name, not {shown(values[len(by_place)])}; "
                 f"write it as in {name}({example}=...)."
             )
-        given = {*by_place[: len(values)], *options}
-        for key in by_place[: len(values)]:
+        placed = by_place[: len(values)]
+        for key in placed:
             if key in options:
                 raise InputError(f"{name} gets {key} twice, by place and by name; give it once.")
-        missing = [key for key, one in self.parameters.items() if one.default is EMPTY and key not in given]
+        missing = [key for key in self._needed if key not in placed and key not in options]
         if missing:
             raise InputError(
                 f"{name} needs {', '.join(missing)}; give a value as in {name}({missing[0]}=...)."
@@ -294,8 +304,23 @@ class Arguments:
             self._defaults[key] = checked(self.owner, key, value, one.annotation)
         return self._defaults[key]
 
-    def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> inspect.BoundArguments:
-        """Return all arguments of a call, defaults included, checked.
+    @functools.cached_property
+    def _unchecked(self) -> dict[str, Any]:
+        """The arguments in their order, with the defaults as a call gets them."""
+        return {
+            key: EMPTY if one.default is EMPTY else self._used(key, one.default)
+            for key, one in self.parameters.items()
+        }
+
+    def _used(self, key: str, value: Any) -> Any:
+        if key in self._free:
+            return value
+        found = self.value(key, value)
+        # A call prints as it was made: e=0, not e=0.0.
+        return value if type(value) in (int, float) else found
+
+    def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> dict[str, Any]:
+        """Return all arguments of a call by name, defaults included, checked.
 
         Raises
         ------
@@ -303,13 +328,15 @@ class Arguments:
             For a name that is not taken or is missing (`check_names`), or a value that is not allowed.
         """
         self.check_names(values, options)
-        call = self.signature.bind(*values, **options)
-        call.apply_defaults()
-        for key, value in call.arguments.items():
-            found = self.value(key, value)
-            # A call prints as it was made: e=0, not e=0.0.
-            call.arguments[key] = value if type(value) in (int, float) else found
+        call = self._unchecked.copy()
+        for key, value in (*zip(self._by_place, values, strict=False), *options.items()):
+            call[key] = self._used(key, value)
         return call
+
+    def split(self, call: Mapping[str, Any]) -> tuple[list[Any], dict[str, Any]]:
+        """Return the arguments of a call by place and by name, as Python takes them."""
+        rest = {key: value for key, value in call.items() if key not in self._by_place}
+        return [call[key] for key in self._by_place], rest
 
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""
@@ -352,8 +379,9 @@ def _checking(function: Callable[P, R], owner: str | None) -> Callable[P, R]:
     def wrapper(*values: P.args, **options: P.kwargs) -> R:
         makes = function.__name__ == "__init__"
         name = type(values[0]).__name__ if makes else function.__name__
-        call = arguments(name).bind(values[bound:], options)
-        return function(*values[:bound], *call.args, **call.kwargs)  # type: ignore[call-arg]
+        taken = arguments(name)
+        by_place, by_name = taken.split(taken.bind(values[bound:], options))
+        return function(*values[:bound], *by_place, **by_name)  # type: ignore[call-arg]
 
     return readable(wrapper)
 

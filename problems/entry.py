@@ -122,13 +122,13 @@ def entry(
         @functools.wraps(make)
         def made(*values: P.args, **options: P.kwargs) -> Problem:
             call = taken.bind(values, options)
-            problem = make(*call.args, **call.kwargs)
+            problem = make(**call)  # type: ignore[call-arg]
             if not isinstance(problem, Problem):
                 raise InputError(f"{name} must return a problems.Problem, not {shown(problem)}.")
             return problem.entitled(
                 name=name,
                 title=words.title or problem.title,
-                arguments=taken.printed(call.arguments, words.shows),
+                arguments=taken.printed(call, words.shows),
                 references=words.references,
                 notes=words.notes,
             )

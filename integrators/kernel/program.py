@@ -282,12 +282,16 @@ class HBVMProgram(Compiled):
 
     def _context(self, *, side: bool) -> Context:
         if side not in self._fresh:
-            tables = {**self._fixed, **({} if side else self.scaled(self.h))}
-            made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
-            made.tolerance = TOLERANCE
-            made.log_rest = LOG_REST
-            self._fresh[side] = made  # when it is complete: another thread may copy it at once
+            # when it is complete: another thread may copy it at once
+            self._fresh[side] = self._made(side=side)
         return self._fresh[side].copy()
+
+    def _made(self, *, side: bool) -> Context:
+        tables = {**self._fixed, **({} if side else self.scaled(self.h))}
+        made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
+        made.tolerance = TOLERANCE
+        made.log_rest = LOG_REST
+        return made
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
         """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
@@ -434,6 +438,8 @@ class AdaptiveProgram(HBVMProgram):
 
     def breakpoints(self, par: Array) -> Array:
         """Return the times that steps end at, ascending: those given, and those of the formulas."""
+        if not self._switches.any:
+            return self._given
         return np.union1d(self._given, self._switches.times(par))
 
     @property
@@ -452,8 +458,8 @@ class AdaptiveProgram(HBVMProgram):
         contexts[0].next_length = self.first or 0.0
         contexts[0].doubt_end = t0
 
-    def _context(self, *, side: bool) -> Context:
-        context = super()._context(side=True)  # with a matrix of its own
+    def _made(self, *, side: bool) -> Context:
+        context = super()._made(side=True)  # with a matrix of its own
         context.point({"estimators": self._estimators, "extrapolation": self._onward})
         context.varying = 1
         context.log_rest = LOG_REST_VARYING

@@ -1,9 +1,11 @@
 """One trajectory of HBVM(k, s) under way: what steps of one length and of varying length have in common."""
 
+import math
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -27,6 +29,7 @@ from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
 from integrators.kernel.native import engine
+from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
@@ -127,6 +130,7 @@ class HBVMStepper(ABC):
     """Where the whole integration ends, if ``advance`` goes there in pieces."""
     crawl: Crawl | None = None
     """What watches the way to the destination; see `integrators.running.watchdog`."""
+    time_limit = math.inf  # seconds after which ``advance`` returns what it has
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: Program, y: Array, par: Array, t0: float):
@@ -171,7 +175,7 @@ class HBVMStepper(ABC):
         ctx.t0 = t0
         for workspace in self._implicit or ():
             workspace.forget()
-        steps(engine.RESET, ctx.address, out=y.ctypes.data)
+        steps(engine.RESET, ctx.address, 0, 0, 0, 0, 0, 0, 0, address(y), 0)
 
     @property
     def t(self) -> float:
@@ -207,30 +211,37 @@ class HBVMStepper(ABC):
         factorizations, rescues of steps that a fixed Jacobian could not solve. With several
         invariants also ``"lost"``, how often one had moved in a step by more than rounding
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
-        from others.
+        from others. With steps of varying length also the method's ``"k"`` and ``"s"`` and, where the field
+        jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a step had to be cut for and the
+        length at which it was found, of the first 64 places.
         """
-        ctx, kept = self._context, self._program.kept
-        extra: dict[str, Any] = {
-            "partial_steps": ctx.partial,
-            "restarts": ctx.restarts,
-            "lanes": self._program.lanes,
-            "form": "second" if self._program.second else "first",
-            **(kept.report(ctx) if kept else {}),
-        }
-        if self._implicit is not None:
-            extra["implicit"] = {
-                "steps": ctx.implicit_steps,
-                "switches": ctx.switches,
-                **report(*self._implicit),
-            }
+        ctx = self._context
         return Stats(
             steps=ctx.steps,
             rejections=ctx.rejections,
             evaluations=ctx.evaluations,
             iterations=ctx.iterations,
             solver=self._solvers(),
-            extra=extra,
+            extra=self._extra(),
         )
+
+    def _extra(self) -> dict[str, Any]:
+        ctx, kept = self._context, self._program.kept
+        extra: dict[str, Any] = {
+            "partial_steps": ctx.partial,
+            "restarts": ctx.restarts,
+            "lanes": self._program.lanes,
+            "form": "second" if self._program.second else "first",
+        }
+        if kept:
+            extra.update(kept.report(ctx))
+        if self._implicit is not None:
+            extra["implicit"] = {
+                "steps": ctx.implicit_steps,
+                "switches": ctx.switches,
+                **report(*self._implicit),
+            }
+        return extra
 
     @property
     def _solver(self) -> str:
@@ -242,10 +253,12 @@ class HBVMStepper(ABC):
     def _solvers(self) -> str:
         """Return the names of the solvers that have solved steps, the one that solved more first."""
         ctx = self._context
+        if self._implicit is None:
+            return "fixed point"
         implicit = ctx.implicit_steps
         fixed = int(ctx.steps + ctx.solved) - implicit
         always = self._program.solver.strategy == ALWAYS_IMPLICIT
-        parts = [(fixed, "fixed point"), (implicit, "" if self._implicit is None else self._implicit[0].name)]
+        parts = [(fixed, "fixed point"), (implicit, self._implicit[0].name)]
         used = [(count, name) for count, name in parts if count > 0] or [(0, parts[always][1])]
         return ", ".join(name for _, name in sorted(used, key=lambda part: -part[0]))
 
@@ -365,12 +378,13 @@ class HBVMStepper(ABC):
 
     def _fill(self, between: int, times: Array, *steps_and_parts: NDArray[Any]) -> Made:
         """Make samples, in chunks so that Ctrl-C is heard between them."""
-        times, *given = map(np.ascontiguousarray, (times, *steps_and_parts))
+        times, *given = [np.ascontiguousarray(each) for each in (times, *steps_and_parts)]
+        addresses = [address(array) for array in given]
         out = np.empty((times.size, self._dim))
         outcome, made, why, ctx = BUDGET, 0, None, self._context
-        while outcome == BUDGET and why is None:
+        late = perf_counter() + self.time_limit
+        while outcome == BUDGET and why is None and not (made and perf_counter() > late):
             before = ctx.steps
-            addresses = [array.ctypes.data for array in given]
             outcome = self._call(engine.ADVANCE, between, times, out, made, self._budget(), *addresses)
             made = ctx.made
             if outcome == BUDGET:
@@ -396,7 +410,7 @@ class HBVMStepper(ABC):
             with self._pace:
                 outcome = steps(
                     what, self._context.address, self._side.address, between, times.size,
-                    times.ctypes.data, targets, parts, made, out.ctypes.data, budget,
+                    address(times), targets, parts, made, address(out), budget,
                 )  # fmt: skip
         except UserError as raised:
             outcome, self.error = NOT_FINITE, raised.error
@@ -414,7 +428,7 @@ class HBVMStepper(ABC):
         return self._context.wanted != 0
 
     def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None" = None) -> Samples:
-        if why is None and outcome != DONE:
+        if why is None and outcome not in (DONE, BUDGET):
             why = self._failure(outcome)
         if why is not None:
             self._status, self._reason = why

@@ -2,8 +2,7 @@
 
 import math
 import sys
-from dataclasses import replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from integrators.kernel.native import engine
 from integrators.kernel.step.rule import FIRST_AT_REST, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
-from integrators.protocol import Array, Samples, Stats, Status
+from integrators.protocol import Array, Samples, Status
 from integrators.refusals import one_thread
 from integrators.running.watchdog import crawl
 
@@ -68,19 +67,13 @@ class AdaptiveStepper(HBVMStepper):
         if any(map(self._is_at, self._breakpoints.tolist())):
             self._context.border = START
 
-    @property
-    def stats(self) -> Stats:
-        """Counters of the work done, as `HBVMStepper.stats`; ``extra`` has the method's k and s too.
-
-        And, where the field jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a
-        step had to be cut for and the length at which it was found, of the first 64 places.
-        """
-        stats, c, context = super().stats, self._program.constants, self._context
-        extra = {**stats.extra, "k": c.k, "s": c.s}
+    def _extra(self) -> dict[str, Any]:
+        c, context = self._program.constants, self._context
+        extra = {**super()._extra(), "k": c.k, "s": c.s}
         if found := context.kinks:
             kept = context.kink_places.reshape(-1, 2)[: min(found, KINKS_KEPT)]
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
-        return replace(stats, extra=extra)
+        return extra
 
     @one_thread
     def take(self, count: int) -> Samples:
@@ -136,7 +129,8 @@ class AdaptiveStepper(HBVMStepper):
             self._goal = end if self.destination is None else self.destination
             ctx.interval = max(ctx.interval, abs(self._goal - self._origin), abs(end - self._origin))
             self._program.limit(ctx, ctx.interval)
-        if not np.sign(end - self.t) * ctx.next_length < 0.0:
+        way = end - self.t
+        if way == 0.0 or not math.copysign(1.0, way) * ctx.next_length < 0.0:
             return
         ctx.next_length *= -1.0
         ctx.border = NOTHING

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from math import isfinite
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -24,6 +26,7 @@ from integrators.protocol import (
     Samples,
     Samplings,
     Status,
+    TimeLimit,
     UserError,
     check_problem,
     offers,
@@ -41,6 +44,7 @@ DEFAULT_SAMPLES = 1001
 SECONDS = 60.0  # from one file to the next
 FIRST = 1e-5  # of the interval: the first piece, when nothing is known of its cost ...
 UNSEEN = 1e-3  # ... and where nobody wants to know of it
+UNLIMITED = 2**17  # numbers of a solution that are always allowed
 PROGRAMS = 8  # kept with each system
 
 
@@ -159,6 +163,8 @@ def integrate(
 
     by_steps = watch is not None and watch.looks and _goes_by_steps(stepper, sample)
     length = abs(end - problem.t0) * (FIRST if watch is not None and watch.looks else UNSEEN)
+    if watch is None and sample != "steps" and offers(stepper, TimeLimit):
+        stepper.time_limit, length = SOON, np.inf
     try:
         while made < grid.size and status is Status.FINISHED:
             piece, how, count = _next_piece(grid, made, here, length, sample, by_steps)
@@ -166,7 +172,8 @@ def integrate(
             samples = stepper.advance(piece, sample=how)
             length *= _growth(perf_counter() - began)
             status, reason = samples.status, samples.reason
-            here = float(piece[-1]) if status is Status.FINISHED else stepper.t
+            in_time = how == "steps" or samples.t.size == piece.size
+            here = float((piece if in_time else samples.t)[-1]) if status is Status.FINISHED else stepper.t
             if how == sample:
                 t.append(samples.t)
                 y.append(samples.y)
@@ -244,7 +251,7 @@ def _compiled(method: MethodBase, system: System) -> tuple[Program, float | None
 
 def _wanted(events: Any, sample: str | None) -> dict[str, Event]:
     """Return the events to look for, by name."""
-    if isinstance(events, Sequence) and not events:
+    if isinstance(events, tuple | list) and not events:
         return {}
     if sample == "land":
         raise InputError(
@@ -281,6 +288,8 @@ def _next_piece(
     the next sample. So pieces give the bits of one call of ``advance``.
     """
     sign = 1.0 if grid[-1] >= here else -1.0
+    if length == np.inf:
+        return grid[made:], sample, grid.size - made
     goal = here + sign * length
     count = int(np.count_nonzero(sign * (grid[made:] - goal) <= 0.0))
     if sample == "steps":
@@ -316,11 +325,19 @@ def _grid(problem: Problem, times: ArrayLike | None) -> Array:
         times = problem.times
     grid = as_numbers("times", problem.t_end if times is None else times)
     if grid.ndim == 0:
-        if not np.isfinite(grid) or grid == problem.t0:
+        if not isfinite(grid) or grid == problem.t0:
             raise InputError(
                 f"times={shown(times)} is no end for a start at t0={problem.t0!r}; give a later time."
             )
-        grid = np.linspace(problem.t0, float(grid), DEFAULT_SAMPLES)
-    gib = 8 * grid.size * problem.system.dim / 2**30
-    limits.check(f"a solution of {grid.size} times and {problem.system.dim} components", "GIB", gib)
+        grid = _equidistant(problem.t0, float(grid))
+    size = grid.size * problem.system.dim
+    if size > UNLIMITED:
+        limits.check(
+            f"a solution of {grid.size} times and {problem.system.dim} components", "GIB", 8 * size / 2**30
+        )
     return grid
+
+
+@lru_cache(maxsize=64)
+def _equidistant(t0: float, end: float) -> Array:
+    return np.linspace(t0, end, DEFAULT_SAMPLES)

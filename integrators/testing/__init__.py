@@ -18,6 +18,7 @@ from integrators.protocol import MethodBase
 from integrators.testing.capabilities import (
     a_destination_leaves_the_samples_alone,
     batches_are_single_trajectories,
+    comes_back_after_its_time,
     comes_back_when_it_is_stopped,
     finds_events_beside_its_steps,
     is_the_hbvm_that_it_names,
@@ -93,6 +94,7 @@ CHECKS: tuple[Check, ...] = (
     prepared_batches_are_batches,
     threads_change_no_bits,
     the_size_of_a_piece_is_a_count,
+    comes_back_after_its_time,
     is_the_hbvm_that_it_names,
 )
 

@@ -25,6 +25,7 @@ from integrators.protocol import (
     Samplings,
     Status,
     Threads,
+    TimeLimit,
     offers,
 )
 from integrators.running.integrate import integrate
@@ -149,6 +150,22 @@ def comes_back_when_it_is_stopped(method: MethodBase, problem: Problem) -> str |
     raise AssertionError("broken: advance comes back when stop is set")
 
 
+def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | None:
+    """Check that pieces made within a limit of time have the bits of one call."""
+    stepper: Any = start(method, problem)
+    if not offers(stepper, TimeLimit):
+        return "it has no limit of time"
+    grid = irregular(problem)
+    whole = start(method, problem).advance(grid)
+    stepper.time_limit, made = 0.0, 0
+    while made < grid.size:
+        piece = stepper.advance(grid[made:])
+        require(piece.status is Status.FINISHED and piece.t.size > 0, "each piece has a sample")
+        require(np.array_equal(piece.y, whole.y[made : made + piece.t.size]), "pieces have the bits of one")
+        made += piece.t.size
+    return None
+
+
 def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
     """Check that a batch gives what its trajectories give alone, in any order, prepared, and with threads."""
     program: Any = method.compile(problem.system)
@@ -222,6 +239,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     PreparedBatches: prepared_batches_are_batches,
     Threads: threads_change_no_bits,
     PieceSize: the_size_of_a_piece_is_a_count,
+    TimeLimit: comes_back_after_its_time,
     AsHBVM: is_the_hbvm_that_it_names,
 }
 """Which check a capability has."""

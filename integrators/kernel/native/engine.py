@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from integrators.kernel.native import binary, store
-from integrators.kernel.native.raised import Interrupts, raise_kept
+from integrators.kernel.native.raised import Interrupts, calls_back, raise_kept
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, WALK, PART = range(4)
@@ -65,9 +65,11 @@ class Engine:
         What a field in Python raised is raised here, as a `UserError`, and Ctrl-C as it is; the memory holds
         what was made before.
         """
-        rest = [named.get(name, 0) for name in self._arguments[len(arguments) :]]
-        function = self._function
+        if len(arguments) < len(self._arguments):
+            arguments += tuple(named.get(name, 0) for name in self._arguments[len(arguments) :])
+        if not calls_back():
+            return self._function(*arguments)
         with Interrupts():
-            outcome = function(*arguments, *rest)
+            outcome = self._function(*arguments)
         raise_kept()
         return outcome

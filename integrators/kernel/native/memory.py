@@ -16,6 +16,7 @@ makes them attributes of its address:
         return orbit.h * orbit.state[0]
 """
 
+import ctypes
 from collections.abc import Mapping
 from math import prod
 from typing import Any, ClassVar, Self, overload
@@ -32,8 +33,16 @@ LINE = 8  # words in 64 bytes, at a multiple of which every array begins
 def aligned(n: int) -> Numbers:
     """Return n zeros at an address that is a multiple of 64."""
     room = np.zeros(n + LINE)
-    start = (-room.ctypes.data % 64) // 8
+    start = (-address(room) % 64) // 8
     return room[start : start + n]
+
+
+def address(array: Any) -> int:
+    """Return where an array's numbers begin: ``array.ctypes.data``, mostly in a quarter of the time."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError, BufferError):  # it is read-only, empty or has gaps
+        return array.ctypes.data
 
 
 class Slot:
@@ -138,15 +147,18 @@ class Memory:
 
         end = -(-len(self.slots) // LINE) * LINE
         self._own: dict[str, tuple[int, int]] = {}  # where an array begins and ends
+        self._ends: dict[int, int] = {}  # the same, for all that were ever its own
         for name, slot in self.slots.items():
             if isinstance(slot, Array) and slot.shape and name not in arrays:
                 self._own[name] = (end, end + length(slot))
+                self._ends[end] = end + length(slot)
                 end += -(-max(length(slot), 1) // LINE) * LINE
         self._lies_in(aligned(end))
         for name, (start, _) in self._own.items():
             self.words[self.slots[name].place] = self.address + 8 * start
         for name, value in numbers.items():
             setattr(self, name, value)
+        self._find_places()
         self._pointed: dict[str, NDArray[Any]] = {}
         self.point(arrays)
 
@@ -154,31 +166,36 @@ class Memory:
         self._memory = memory
         self.reals: Numbers = memory[: len(self.slots)]
         self.words: Integers = self.reals.view(np.int64)
-        self.address: int = memory.ctypes.data
+        self.address: int = address(memory)
 
     def copy(self) -> Self:
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
-        other._own, other._pointed = self._own.copy(), self._pointed.copy()
+        other._pointed = self._pointed.copy()
         memory = aligned(self._memory.size)
         memory[:] = self._memory
         other._lies_in(memory)
-        other.words[[self.slots[name].place for name in self._own]] += other.address - self.address
+        other.words[self._places] += other.address - self.address
         return other
 
     def point(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Let slots point to arrays, and keep these alive."""
         for name, array in arrays.items():
-            self._own.pop(name, None)
             self._pointed[name] = array
-            self.words[self.slots[name].place] = array.ctypes.data
+            self.words[self.slots[name].place] = address(array)
+        if not self._own.keys().isdisjoint(arrays):
+            self._own = {name: part for name, part in self._own.items() if name not in arrays}
+            self._find_places()
+
+    def _find_places(self) -> None:
+        # of the addresses in this memory, which are others in a copy
+        self._places = np.array([self.slots[name].place for name in self._own], dtype=np.intp)
 
     def array(self, slot: Array) -> NDArray[Any]:
         """Return the array that a slot points to now; compiled code may have exchanged it for another."""
         if slot.name in self._pointed:
             return self._pointed[slot.name]
         start = (int(self.words[slot.place]) - self.address) // 8
-        end = next(end for begin, end in self._own.values() if begin == start)
-        found = self._memory[start:end]
+        found = self._memory[start : self._ends[start]]
         return found if slot.of is float else found.view(np.int64)

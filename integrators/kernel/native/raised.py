@@ -49,9 +49,14 @@ def raise_kept() -> None:
 
 
 def expect_callbacks() -> None:
-    """Say that compiled code of this process calls Python back: from now on Ctrl-C is kept."""
+    """Say that compiled code of this process calls Python back: from now on Ctrl-C is kept meanwhile."""
     global _calls_back
     _calls_back = True
+
+
+def calls_back() -> bool:
+    """Whether compiled code of this process may call Python back."""
+    return _calls_back
 
 
 class Interrupts:
@@ -59,7 +64,7 @@ class Interrupts:
 
     def __enter__(self) -> None:
         self._handler: Any = None
-        if _calls_back and threading.current_thread() is threading.main_thread():
+        if threading.current_thread() is threading.main_thread():
             handler = signal.getsignal(signal.SIGINT)
             if callable(handler):
                 self._handler = handler
