@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from integrators.kernel.native.memory import Array, Integer, Memory, Real
 from integrators.kernel.tables import Constants
+from problems.analysis.sides import MOST
 from problems.problem import System
 
 Numbers = NDArray[np.float64]
@@ -46,6 +47,7 @@ MEASURE, EVALUATE = 1, 2
 VALUES, END, ARRIVE = range(3)
 
 KINKS_KEPT = 64
+MOST_SIDES = 1 + MOST  # rows of what tells the sides of switching surfaces
 
 # What is known of the field where a step ends: NOTHING; the values that its polynomial says, EXTRAPOLATED,
 # which are compared with those of the next; that they are right, SEEN. At a START it may jump.
@@ -279,7 +281,12 @@ class Context(Memory):
     slowest_decay = Real()  # of a smooth field, from the middle coefficients to the last ones
     negligible = Real()  # part of a block's size that the error at a kink may be
     sides = Integer()  # address of `problems.analysis.sides`, called like the field; 0: no such surfaces
-    side_values = Array(2, "lanes")  # its values at the stages, then times
+    surfaces = Integer()  # how many distances it has besides: rows after the first
+    side_values = Array("calls", MOST_SIDES, "lanes")  # its values at the stages,
+    side_ends = Array(MOST_SIDES, "lanes")  # at the start, then at the end of the step,
+    side_between = Array(MOST_SIDES, "lanes")  # and between two nodes
+    side_times = Array("lanes")
+    side_state = Array(2, "padded")  # a state there
     crossed = Integer()  # 1: a switching surface lies in the step that was attempted
     kinked = Integer()  # 1: in the step that was estimated the field does not look smooth
     kinks = Integer()  # places where steps were rejected for that

@@ -395,9 +395,10 @@ class AdaptiveProgram(HBVMProgram):
             if system.traced and not self.kept
             else None
         )
-        self._sides = None
+        self._sides, self._surfaces = None, 0
         if surfaces is not None:
             self._sides = fields.compile_field(system, surfaces, tables.lanes_for(k))
+            self._surfaces = len(surfaces.outputs) - 1
             self.from_cache = self.from_cache and self._sides.from_cache
         looks = sees_kinks(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
@@ -477,6 +478,7 @@ class AdaptiveProgram(HBVMProgram):
         context.doubt, context.slowest_decay = self._doubt, self._slowest
         context.negligible = self._negligible
         context.sides = self._sides.address if self._sides else 0
+        context.surfaces = self._surfaces
         context.absolute[:] = self._absolute
         context.asks = int(self.atol is None or np.any(np.greater(self.atol, 0.0)))
         self.limit(context, 0.0)

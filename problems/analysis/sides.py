@@ -1,4 +1,4 @@
-"""On which sides of its switching surfaces a traced field is evaluated, as one function."""
+"""On which sides of its switching surfaces a traced field is evaluated, and how far from them."""
 
 from dataclasses import replace
 
@@ -6,11 +6,12 @@ from problems.analysis.structure import has_kink
 from problems.calculus.function import Function, Term
 from problems.trace.graph import STATE, Node, Table, reachable
 
+MOST = 16  # surfaces whose distances have an output of their own
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
 
 
 def sides(field: Function) -> Function | None:
-    """Return a function whose value changes where a condition, a sign or a piece of a table does.
+    """Return a function whose first value changes where a condition, a sign or a piece of a table does.
 
     Parameters
     ----------
@@ -20,9 +21,10 @@ def sides(field: Function) -> Function | None:
     Returns
     -------
     Function or None
-        With one output, the same everywhere between two switching surfaces. In a loop, sides that change
-        in two terms at once and in opposite directions may cancel. ``None`` where the field has no such
-        surface.
+        Its first output is the same everywhere between two switching surfaces. In a loop, sides that change
+        in two terms at once and in opposite directions may cancel. Each of the others, `MOST` at most,
+        vanishes on one surface and is smooth beside it; on those of a loop, and on those that are left, one
+        of them vanishes that is of the size of the smallest. ``None`` where the field has no such surface.
     """
     found = [
         node
@@ -34,7 +36,12 @@ def sides(field: Function) -> Function | None:
     terms = tuple(
         Term(_side(node) * (1.0 + GOLDEN * (i + 1) % 1.0), i) for i, node in enumerate(dict.fromkeys(found))
     )
-    return replace(field, outputs=(terms,), loops=(), name="sides")
+    distances = list(dict.fromkeys(_distance(node) for node in found))
+    if len(distances) > MOST:
+        last = [_inverse_square(node) for node in distances[MOST - 1 :]]
+        distances[MOST - 1 :] = [_smallest(sum(last[1:], last[0]))]
+    outputs = (terms, *((Term(node, 0),) for node in distances))
+    return replace(field, outputs=outputs, loops=(), name="sides")
 
 
 def _side(node: Node) -> Node:
@@ -45,3 +52,25 @@ def _side(node: Node) -> Node:
     else:
         side = graph.where(x, graph.const(1.0), graph.const(0.0))
     return side if node.loop is None else graph.sum(side, node.loop)
+
+
+def _distance(node: Node) -> Node:
+    """Return what vanishes where the node switches."""
+    graph, x = node.graph, node.args[0]
+    if node.op == "table":
+        ends = node.data.knots
+        low, high = (
+            graph.table(x, Table(ends, tuple((piece,) for piece in pieces)))
+            for pieces in (ends[:-1], ends[1:])
+        )
+        x = (x - low) * (high - x)
+    return x if node.loop is None else _smallest(graph.sum(_inverse_square(x), node.loop))
+
+
+def _inverse_square(x: Node) -> Node:
+    return 1.0 / (x * x)
+
+
+def _smallest(inverse_squares: Node) -> Node:
+    """Return a number that is at most as large as the smallest of those whose inverse squares are added."""
+    return inverse_squares.graph.call("sqrt", 1.0 / inverse_squares)

@@ -1,6 +1,15 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
-from integrators.kernel.context import AT_START, EXTRAPOLATED, KINKS_KEPT, NOTHING, SEEN, START, UNSOLVED
+from integrators.kernel.context import (
+    AT_START,
+    EXTRAPOLATED,
+    KINKS_KEPT,
+    MOST_SIDES,
+    NOTHING,
+    SEEN,
+    START,
+    UNSOLVED,
+)
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
@@ -62,16 +71,16 @@ def crosses(ctx):
     if ctx.sides == 0:
         return False
     lanes, rows, found = ctx.lanes, ctx.rows, ctx.side_values
-    size = lanes * ctx.padded
-    first = 0.0
+    size, first = lanes * ctx.padded, 0.0
     for call in range(ctx.calls):
-        call_field(ctx.sides, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, found)
+        values = found + lanes * MOST_SIDES * call
+        call_field(ctx.sides, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, values)
         if call == 0:
             first = found[0]
         for lane in range(lanes):
-            if found[lane] != first:
+            if values[lane] != first:
                 return True
-    times, ends, second = found + lanes, ctx.sums, ctx.second
+    times, ends, second = ctx.side_times, ctx.sums, ctx.second
     for lane in range(lanes):
         times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
     for d in range(rows):
@@ -79,8 +88,8 @@ def crosses(ctx):
         ends[lanes * d] = ctx.row_state[d]
         for lane in range(1, lanes):
             ends[lanes * d + lane] = ctx.next_state[after]
-    call_field(ctx.sides, times, ends, ctx.par, found)
-    return found[0] != first or found[1] != first
+    call_field(ctx.sides, times, ends, ctx.par, ctx.side_ends)
+    return ctx.side_ends[0] != first or ctx.side_ends[1] != first
 
 
 @compiled

@@ -41,9 +41,10 @@ from integrators.kernel.step.control import (
 )
 from integrators.kernel.step.estimate import estimate, estimate_implicit, log_decay
 from integrators.kernel.step.finish import count_step, finish
+from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
-from integrators.kernel.step.kinks import crosses, keep_end, kink, undo
+from integrators.kernel.step.kinks import count, crosses, keep_end, kink, undo
 from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sweep import sweep_measured
 
@@ -310,11 +311,14 @@ def estimate_attempt(ctx, outcome, implicit):
             error = INFINITY
         ctx.border_ahead = NOTHING
         ctx.undone = 0
-        return error, defect
-    if ctx.kinked:
-        ctx.doubts += 1
-        ctx.doubt_end = ctx.t0 + ctx.h
-    if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
+    else:
+        if ctx.kinked:
+            ctx.doubts += 1
+            ctx.doubt_end = ctx.t0 + ctx.h
+        if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
+            error = INFINITY
+    if ctx.surfaces and fits and error < INFINITY and ctx.crossed == 0 and grazes(ctx):
+        count(ctx, ctx.t0, ctx.h)
         error = INFINITY
     return error, defect
 

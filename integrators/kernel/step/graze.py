@@ -1,0 +1,123 @@
+"""Contacts that begin and end between two nodes: a switching surface that the trajectory touches.
+
+No node sees such a contact, but the distance from the surface does not fall to 0 unannounced: it has a
+minimum at the nodes beside it. There the polynomial of the step is looked at more closely.
+"""
+
+from integrators.kernel.context import MOST_SIDES
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_field
+from integrators.kernel.step.estimate import block_size
+from integrators.kernel.step.sample import interpolate
+
+DEEPER = 2.0  # times as far as a parabola may fall between its points, a distance may fall
+LOOKS = 3  # at as many times as there are lanes: the last are a thousandth of the nodes' distance apart
+# Times the coefficients that the polynomial leaves out: between nodes it is no farther from a smooth field.
+BESIDE = 10.0
+
+
+@compiled
+def grazes(ctx):
+    """Whether the solved step, whose ends and nodes are on one side, touches a surface and it matters."""
+    last = ctx.k + 1
+    for i in range(1, 1 + ctx.surfaces):
+        before, here, x_before, x_here = distance(ctx, i, 0), distance(ctx, i, 1), 0.0, ctx.nodes[0]
+        for j in range(2, last + 1):
+            after, x_after = distance(ctx, i, j), place(ctx, j)
+            near = may_vanish(before, here, after, x_here - x_before, x_after - x_here)
+            if near and touches(ctx, i, x_before, x_after):
+                return True
+            before, here, x_before, x_here = here, after, x_here, x_after
+    return False
+
+
+@compiled
+def place(ctx, j):
+    """Return the part of the step at which point j is: the start, the nodes, the end."""
+    return 0.0 if j == 0 else ctx.nodes[j - 1] if j <= ctx.k else 1.0
+
+
+@compiled
+def distance(ctx, i, j):
+    """Return the distance from surface i at point j of `place`."""
+    lanes = ctx.lanes
+    if j == 0 or j > ctx.k:
+        return abs(ctx.side_ends[lanes * i + (1 if j else 0)])
+    call, lane = (j - 1) // lanes, (j - 1) % lanes
+    return abs(ctx.side_values[lanes * (MOST_SIDES * call + i) + lane])
+
+
+@compiled
+def may_vanish(before, here, after, back, ahead):
+    """Whether a distance, smallest at the second of three points, may be 0 near that."""
+    if here > before or here > after:
+        return False
+    curvature = ((after - here) / ahead + (before - here) / back) / (back + ahead)
+    return here <= DEEPER * 0.25 * curvature * max(back, ahead) ** 2
+
+
+@compiled
+def touches(ctx, i, low, high):
+    """Whether surface i is touched between two parts of the step by more than is negligible."""
+    lanes, values = ctx.lanes, ctx.side_between
+    for _ in range(LOOKS):
+        width = (high - low) / (lanes - 1)
+        set_states(ctx, low, width)
+        call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, values)
+        nearest = 0
+        for lane in range(lanes):
+            if values[lane] != ctx.side_ends[0]:
+                return matters(ctx, low, width)
+            if abs(values[lanes * i + lane]) < abs(values[lanes * i + nearest]):
+                nearest = lane
+        if nearest == 0 or nearest == lanes - 1:
+            return False
+        here = lanes * i + nearest
+        if not may_vanish(abs(values[here - 1]), abs(values[here]), abs(values[here + 1]), width, width):
+            return False
+        low, high = low + width * (nearest - 1), low + width * (nearest + 1)
+    return False
+
+
+@compiled
+def set_states(ctx, low, width):
+    """Set states of the polynomial, a lane each, at equidistant parts of the step."""
+    lanes, rows, state = ctx.lanes, ctx.rows, ctx.side_state
+    for lane in range(lanes):
+        c = low + width * lane
+        interpolate(ctx, c, state)
+        ctx.side_times[lane] = ctx.t0 + c * ctx.h
+        for d in range(rows):
+            ctx.sums[lanes * d + lane] = state[d]
+
+
+@compiled
+def matters(ctx, low, width):
+    """Whether beyond the surface the field is farther from its polynomial than is negligible."""
+    lanes, sides, found = ctx.lanes, ctx.side_between, ctx.estimates
+    values = ctx.stages  # the solved step does not need them any more
+    call_field(ctx.field, ctx.side_times, ctx.sums, ctx.par, values)
+    ctx.evaluations += lanes
+    # Unseen for no longer than the states that are looked at.
+    least = ctx.negligible / (abs(ctx.h) * width * (lanes - 1))
+    for d in range(ctx.rows):
+        i = 8 * d
+        smooth = BESIDE * max(max(found[i + 4], found[i + 5]), max(found[i + 6], found[i + 7]))
+        most = max(smooth, least * block_size(ctx, ctx.block[d]))
+        for lane in range(lanes):
+            far = abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * lane))
+            if sides[lane] != ctx.side_ends[0] and far > most:
+                return True
+    return False
+
+
+@compiled
+def polynomial(ctx, d, c):
+    """Return the polynomial of row d of the field at a part of the step, after `interpolate`."""
+    x, gamma, total = 2.0 * c - 1.0, ctx.coefficients, 0.0
+    before, here = 0.0, 1.0
+    for j in range(ctx.s):
+        i = ctx.first + j
+        total += (2.0 * j + 1.0) ** 0.5 * here * gamma[((i // 8) * ctx.padded + d) * 8 + i % 8]
+        before, here = here, ((2.0 * j + 1.0) * x * here - j * before) / (j + 1.0)
+    return total
