@@ -56,9 +56,9 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         round, instead of a process for every visit: ratios within rounds then say more.
     order : {"shuffled", "alternating"}
         Of interleaved rounds: anew in each, or every other one backwards.
-    clock : {"wall", "thread"}
-        Of interleaved times: of the wall, or of the processor's time for this thread, in which
-        other work on the machine does not count.
+    clock : {"wall", "thread", "process"}
+        Of interleaved times: of the wall, or of the processor's time for this thread, or for all threads
+        of this process, in which other work on the machine does not count.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
@@ -67,7 +67,7 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     budget: Positive = 8.0
     interleaved: bool = False
     order: Literal["shuffled", "alternating"] = "shuffled"
-    clock: Literal["wall", "thread"] = "wall"
+    clock: Literal["wall", "thread", "process"] = "wall"
 
 
 class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

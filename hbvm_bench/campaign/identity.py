@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from hbvm_bench.campaign.spec import Spec, parse_spec
 from integrators.kernel.native import store as kept
 from integrators.protocol import MethodBase
 from problems import emit
-from problems.errors import InputError
+from problems.errors import InputError, unknown
 from problems.problem import Problem
 
 OWN_PACKAGES = ("problems", "integrators", "hbvm_bench")
@@ -107,12 +108,26 @@ def typed_problem(text: str) -> Problem:
 
 
 def make_method(text: str) -> MethodBase:
-    """Make the method that ``text`` specifies."""
+    """Make the method that ``text`` specifies; ``peers.alone:Taylor(...)`` is one of a study's own."""
     spec = parse_spec(text)
+    study, _, name = spec.name.rpartition(":")
     try:
-        return integrators.registry.create(spec.name, **spec.arguments)
+        if study:
+            return _of_study(study, name)(**spec.arguments)
+        return integrators.registry.create(name, **spec.arguments)
     except (InputError, ImportError) as error:
         raise InputError(f"{spec}: {error}") from None
+
+
+def _of_study(study: str, name: str) -> type[MethodBase]:
+    """Return a method of `hbvm_bench.studies`, which has them by name in ``METHODS`` of a module."""
+    try:
+        known = import_module(f"hbvm_bench.studies.{study}").METHODS
+    except (ModuleNotFoundError, AttributeError):
+        raise InputError(f"there is no study {study!r} with methods of its own.") from None
+    if name not in known:
+        raise unknown(f"method of {study}", name, known)
+    return known[name]
 
 
 def case_key(case: Case, problem: Problem, method: MethodBase) -> dict[str, Any]:

@@ -4,7 +4,8 @@
 specifications. They are parsed with `ast` against a whitelist of nodes and
 never evaluated, so that a campaign file or a command line cannot run code. In
 ``mine.py:swing(g=1.1)`` the name is that of a function in a Python file, which
-`hbvm_bench.campaign.own` reads where that was asked for.
+`hbvm_bench.campaign.own` reads where that was asked for; in ``peers.alone:Taylor()`` it is that of a method
+in a module of `hbvm_bench.studies`.
 """
 
 import ast
@@ -20,6 +21,7 @@ from problems.errors import InputError
 LONGEST = 4000  # characters; a specification is one line of text
 DEEPEST = 8  # nesting of lists in an argument
 _FILE = re.compile(r"\s*(?P<file>[^\s()'\"][^()'\"]*\.py(@\w+)?):")
+_STUDY = re.compile(r"\s*(?P<file>[a-z_]+(\.[a-z_]+)*):")
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Spec:
     Attributes
     ----------
     name : str
-        Name of a problem or a method in its registry, or ``"mine.py:swing"``.
+        Name of a problem or a method in its registry, ``"mine.py:swing"``, or ``"peers.alone:Taylor"``.
     arguments : dict
         Values by argument name: numbers, strings, booleans, ``None`` and
         tuples of these.
@@ -64,7 +66,7 @@ def parse_spec(text: str) -> Spec:
     """
     if len(text) > LONGEST:
         raise InputError(f"a specification of {len(text)} characters is too long; at most {LONGEST}.")
-    if (found := _FILE.match(text)) is not None:
+    if (found := _FILE.match(text) or _STUDY.match(text)) is not None:
         call = parse_spec(text[found.end() :])
         return Spec(f"{found['file']}:{call.name}", call.arguments)
     line = "".join(" " if character.isspace() else character for character in text)  # columns stay

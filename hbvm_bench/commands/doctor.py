@@ -1,8 +1,6 @@
 """``hbvm-bench doctor | warm``: this machine."""
 
 import os
-import sys
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -11,24 +9,29 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
+from hbvm_bench.campaign.file import load
+from hbvm_bench.campaign.shorter import with_rounds
+from hbvm_bench.commands.listing import as_json as run_as_json
+from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
-from hbvm_bench.store.files import ensure_writable, write_json
 from integrators.kernel.ahead import compile_ahead
 from problems.errors import InputError
 
 UNHEALTHY = 1
+PEERS = "peers"  # the campaign of --peers
 HEADINGS = {"installed": "What is installed", "timings": "Whether times measured here can be trusted"}
 MARKS = {"ok": ("ok", "green"), "note": ("note", "yellow"), "bad": ("bad", "bold red")}
 
 
 def doctor(
+    context: typer.Context,
     peers: Annotated[
         bool, typer.Option("--peers", help="Time every peer through the bench and alone; some minutes.")
     ] = False,
     rounds: Annotated[int | None, typer.Option(min=2, help="Of --peers: times each, in turn.")] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Of --peers: a JSON file for the result.", dir_okay=False)
+        Path | None, typer.Option("--out", help="Of --peers: where results go; default runs/peers.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
 ) -> None:
@@ -38,10 +41,10 @@ def doctor(
     the bench costs a peer more than a twentieth of its time, or one did not run.
     """
     if peers:
-        _peers(rounds, out, as_json)
+        _peers(context, rounds, out, as_json)
         return
     if rounds is not None or out is not None:
-        raise InputError("--rounds and --out belong to --peers: hbvm-bench doctor --peers --out FILE.")
+        raise InputError("--rounds and --out belong to --peers: hbvm-bench doctor --peers --out DIR.")
     findings = examining.examine()
     healthy = examining.healthy(findings)
     if as_json:
@@ -53,28 +56,23 @@ def doctor(
         raise typer.Exit(UNHEALTHY)
 
 
-def _peers(rounds: int | None, out: Path | None, as_json: bool) -> None:
-    from hbvm_bench.studies.peers import check
-    from hbvm_bench.summaries import peers
+def _peers(context: typer.Context, rounds: int | None, out: Path | None, as_json: bool) -> None:
+    from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
+    from hbvm_bench.studies.peers import report
 
-    if out is not None:
-        ensure_writable(out.parent)
-    with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        made = Path(scratch) / "result.json"
-        code = check.in_a_process(made, rounds or check.ROUNDS)
-        result = peers.load(made)
-    if code != 0 or result is None:
-        print(f"hbvm-bench: the process that times the peers ended with exit code {code}.", file=sys.stderr)
-        raise typer.Exit(UNHEALTHY)
-    if out is not None:
-        write_json(out, result)
+    directory = out or Path("runs") / PEERS
+    store = carry_out(with_rounds(load(PEERS), rounds), directory, as_typed(context))
+    results = report_on([store], directory / "report")
+    run = results.runs[-1]
+    found = report.pairs(results, run)
     if as_json:
-        terminal.print_json(result)
+        terminal.print_json(run_as_json(run.index, run.records))
     else:
-        terminal.print_table(peers.table(result))
-        for method, reason in result.refused.items():
-            print(f"{method} did not run: {reason}")
-    if result.refused or any(row.beyond for row in result.rows):
+        terminal.print_table(report.table(found))
+        for one in found:
+            if one.failed:
+                print(f"{one.bench.case.method} on {one.task.problem} did not run: {one.failed}")
+    if not report.healthy(found):
         raise typer.Exit(UNHEALTHY)
 
 

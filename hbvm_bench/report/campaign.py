@@ -186,7 +186,7 @@ def fairness(results: Results) -> Section:
         rows.append((*of, str(len(members)), *(str(kinds[kind]) for kind in KINDS)))
     head = ("method", "library", "settings", *KINDS)
     settings = Table("How many settings each method has", head, rows, words=(0, 1))
-    blocks = [Items(rules, "numbered"), settings, *attempt(provenance.PEERS)]
+    blocks = [Items(rules, "numbered"), settings]
     if excluded := words.excluded(records):
         title = f"{len(excluded)} cases that take part in no ranking, and why"
         blocks.append(Details(title, [Items(excluded)], open=len(excluded) <= LISTED))

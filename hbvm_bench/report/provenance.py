@@ -1,12 +1,11 @@
 """What was measured with: days, versions, machines, and what the machine code is built for."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 
 from hbvm_bench.measure import machine
 from hbvm_bench.report.document import Commands, Section
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import peers
 from hbvm_bench.summaries.table import Table
 
 # Machine code of the libraries: what the times were made with.
@@ -17,8 +16,6 @@ BUILT = {
     "rebound": "generic wheel",
     "scipy": "generic wheel; vector field compiled on this machine by numba",
 }
-
-PEERS: tuple[str, Callable[[], Table | None]] = ("what the bench costs the peers", peers.kept)
 
 
 def days(records: Sequence[Record]) -> str:

@@ -53,7 +53,7 @@ TIMES = (
     "Times are those of whole integrations without output, compiled before, with one thread on one core, in "
     "a pass of their own with no other case running. {visits} {sample} The table gives the median and the "
     "quartiles; all samples are in the store. Compilation is stated apart. Each library goes to the end in "
-    "the way of its own documentation; what the bench adds to its time is in a table below."
+    "the way of its own documentation; what the bench adds to its time is measured by `hbvm-bench run peers`."
 )
 ENDS = "Where the campaign gives the end state itself, that stands in the place of the 128-bit solution."
 WEAKNESSES_TEXT = """
@@ -86,8 +86,10 @@ def timing(plan: TimingPlan) -> str:
         visits = f"Each of {plan.rounds} rounds visits every case once, in a fresh process{alike}"
     else:
         visits = "Every case is visited once, in a fresh process."
-    if plan.interleaved and plan.clock == "thread":
-        visits += " The seconds are the processor's for this thread: waiting for others does not count."
+    if plan.interleaved and plan.clock != "wall":
+        visits += (
+            f" The seconds are the processor's for this {plan.clock}: waiting for others does not count."
+        )
     sample = f"A sample lasts at least {seconds(plan.shortest)}."
     if plan.shortest < SHORTEST_RUN:
         sample = "A sample is one integration."

@@ -23,7 +23,7 @@ from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import fill
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
-from hbvm_bench.summaries.rows import Task
+from hbvm_bench.summaries.rows import Task, by
 from problems.errors import InputError, unknown
 
 LEAST = {"wall_seconds": 0.1, "compile_seconds": 0.1, "memory_gib": 0.1}
@@ -115,18 +115,17 @@ def _ensemble(many: EnsembleEntry) -> None:
 def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:
     """Return the cases by what a campaign calls their problems and ensembles."""
     found: dict[str, list[Resolved]] = {}
-    there = {
-        Task.on(repr(make_problem(fill(entry.use, values))), entry.grid or campaign.grid): name_of(entry)
+    there = [
+        (name_of(entry), Task.on(repr(make_problem(fill(entry.use, values))), entry.grid or campaign.grid))
         for entry in campaign.entries()
         for values in chosen(entry)
-    } | {
-        Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble): name_of(many.entry)
+    ] + [
+        (name_of(many.entry), Task.on(repr(make_problem(many.problem)), ensemble=many.ensemble))
         for many in campaign.ensembles
-    }
-    for name in there.values():
-        found.setdefault(name, [])
-    for one in cases:
-        found[there[Task.of(one.case)]].append(one)
+    ]
+    of_task = by(lambda one: Task.of(one.case), cases)
+    for name, task in there:  # two entries may be one task, as the spans of a quick run
+        found.setdefault(name, []).extend(of_task.get(task, []))
     return found
 
 

@@ -17,7 +17,7 @@ from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, st
 from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
 from hbvm_bench.report.figures.style import MUTED, Look
 from hbvm_bench.report.page import Results, block
-from hbvm_bench.report.provenance import PEERS, again
+from hbvm_bench.report.provenance import again
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Law
 from hbvm_bench.summaries import outcomes, standings
@@ -196,13 +196,6 @@ def measured_on(results: Results) -> Note:
 def errors_and_goals(results: Results) -> list[Table]:
     """Return the tables: the errors with their laws, and the goals."""
     return tables(of(results))
-
-
-@block
-def peers(results: Results) -> Table | None:
-    """Return what the bench costs the peers."""
-    del results
-    return PEERS[1]()
 
 
 @block

@@ -20,6 +20,7 @@ HEADLINE = (
 RANKED_BY = "position_end"
 APART = 0.1  # position error at the end; the trajectory is another one there
 K = TypeVar("K")
+R = TypeVar("R")
 
 GROUPS = {
     "on": "On the trajectory that was asked for",
@@ -81,9 +82,9 @@ def rows(records: Sequence[Record], sort: str | None = None) -> list[Row]:
     return sorted(made, key=lambda row: (order.index(row.group), _sort_value(row, key)))
 
 
-def by(key: Callable[[Record], K], records: Iterable[Record]) -> dict[K, list[Record]]:
+def by(key: Callable[[R], K], records: Iterable[R]) -> dict[K, list[R]]:
     """Return the records that have one key together, in order."""
-    made: dict[K, list[Record]] = {}
+    made: dict[K, list[R]] = {}
     for record in records:
         made.setdefault(key(record), []).append(record)
     return made

@@ -1,110 +1,173 @@
-"""Every peer alone, as its own documentation writes it: what `check` compares the bench with.
+"""Every peer alone, as its own documentation writes it: what the campaign `peers` compares the bench with.
 
-Each function takes a problem and the method whose options to use, prepares and compiles, and returns a
-`Script`. The vector field is emitted from the same traced definition. Two small helpers of our adapters
-take part, in neither of which anything is integrated: `same_arithmetic`, which restores the processor's modes
-after WHFast512, and `_pointer`, which makes an address of REBOUND's a pointer in compiled code.
+``peers.alone:Taylor(tol=1e-15)`` is `integrators.Taylor` with the options that it has, and none of its
+adapter: setting up and compiling are the library's own calls, and the clock runs for one call of the library
+and for reading the state at the end, as it does through the adapter. The vector field is emitted from the
+same definition. Two small helpers of our adapters take part, in neither of which anything is integrated:
+`same_arithmetic`, which restores the processor's modes after WHFast512, and `_pointer`, which makes an
+address of REBOUND's a pointer in compiled code.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import cached_property
+from time import perf_counter
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from integrators.peers import load
-from integrators.protocol import Array, MethodBase
+from integrators.peers import load, rebound, scipy
+from integrators.peers.diffrax import methods as diffrax
+from integrators.peers.heyoka import taylor as heyoka
+from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, Trajectories
 from problems import emit
-from problems.problem import Problem
+from problems.problem import System
 
 
-class Script(NamedTuple):
-    """A library's run in three parts.
+class Call(NamedTuple):
+    """One run of a library, which is set up.
 
     Attributes
     ----------
-    begin : callable
-        ``begin() -> run`` sets up one run; not timed.
     go : callable
-        ``go(run) -> result`` integrates to the end; timed.
+        ``go(t_end)`` integrates to the end; timed.
     end : callable
-        ``end(run, result) -> (steps, y)``: how many steps it took, and the state at the end.
+        ``end(what go returned) -> (steps, y)``: how many steps it took, and the state at the end.
     """
 
-    begin: Callable[[], Any]
-    go: Callable[[Any], Any]
-    end: Callable[[Any, Any], tuple[int, Array]]
+    go: Callable[[float], Any]
+    end: Callable[[Any], tuple[int, Array]]
 
 
-def heyoka(problem: Problem, method: MethodBase) -> Script:
+Begin = Callable[[Array, Array, float], Call]
+"""``begin(y0, par, t0)`` sets up a run; not timed."""
+Script = Callable[[System, Any], Begin]
+"""What compiles a method for a system."""
+
+
+class Program(Compiled):
+    """A library's own calls for one system; satisfies `integrators.protocol.Program`."""
+
+    from_cache: bool | None = None
+
+    def __init__(self, system: System, method: Any, script: Script):
+        started = perf_counter()
+        self.system, self.method = system, method
+        self._begin = script(system, method)
+        self.compile_seconds = perf_counter() - started
+
+    def start(self, y0: Array, par: Array | None = None, t0: float = 0.0) -> "Stepper":
+        """Return a run that is set up."""
+        return Stepper(self._begin(y0, self.system.pack({}) if par is None else par, t0), y0, t0)
+
+
+class Stepper:
+    """A run of a library; satisfies `integrators.protocol.Stepper`, but that it takes no single steps."""
+
+    def __init__(self, call: Call, y0: Array, t0: float):
+        self._call, self.t, self.y = call, t0, y0
+        self.status, self.reason, self.stats = Status.RUNNING, "", Stats()
+
+    def step(self) -> Status:
+        """Refuse."""
+        raise NotImplementedError("a library alone is asked for whole integrations")
+
+    def advance(self, times: Array, *, sample: str | None = None) -> Samples:
+        """Integrate from one of the times to the next, each as the library itself goes to an end."""
+        del sample
+        states = np.empty((times.size, self.y.size))
+        for i, t in enumerate(times.tolist()):
+            if t != self.t:
+                steps, self.y = self._call.end(self._call.go(t))
+                self.t, self.stats.steps = t, steps
+            states[i] = self.y
+        return Samples(times, states, Status.FINISHED)
+
+
+class BatchProgram(Program):
+    """The same with heyoka's batches: ``taylor_adaptive_batch(...).propagate_until([t_end] * lanes)``."""
+
+    def prepare_batch(
+        self, Y0: Array, par: Array | None = None, *, times: Array, t0: float = 0.0
+    ) -> Callable[[], Trajectories]:
+        """Set up as many starts at a time as there are lanes; all have the system's own parameters."""
+        n, lanes = len(Y0), self._batch.batch_size
+        filled = Y0[np.minimum(np.arange(-(-n // lanes) * lanes), n - 1)]
+        parameters = self.system.pack({}) if par is None else np.atleast_2d(par)[0]
+        self._batch.pars[:] = parameters[:, None]
+        end, y = np.full(lanes, times[-1]), np.zeros(filled.shape)
+
+        def go() -> Trajectories:
+            ended = []
+            for i in range(0, len(filled), lanes):
+                self._batch.set_time(t0)
+                self._batch.state[:] = filled[i : i + lanes].T
+                self._batch.propagate_until(end)
+                y[i : i + lanes] = self._batch.state.T
+                ended += self._batch.propagate_res
+            return Trajectories(
+                t=times[-1:],
+                y=y[:n, None],
+                status=[Status.FINISHED] * n,
+                reason=[""] * n,
+                t_stop=np.full(n, times[-1]),
+                steps=np.array([one[3] for one in ended[:n]]),
+            )
+
+        return go
+
+    @cached_property
+    def _batch(self) -> Any:
+        hy = load("heyoka")
+        lanes = hy.recommended_simd_size()
+        return hy.taylor_adaptive_batch(
+            emit.heyoka(self.system),
+            np.zeros((self.system.dim, lanes)),
+            pars=np.zeros((self.system.n_par, lanes)),
+            **self.method.options(defaults=True),
+        )
+
+
+def _heyoka(system: System, method: MethodBase) -> Begin:
     """``taylor_adaptive(...).propagate_until(t_end)``."""
     hy = load("heyoka")
-    ta = hy.taylor_adaptive(
-        emit.heyoka(problem.system),
-        problem.y0.tolist(),
-        pars=problem.par.tolist(),
-        **method.options(defaults=True),
+    made = hy.taylor_adaptive(
+        emit.heyoka(system), [0.0] * system.dim, pars=[0.0] * system.n_par, **method.options(defaults=True)
     )
 
-    def begin() -> Any:
-        ta.time = problem.t0
-        ta.state[:] = problem.y0
-        return ta
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        made.time, made.state[:], made.pars[:] = t0, y0, par
+        return Call(made.propagate_until, lambda ended: (ended[3], made.state.copy()))
 
-    return Script(begin, lambda ta: ta.propagate_until(problem.t_end), lambda ta, made: (made[3], ta.state))
-
-
-def heyoka_batch(problem: Problem, method: MethodBase, starts: Array) -> Script:
-    """``taylor_adaptive_batch(...).propagate_until([t_end] * lanes)``, as many starts at a time as lanes."""
-    hy = load("heyoka")
-    lanes, n = hy.recommended_simd_size(), len(starts)
-    ta = hy.taylor_adaptive_batch(
-        emit.heyoka(problem.system),
-        np.zeros((problem.system.dim, lanes)),
-        pars=np.tile(problem.par[:, None], (1, lanes)),
-        **method.options(defaults=True),
-    )
-    filled = starts[np.minimum(np.arange(-(-n // lanes) * lanes), n - 1)]
-
-    def go(y: Array) -> list[Any]:
-        end, ended = np.full(lanes, problem.t_end), []
-        for i in range(0, len(filled), lanes):
-            ta.set_time(problem.t0)
-            ta.state[:] = filled[i : i + lanes].T
-            ta.propagate_until(end)
-            y[i : i + lanes] = ta.state.T
-            ended += ta.propagate_res
-        return ended
-
-    return Script(
-        lambda: np.zeros(filled.shape), go, lambda y, ended: (sum(one[3] for one in ended[:n]), y[:n])
-    )
+    return begin
 
 
-def rebound(problem: Problem, method: Any) -> Script:
+def _rebound(system: System, method: Any) -> Begin:
     """``sim.integrate(t_end)``: bodies under REBOUND's own gravity, or a particle under a compiled force."""
     library = load("rebound")
     from integrators.peers.rebound.whfast512 import same_arithmetic
 
-    bodies, dof = problem.system.bodies, problem.system.dim // 2
-    force: Any = None if bodies else _force(problem)
+    bodies, dof = system.bodies, system.dim // 2
     name, options = type(method).__name__.lower(), method.options()
     h, mode = options.pop("h", None), options.pop("mode", None)
+    forces: dict[bytes, Any] = {}  # by the parameters, which are written into them; addresses are kept
 
-    def begin() -> Any:
-        sim = library.Simulation()
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        sim: Any = library.Simulation()
         if bodies:
-            parameters = problem.system.unpack(problem.par)
+            parameters = system.unpack(par)
             masses = np.atleast_1d(parameters[bodies.masses])
             sim.G = parameters[bodies.G] if isinstance(bodies.G, str) else bodies.G
-            x, p = problem.y0.reshape(2, -1, 3)
+            x, p = y0.reshape(2, -1, 3)
             for m, (px, py, pz), (vx, vy, vz) in zip(masses, x, p / masses[:, None], strict=True):
                 sim.add(m=m, x=px, y=py, z=pz, vx=vx, vy=vy, vz=vz)
         else:
-            (x, y), (vx, vy) = problem.y0.reshape(2, dof)
+            (x, y), (vx, vy) = y0.reshape(2, dof)
             sim.add(m=1.0, x=x, y=y, vx=vx, vy=vy)
             sim.gravity = "none"
-            sim._additional_forces = type(sim._additional_forces)(force.address)
-        sim.t = problem.t0
+            key = par.tobytes()
+            forces[key] = forces.get(key) or _force(system, par)
+            sim._additional_forces = type(sim._additional_forces)(forces[key].address)
+        sim.t = t0
         sim.integrator = name
         chosen: Any = sim.integrator  # not the name, but what holds its options
         for option, value in options.items():
@@ -120,37 +183,46 @@ def rebound(problem: Problem, method: Any) -> Script:
             sim.dt *= unit
             for particle in sim.particles:
                 particle.vx, particle.vy, particle.vz = (v / unit for v in particle.vxyz)
-            chosen.concatenate_steps = round((problem.t_end - problem.t0) / h)
-        return sim
+            return _in_one_go(sim, chosen, h, t0)
 
-    def go(sim: Any) -> None:
-        if name == "whfast512":
-            with same_arithmetic():
-                sim.integrate((problem.t_end - h / 2) * sim.dt / h, exact_finish_time=0)
-        else:
-            sim.integrate(problem.t_end)
+        def end(made: None) -> tuple[int, Array]:
+            q = np.array([particle.xyz for particle in sim.particles])
+            v = np.array([particle.vxyz for particle in sim.particles])
+            if not bodies:
+                return sim.steps_done, np.concatenate([q.ravel()[:dof], v.ravel()[:dof]])
+            p = v * np.array([[particle.m] for particle in sim.particles])
+            return sim.steps_done, np.concatenate([q.ravel(), p.ravel()])
 
-    def end(sim: Any, made: None) -> tuple[int, Array]:
-        x = np.array([particle.xyz for particle in sim.particles])
-        v = np.array([particle.vxyz for particle in sim.particles])
-        if not bodies:
-            return sim.steps_done, np.concatenate([x.ravel()[:dof], v.ravel()[:dof]])
-        p = v * np.array([[particle.m] for particle in sim.particles])
-        if name == "whfast512":
-            return sim.integrator.concatenate_steps, np.concatenate([x.ravel(), p.ravel() * sim.dt / h])
-        return sim.steps_done, np.concatenate([x.ravel(), p.ravel()])
+        return Call(sim.integrate, end)
 
-    return Script(begin, go, end)
+    def _in_one_go(sim: Any, chosen: Any, h: float, t0: float) -> Call:
+        def go(t_end: float) -> int:
+            chosen.concatenate_steps = round((t_end - t0) / h)
+            if chosen.concatenate_steps:
+                with same_arithmetic():
+                    sim.integrate((t_end - t0 - h / 2) * sim.dt / h, exact_finish_time=0)
+            return chosen.concatenate_steps
+
+        def end(steps: int) -> tuple[int, Array]:
+            q = np.array([particle.xyz for particle in sim.particles])
+            p = np.array([particle.vxyz for particle in sim.particles]) * np.array(
+                [[particle.m] for particle in sim.particles]
+            )
+            return steps, np.concatenate([q.ravel(), p.ravel() * sim.dt / h])
+
+        return Call(go, end)
+
+    return begin
 
 
-def _force(problem: Problem) -> Any:
-    """Return the problem's forces as a C function for ``sim.additional_forces``."""
+def _force(system: System, par: Array) -> Any:
+    """Return the system's forces as a C function for ``sim.additional_forces``."""
     import numba
     from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 
     from integrators.peers.rebound.hooks import _pointer
 
-    kernel, par, dof = emit.numba(problem.system, "force"), problem.par, problem.system.dim // 2
+    kernel, dof = emit.numba(system, "force"), system.dim // 2
     particles = load("rebound").Simulation._particles.offset // 8
 
     @numba.cfunc(types.void(types.voidptr))
@@ -161,53 +233,57 @@ def _force(problem: Problem) -> Any:
     return force
 
 
-def diffrax(problem: Problem, method: Any) -> Script:
+def _diffrax(system: System, method: Any) -> Begin:
     """``jax.jit`` of ``diffeqsolve(ODETerm(f), solver, t0, t_end, dt0, y0)``."""
     dx = load("diffrax", "diffrax", "jax")
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    name, dof = type(method).__name__, problem.system.dim // 2
-    if name == "SemiImplicitEuler":
-        scale, push = emit.jax(problem.system, "velocity_scale"), emit.jax(problem.system, "force")
+    name, dof = type(method).__name__, system.dim // 2
+    halves = name == "SemiImplicitEuler"
+    if halves:
+        scale, push = emit.jax(system, "velocity_scale"), emit.jax(system, "force")
         terms: Any = (
             dx.ODETerm(lambda t, p, par: scale(t, p, par) * p),
             dx.ODETerm(lambda t, q, par: push(t, q, par)),
         )
-        y0: Any = (problem.y0[:dof], problem.y0[dof:])
     else:
-        terms, y0 = dx.ODETerm(emit.jax(problem.system, "field")), problem.y0
+        terms = dx.ODETerm(emit.jax(system, "field"))
     h = getattr(method, "h", None)
     controller = dx.ConstantStepSize() if h else dx.PIDController(rtol=method.rtol, atol=method.atol)
 
     @jax.jit
-    def solve(y0: Any, par: Any) -> Any:
+    def solve(t0: float, t_end: float, y0: Any, par: Any) -> Any:
         return dx.diffeqsolve(
-            terms, getattr(dx, name)(), problem.t0, problem.t_end, h or 0.01, y0, args=par,
+            terms, getattr(dx, name)(), t0, t_end, h or 0.01, y0, args=par,
             stepsize_controller=controller, max_steps=None, adjoint=dx.ForwardMode(),
         )  # fmt: skip
 
-    def end(run: None, solution: Any) -> tuple[int, Array]:
+    def end(solution: Any) -> tuple[int, Array]:
         return int(solution.stats["num_accepted_steps"]), np.concatenate(
             [np.asarray(part)[-1] for part in jax.tree.leaves(solution.ys)]
         )
 
-    return Script(lambda: None, lambda run: jax.block_until_ready(solve(y0, problem.par)), end)
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        start: Any = (y0[:dof], y0[dof:]) if halves else y0
+        return Call(lambda t_end: jax.block_until_ready(solve(t0, t_end, start, par)), end)
+
+    return begin
 
 
-def scipy(problem: Problem, method: Any) -> Script:
+def _scipy(system: System, method: Any) -> Begin:
     """``solve_ivp(f, (t0, t_end), y0, method=..., rtol=..., atol=...)`` with a compiled f."""
     solve_ivp = load("scipy", "scipy.integrate").solve_ivp
-    field, par = emit.numba(problem.system, "field"), problem.par
+    field = emit.numba(system, "field")
+    known = system.jacobian()
+    pattern: Any = cast(Any, known)
+    entries: Any = None if known is None else emit.numba(system, known)
 
-    def f(t: float, y: Array) -> Array:
-        out = np.empty(y.size)
-        field(t, y, par, out)
-        return out
-
-    known = {}
-    if type(method).__name__ == "Radau" and (pattern := problem.system.jacobian()) is not None:
-        entries = emit.numba(problem.system, pattern)
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        def f(t: float, y: Array) -> Array:
+            out = np.empty(y.size)
+            field(t, y, par, out)
+            return out
 
         def jac(t: float, y: Array) -> Array:
             matrix, values = np.zeros((y.size, y.size)), np.empty(pattern.rows.size)
@@ -215,12 +291,42 @@ def scipy(problem: Problem, method: Any) -> Script:
             matrix[pattern.rows, pattern.columns] = values
             return matrix
 
-        known["jac"] = jac
+        name = type(method).__name__
+        options = {"jac": jac} if name == "Radau" and entries is not None else {}
 
-    def go(run: None) -> Any:
-        return solve_ivp(
-            f, (problem.t0, problem.t_end), problem.y0, method=type(method).__name__,
-            rtol=method.rtol, atol=method.atol, **known,
-        )  # fmt: skip
+        def go(t_end: float) -> Any:
+            return solve_ivp(f, (t0, t_end), y0, method=name, rtol=method.rtol, atol=method.atol, **options)
 
-    return Script(lambda: None, go, lambda run, solution: (solution.t.size - 1, solution.y[:, -1]))
+        return Call(go, lambda solution: (solution.t.size - 1, solution.y[:, -1]))
+
+    return begin
+
+
+def _alone(method: type[MethodBase]) -> type[MethodBase]:
+    """Return a method of a library with the library's own calls in the place of our adapter."""
+    script, program = SCRIPTS[method.library]
+
+    def compile(self: MethodBase, system: System) -> Program:  # noqa: A001 -- the protocol's name
+        return program(system, self, script)
+
+    return type(
+        method.__name__, (method,), {"compile": compile, "__module__": __name__, "__doc__": script.__doc__}
+    )
+
+
+SCRIPTS: dict[str, tuple[Script, type[Program]]] = {
+    "heyoka": (_heyoka, BatchProgram),
+    "rebound": (_rebound, Program),
+    "diffrax": (_diffrax, Program),
+    "scipy": (_scipy, Program),
+}
+METHODS = {
+    method.__name__: _alone(method)
+    for method in (
+        heyoka.Taylor,
+        *(rebound.IAS15, rebound.Leapfrog, rebound.WHFast, rebound.WHFast512),
+        *(diffrax.Dopri8, diffrax.ReversibleHeun, diffrax.LeapfrogMidpoint, diffrax.SemiImplicitEuler),
+        *(scipy.DOP853, scipy.Radau),
+    )
+}
+"""By the names of the methods; ``peers.alone:NAME`` in a campaign."""

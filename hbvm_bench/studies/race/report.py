@@ -11,7 +11,7 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.report.document import Details, Items, Note, Section, attempt
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.page import Results, block
-from hbvm_bench.report.provenance import PEERS, again
+from hbvm_bench.report.provenance import again
 from hbvm_bench.studies.race import tables
 from hbvm_bench.studies.race.families import FAMILIES
 from hbvm_bench.studies.race.figures import work_precision
@@ -121,7 +121,6 @@ def terms(results: Results) -> Section:
     families = [f"{family.title}: {family.code}" for family in FAMILIES.values()]
     blocks = [
         Items(rules(of(results)), "numbered"),
-        *attempt(PEERS),
         "What machine code runs:",
         Items(families),
     ]

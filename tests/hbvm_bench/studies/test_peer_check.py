@@ -1,124 +1,169 @@
-"""Every peer through the harness beside its library alone: the same steps to the same end."""
+"""Every peer through the bench beside its library alone: the same steps to the same end."""
 
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 import integrators.registry
 from hbvm_bench import cli
-from hbvm_bench.store.files import write_json
-from hbvm_bench.studies.peers import check
-from hbvm_bench.studies.peers.check import PAIRS
-from hbvm_bench.summaries import peers
-from hbvm_bench.summaries.peers import PeerCheck, Row
+from hbvm_bench.campaign.file import Case, load, name_of
+from hbvm_bench.campaign.identity import make_method, make_problem, resolve
+from hbvm_bench.campaign.shorter import chosen
+from hbvm_bench.campaign.spec import Spec, parse_spec
+from hbvm_bench.measure import batch
+from hbvm_bench.store.records import Compile, Counters, Record, Result, Timing, TimingRound
+from hbvm_bench.store.store import Store
+from hbvm_bench.studies.peers import alone, report
+from hbvm_bench.studies.peers.report import ALONE, Pair
+from hbvm_bench.summaries.rows import Task
+from integrators.protocol import Status
+from problems.errors import InputError
 
 for library in ("heyoka", "rebound", "diffrax"):
     pytest.importorskip(library)
 
-
-def made_up(ratio=1.0, steps=5, alone=0.03, difference=0.0):
-    row = Row(
-        problem="kepler(e=0.6)", method="Taylor()", call="propagate_until",
-        seconds=[ratio * alone] * 3, alone=[alone] * 3, steps=5, alone_steps=steps, difference=difference,
-    )  # fmt: skip
-    return PeerCheck(
-        rows=[row],
-        refused={},
-        machine={"processor": "a processor"},
-        versions={"heyoka": "7"},
-        measured="2026-11-21T00:00:00",
-    )
+CAMPAIGN = load("peers")
+# Of diffrax's methods with a fixed step, which share their code and compile for seconds, one is enough.
+SLOW = ("LeapfrogMidpoint", "ReversibleHeun", "Dopri8(h=")
+SHARE = 0.020033  # of the span: some fifty steps and more, but of the short ones, the last one shortened
+SHORT = (
+    "cr3bp",
+    "kepler(e=0.6, t_end=30.0)",
+    "kepler(e=0.6, t_end=6.0)",
+    "kepler(e=0.6, t_end=300.0)",
+    "outer_solar_system(t_end=600.0)",
+)
 
 
-def test_every_peer_that_is_registered_is_checked():
+def pairs():
+    cases = [case for case in CAMPAIGN.cases() if case.ensemble is None]
+    there = {(case.problem, case.method) for case in cases}
+    for problem, method in sorted(there):
+        if (problem, ALONE + method) in there:
+            marks = [pytest.mark.slow] if method.startswith(SLOW) else []
+            yield pytest.param(problem, method, marks=marks, id=f"{method} on {problem}")
+
+
+def test_every_peer_that_is_registered_is_compared():
     registered = {
         name
         for name in integrators.registry.names()
         if integrators.registry.get(name).library != "hbvm-bench"
     }
-    assert registered == {pair.method.partition("(")[0] for pair in PAIRS}
+    names = {parse_spec(case.method).name for case in CAMPAIGN.cases()}
+    assert registered == set(alone.METHODS) == {name for name in names if not name.startswith(ALONE)}
+    assert {ALONE + name for name in registered} == {name for name in names if name.startswith(ALONE)}
 
 
-# Of diffrax's methods with a fixed step, which share their code and compile for seconds, one is enough.
-SLOW = ("LeapfrogMidpoint", "ReversibleHeun", "Dopri8(h=")
-
-
-@pytest.mark.parametrize(
-    "pair",
-    [pytest.param(pair, marks=[pytest.mark.slow] if pair.method.startswith(SLOW) else []) for pair in PAIRS],
-    ids=[f"{pair.method} on {pair.problem}" for pair in PAIRS],
-)
-def test_the_harness_takes_the_library_s_own_steps_to_its_own_end(pair):
-    result = check.check([pair], rounds=2, short=True, tell=lambda what: None)
-    if result.refused and pair.method.startswith("WHFast512"):
-        pytest.skip(*result.refused.values())
-    assert not result.refused
-    (row,) = result.rows
-    assert row.steps == row.alone_steps >= 50
+@pytest.mark.parametrize(("problem", "method"), list(pairs()))
+def test_the_bench_takes_the_library_s_own_steps_to_its_own_end(problem, method):
+    whole = make_problem(problem)
+    if not problem.startswith(SHORT):
+        spec = parse_spec(problem)
+        whole = make_problem(str(Spec(spec.name, spec.arguments | {"t_end": SHARE * whole.t_end})))
+    ends, steps = [], []
+    for text in (method, ALONE + method):
+        made = make_method(text)
+        if reason := made.accepts(whole):
+            assert method.startswith("WHFast512")
+            pytest.skip(reason)
+        stepper = made.compile(whole.system).start(whole.y0, whole.par, whole.t0)
+        samples = stepper.advance(np.array([whole.t_end]), sample=made.to_end)
+        assert samples.status is Status.FINISHED
+        ends.append(samples.y[-1])
+        steps.append(stepper.stats.steps)
+    assert steps[0] == steps[1] >= 50
     # 0 but for REBOUND's fixed steps, whose clock we set anew: there 2e-12, from the last, shortened step
-    assert row.difference < 1e-10
-    assert len(row.seconds) == len(row.alone) == 2
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-10 * np.abs(ends[1]).max()
+
+
+def test_heyoka_s_own_batch_comes_to_the_same_ends():
+    problem = make_problem("henon_heiles(energy=0.125, q2=0.1, t_end=20.0)")
+    starts = problem.y0 * (1.0 + 0.01 * np.linspace(-1.0, 1.0, 5)[:, None])
+    ours, theirs = (
+        batch.integrate(make_method(text).compile(problem.system), starts, problem)
+        for text in ("Taylor()", f"{ALONE}Taylor()")
+    )
+    assert np.array_equal(ours.y, theirs.y)
+    assert ours.steps == theirs.steps
+
+
+def test_a_method_of_no_study_is_refused():
+    with pytest.raises(InputError, match="there is no study 'nobody'"):
+        make_method("nobody:Taylor()")
+    with pytest.raises(InputError, match=r"unknown method of peers\.alone 'Tailor'"):
+        make_method(f"{ALONE}Tailor()")
+
+
+def test_the_library_alone_is_a_case_of_its_own_with_the_library_s_version():
+    ids = {resolve(Case(problem="kepler()", method=text)).id for text in ("Taylor()", f"{ALONE}Taylor()")}
+    assert len(ids) == 2
+    case = resolve(Case(problem="kepler()", method=f"{ALONE}Taylor()"))
+    assert (case.case.method, case.method.library) == (f"{ALONE}Taylor()", "heyoka")
+
+
+def made_up(ratio=1.0, steps=5, seconds=0.03, difference=0.0):
+    def record(method, seconds, steps):
+        rounds = [
+            TimingRound(samples=[seconds], repeats=1, compile=Compile(seconds=0.0, cached=None), number=i)
+            for i in range(3)
+        ]
+        return Record(
+            id="0" * 64,
+            case=Case(problem="kepler(e=0.6)", method=method),
+            role="peer",
+            library="heyoka",
+            order=None,
+            result=Result(outcome="ok", status="finished", counters=Counters(steps=steps)),
+            timing=Timing(rounds=rounds),
+        )
+
+    bench, other = record("Taylor()", ratio * seconds, 5), record(f"{ALONE}Taylor()", seconds, steps)
+    return Pair(Task.of(bench.case), bench, other, difference)
 
 
 @pytest.mark.parametrize(
-    ("result", "beyond"),
+    ("pair", "beyond"),
     [
-        (made_up(1.05), False),
+        (made_up(1.04), False),
         (made_up(1.06), True),
-        (made_up(1.1, alone=0.0001), False),  # ten microseconds, of a very short run
-        (made_up(1.5, alone=0.0001), True),
-        (made_up(1.0, steps=6), True),
+        (made_up(1.1, seconds=0.0001), False),  # ten microseconds, of a very short run
+        (made_up(1.5, seconds=0.0001), True),
+        (made_up(steps=6), False),  # a last step that is shortened
+        (made_up(steps=7), True),
         (made_up(difference=1e-7), False),  # a clock that is added up
         (made_up(difference=1e-5), True),
     ],
 )
-def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(
-    monkeypatch, tmp_path, result, beyond
-):
-    def in_a_process(out, rounds):
-        write_json(out, result)
-        return 0
-
-    monkeypatch.setattr(check, "in_a_process", in_a_process)
-    assert result.rows[0].beyond is beyond
-    out = tmp_path / "peers.json"
-    assert cli.main(["doctor", "--peers", "--out", str(out)]) == int(beyond)
-    assert peers.load(out) == result
-    assert ("(beyond)" in peers.table(result).rows[0][3]) is beyond
+def test_a_row_is_marked_where_the_bench_costs_too_much_or_steps_differ(pair, beyond):
+    assert pair.beyond is beyond
+    assert report.healthy([pair]) is not beyond
+    assert ("(beyond)" in report.table([pair]).rows[0][2]) is beyond
 
 
-def test_the_reports_print_what_was_kept_with_its_day_machine_and_command():
-    shown = peers.kept()
-    assert shown is not None
-    kept = peers.load()
-    assert kept is not None
-    assert {row.method.partition("(")[0] for row in kept.rows} == {p.method.partition("(")[0] for p in PAIRS}
-    for words in (kept.measured[:10], str(kept.machine["processor"]), "hbvm-bench doctor --peers"):
-        assert words in shown.note
+def test_a_peer_that_did_not_run_is_named_and_not_healthy():
+    failed = msgspec.structs.replace(made_up().bench, result=Result(outcome="refused", reason="no AVX-512"))
+    pair = replace(made_up(), bench=failed)
+    assert pair.failed == "refused: no AVX-512"
+    assert not report.healthy([pair])
+    assert report.table([pair]).rows == []
+    assert not report.healthy([])
 
 
-def test_a_process_that_dies_leaves_nothing(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(check, "in_a_process", lambda out, rounds: -9)
-    out = tmp_path / "peers.json"
-    assert cli.main(["doctor", "--peers", "--out", str(out)]) == 1
-    assert "exit code -9" in capsys.readouterr().err
-    assert not out.exists()
-
-
-def test_a_peer_that_raises_does_not_lose_what_the_others_gave():
-    def raises(problem, method):
-        raise ZeroDivisionError("broken")
-
-    good = next(pair for pair in PAIRS if pair.problem.startswith("cr3bp"))
-    bad = replace(good, alone=raises)
-    result = check.check([good, bad], rounds=2, short=True, tell=lambda what: None)
-    assert len(result.rows) == 1
-    assert result.refused == {f"{bad.method} on {bad.problem}": "ZeroDivisionError: broken"}
-    assert result.sources == peers.digest([good.method])
-
-
-def test_a_result_of_other_sources_says_so():
-    now = msgspec.structs.replace(made_up(), sources=peers.digest(["Taylor()"]))
-    assert "an earlier version" in peers.table(made_up()).note
-    assert "an earlier version" not in peers.table(now).note
+@pytest.mark.slow
+def test_the_command_runs_the_campaign_and_writes_its_page(monkeypatch, tmp_path, capsys):
+    short = chosen(CAMPAIGN, ["kepler-dop853"])
+    short = msgspec.structs.replace(short, ensembles=[])
+    assert [name_of(entry) for entry in short.entries()] == ["kepler-dop853"]
+    monkeypatch.setattr("hbvm_bench.commands.doctor.load", lambda name: short)
+    code = cli.main(["doctor", "--peers", "--rounds", "2", "--out", str(tmp_path / "run")])
+    assert code in (0, 1)  # this machine may be busy
+    assert "DOP853" in capsys.readouterr().out
+    assert "bench / alone" in (tmp_path / "run" / "report" / "report.md").read_text()
+    records = Store(tmp_path / "run").records()
+    assert [len(one.timing.rounds) for one in records] == [2, 2]
+    bench, library = (one.result.counters.steps for one in records)
+    assert abs(bench - library) <= report.A_STEP
+    assert library >= 50

@@ -1,0 +1,156 @@
+"""What the bench costs each peer beside its library alone, from the results of the campaign `peers`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from hbvm_bench.measure import machine
+from hbvm_bench.measure.timing import Spread
+from hbvm_bench.report.document import Block, Items, Note, Section
+from hbvm_bench.report.page import Results, block
+from hbvm_bench.store.kept import Kept
+from hbvm_bench.store.records import Record
+from hbvm_bench.summaries import outcomes
+from hbvm_bench.summaries.rows import Task, at_once, reason_of, tasks
+from hbvm_bench.summaries.rows import seconds as in_words
+from hbvm_bench.summaries.standings import compare
+from hbvm_bench.summaries.table import NONE, Table
+
+ALONE = "peers.alone:"
+
+ALLOWED = 1.05
+"""Largest median of the ratio bench over library."""
+
+OVERHEAD = 2e-5
+"""Seconds a call may take longer whatever its ratio, which is then that of a very short run."""
+
+DIFFERENCE = 1e-6
+"""Most difference of the end states. Measured: 1e-8 for REBOUND, which adds a fixed step to its clock 300,000
+times where our adapter sets it to t0 + n h; 2e-7 for diffrax's LeapfrogMidpoint, whose rounding grows
+over 1,500,000 steps; 0 where steps vary."""
+
+A_STEP = 1
+"""Most difference of the counts of steps: the run that is timed may shorten its last step."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One method through the bench and alone."""
+
+    task: Task
+    bench: Record
+    alone: Record
+    difference: float | None  # largest difference of the states at the end, over the largest component
+
+    @property
+    def ratio(self) -> Spread | None:
+        """Bench over library within each round."""
+        return compare(self.alone, self.bench).ratio
+
+    @property
+    def steps(self) -> tuple[int | None, int | None]:
+        """How many steps each took."""
+        return self.bench.result.counters.steps, self.alone.result.counters.steps
+
+    @property
+    def failed(self) -> str:
+        """Why there is nothing to compare; empty where there is."""
+        return next((reason for one in (self.bench, self.alone) if (reason := reason_of(one))), "")
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the bench costs more than is allowed, takes other steps or comes elsewhere."""
+        bench, alone = self.steps
+        far = self.difference is not None and not self.difference <= DIFFERENCE
+        if far or bench is None or alone is None or abs(bench - alone) > A_STEP:
+            return True
+        spent = [one.timing.summary.get("median", 0.0) for one in (self.bench, self.alone) if one.timing]
+        slow = self.ratio is not None and self.ratio.median > ALLOWED
+        return slow and spent[0] - spent[-1] > OVERHEAD
+
+
+def pairs(results: Results, run: Kept) -> list[Pair]:
+    """Return every method of a run with its library alone, in the order of the campaign."""
+    found = []
+    for task, records in tasks(run.records).items():
+        alone = {one.case.method.removeprefix(ALONE): one for one in records if _is_alone(one)}
+        for one in records:
+            if not _is_alone(one) and one.case.method in alone:
+                other = alone[one.case.method]
+                found.append(Pair(task, one, other, _difference(results, one, other)))
+    return found
+
+
+def healthy(found: Sequence[Pair]) -> bool:
+    """Whether every pair ran and none is beyond what is allowed."""
+    return bool(found) and not any(pair.failed or pair.beyond for pair in found)
+
+
+def table(found: Sequence[Pair]) -> Table:
+    """Return the pairs as a table; those beyond what is allowed are marked."""
+    rows = []
+    for pair in found:
+        if pair.failed:
+            continue
+        ratio, timing = pair.ratio, pair.alone.timing
+        said, spent = NONE, NONE
+        if ratio is not None and timing is not None:
+            low, high = (ratio.median if end is None else end for end in (ratio.low, ratio.high))
+            said, spent = f"{ratio.median:.3f} [{low:.3f}, {high:.3f}]", in_words(median(timing.samples))
+        rows.append(
+            (
+                pair.bench.case.method,
+                pair.task.problem + at_once(pair.task.ensemble),
+                said + " (beyond)" * pair.beyond,
+                spent,
+                *(NONE if count is None else str(count) for count in pair.steps),
+                NONE if pair.difference is None else f"{pair.difference:.0e}",
+            )
+        )
+    return Table(
+        "Every peer through this bench, over the same library alone",
+        (
+            *("method", "problem", "bench / alone", "time alone"),
+            *("steps, bench", "steps, alone", "end states differ by"),
+        ),
+        rows,
+        "Median and quartiles of the ratio of the processor's times in each round, the two in turn in one "
+        f"process, compiled and set up before; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} microseconds a "
+        "call. The end states of REBOUND's fixed steps differ because it adds up its clock, which our "
+        "adapter sets to whole steps.",
+        words=(0, 1),
+    )
+
+
+@block
+def costs(results: Results) -> list[Section]:
+    """Return for each kind of processor the table, what did not run, and where it was measured."""
+    return [
+        Section(kind, [one for run in runs for one in _run(results, run)], key=kind, nav=kind)
+        for kind, runs in results.by_processor.items()
+    ]
+
+
+def _run(results: Results, run: Kept) -> list[Block]:
+    found = pairs(results, run)
+    refused = [f"{one.bench.case.method} on {one.task.problem}: {one.failed}" for one in found if one.failed]
+    libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
+    said = [machine.sentence(run.machine), *outcomes.beside(run.records)]
+    why: list[Block] = ["Not run:", Items(refused)] if refused else []
+    measured = f"Measured on {run.started[:10]} with {libraries}: `{run.command}`"
+    return [table(found), *why, Note(" ".join(said)), measured]
+
+
+def _is_alone(record: Record) -> bool:
+    return record.case.method.startswith(ALONE)
+
+
+def _difference(results: Results, bench: Record, alone: Record) -> float | None:
+    ends = [results.series[one.id].get("y", np.empty(0)) for one in (bench, alone)]
+    if not all(end.size for end in ends) or ends[0].shape != ends[1].shape:
+        return None
+    if bench.case.ensemble is None:
+        ends = [end[-1] for end in ends]
+    return float(np.abs(ends[0] - ends[1]).max() / np.abs(ends[1]).max())
