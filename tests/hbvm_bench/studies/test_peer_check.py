@@ -161,7 +161,7 @@ def test_the_command_runs_the_campaign_and_writes_its_page(monkeypatch, tmp_path
     code = cli.main(["doctor", "--peers", "--rounds", "2", "--out", str(tmp_path / "run")])
     assert code in (0, 1)  # this machine may be busy
     assert "DOP853" in capsys.readouterr().out
-    assert "bench / alone" in (tmp_path / "run" / "report" / "report.md").read_text()
+    assert "bench / alone" in (tmp_path / "run" / "report" / "README.md").read_text()
     records = Store(tmp_path / "run").records()
     assert [len(one.timing.rounds) for one in records] == [2, 2]
     bench, library = (one.result.counters.steps for one in records)
