@@ -1,14 +1,16 @@
 """Runs that nobody ran: records and series made up, for the tests of the reports."""
 
+import hashlib
 import sys
 from pathlib import Path
+from statistics import median
 
 import msgspec
 import numpy as np
 
 import problems
 from hbvm_bench.campaign.file import Campaign, Case, Grid, MethodEntry, TimingPlan
-from hbvm_bench.campaign.identity import is_ours, resolve
+from hbvm_bench.campaign.identity import Resolved, resolve
 from hbvm_bench.measure import machine, raw, reading
 from hbvm_bench.reference import solutions
 from hbvm_bench.report.page import Results
@@ -27,6 +29,53 @@ METHODS = (
     "Leapfrog(h=0.02, order=8)",
     "Radau(rtol=1e-6, atol=1e-8)",
 )
+
+COMPILED = Compile(seconds=0.1, cached=True)
+
+
+def record(case="m()", times=(), **given):
+    """Return a record that nobody measured.
+
+    ``case`` is the text of a method, a case or a resolved one; ``times`` are the seconds of interleaved
+    rounds, ``None`` for one that it was left out of. What is given goes to the record, its case or its
+    result, whichever has a field of the name; metrics may be numbers, and those that are ``None`` are left
+    out. All metrics are void where a violation is given.
+    """
+    mine = {struct: {key: given.pop(key) for key in struct.__struct_fields__ if key in given}
+            for struct in (Case, Result)}  # fmt: skip
+    if isinstance(case, Resolved):
+        given = {"id": case.id, "library": case.method.library} | given
+        case = case.case
+    if isinstance(case, str):
+        case = Case(**{"problem": "p()", "method": case} | mine[Case])
+    result = {"outcome": "ok", "status": "finished", "metrics": {}} | mine[Result]
+    rounds = timed(times)
+    seconds = {"warm_seconds": median(one.samples[0] for one in rounds)} if rounds else {}
+    why = result.get("violation", "")
+    result["metrics"] = {
+        key: one if isinstance(one, Value) else Value(value=one, void=bool(why), why=why)
+        for key, one in (seconds | result["metrics"]).items()
+        if one is not None
+    }
+    fields = {
+        "id": hashlib.sha256(f"{case.problem}{case.method}".encode()).hexdigest(),
+        "role": "ours" if case.method.startswith(("HBVM(", "Gauss(")) else "peer",
+        "library": "x",
+        "order": None,
+        "timing": Timing(rounds=rounds) if rounds else None,
+        "versions": {"numpy": "2"},
+        "finished": "2026-01-02T03:04:05+00:00",
+    }
+    return Record(case=case, result=Result(**result), **fields | given)
+
+
+def timed(times, calibration=()):
+    """Return interleaved rounds of one sample each; ``None`` for one that was left out."""
+    return [
+        TimingRound(samples=[one], repeats=1, compile=COMPILED, calibration=list(calibration), number=place)
+        for place, one in enumerate(times)
+        if one is not None
+    ]
 
 
 def made_up(method, number):
@@ -58,17 +107,13 @@ def made_up(method, number):
         method=resolved.method,
     )
     result, series = raw.of_solution(solution)
-    rounds = [
-        TimingRound(samples=[0.01 * (number + 1), 0.02], repeats=2, compile=Compile(seconds=0.1, cached=True))
-    ]
-    timing = None if stalled else Timing(rounds=rounds)
+    visit = TimingRound(samples=[0.01 * (number + 1), 0.02], repeats=2, compile=COMPILED)
+    timing = None if stalled else Timing(rounds=[visit])
     result = msgspec.structs.replace(result, reason=HOSTILE if stalled else "")
-    record = Record(
-        id=resolved.id, case=resolved.case, role="ours" if is_ours(resolved.method) else "peer",
-        library=resolved.method.library, order=None, result=result, timing=timing,
-        versions={"python": "3"}, machine={"cores": 2}, finished="2026-11-21T10:00:00+00:00",
-    )  # fmt: skip
-    return reading.read(record, series), series
+    made = msgspec.structs.replace(
+        record(resolved, timing=timing, versions={"python": "3"}, machine={"cores": 2}), result=result
+    )
+    return reading.read(made, series), series
 
 
 def raw_of(result):
@@ -81,9 +126,9 @@ def sitnikov(store):
     store.prepare()
     ids = []
     for number, method in enumerate(METHODS):
-        record, series = made_up(method, number)
-        store.save(msgspec.structs.replace(record, result=raw_of(record.result)), series)
-        ids.append(record.id)
+        made, series = made_up(method, number)
+        store.save(msgspec.structs.replace(made, result=raw_of(made.result)), series)
+        ids.append(made.id)
     notes = {4: HOSTILE}
     campaign = Campaign(
         name="x",
@@ -146,29 +191,20 @@ def write(store, texts, count, *, missing=0):
                 plan=TimingPlan(rounds=1),
                 machine=machine.describe(),
             )
-            record = Record(
-                id=resolved.id,
-                case=resolved.case,
-                role="ours" if is_ours(resolved.method) else "peer",
-                library=resolved.method.library,
-                order=None,
-                result=Result(
-                    outcome="stalled" if stalled else "ok",
-                    status="stalled" if stalled else "finished",
-                    reason="its step fell to 1e-20" if stalled else "",
-                    t_stop=50.0 if stalled else 100.0,
-                    counters=Counters(steps=100 + number),
-                    metrics=metrics,
-                ),
+            made = record(
+                resolved,
+                outcome="stalled" if stalled else "ok",
+                status="stalled" if stalled else "finished",
+                reason="its step fell to 1e-20" if stalled else "",
+                t_stop=50.0 if stalled else 100.0,
+                counters=Counters(steps=100 + number),
+                metrics=metrics,
                 timing=None if stalled else timing,
                 versions={"python": "3"},
                 machine={"cores": 2},
-                finished="2026-11-21T10:00:00+00:00",
             )
             nowhere = dict.fromkeys(("position_t", "position", "phase"), np.empty(0))
-            store.save(
-                record, {"t": t, "y": y, "error.energy": error, "distance": np.ones_like(t), **nowhere}
-            )
+            store.save(made, {"t": t, "y": y, "error.energy": error, "distance": np.ones_like(t), **nowhere})
     campaign = Campaign(
         name="large",
         title="A large campaign",

@@ -9,8 +9,8 @@ from hbvm_bench.campaign.file import Case, Grid, Limits
 from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.run import loop
-from hbvm_bench.store.records import Record, Result
 from problems.errors import InputError
+from tests.hbvm_bench.made_up_run import record
 
 METHOD = '\n[[methods]]\nuse = "Gauss(s=2, h=0.5)"\n'
 GOOD = 'name = "x"\nproblems = ["sitnikov()"]\n'
@@ -119,19 +119,13 @@ def test_ours_are_ours():
 
 def test_a_case_that_hit_a_limit_runs_again_under_a_larger_one():
     old = Limits(wall_seconds=10, memory_gib=1)
-    case = Case(problem="p", method="m")
-
-    def record(outcome):
-        result = Result(outcome=outcome)
-        return Record(id="0", case=case, role="peer", library="x", order=None, result=result, limits=old)
-
     same, larger = Limits(wall_seconds=10, memory_gib=1), Limits(wall_seconds=20, memory_gib=2)
     assert not loop.is_done(None, same)
     for outcome in ("ok", "stalled", "crashed", "refused"):
-        assert loop.is_done(record(outcome), larger)
+        assert loop.is_done(record(outcome=outcome, limits=old), larger)
     for outcome in ("timeout", "killed"):
-        assert loop.is_done(record(outcome), same)
-        assert not loop.is_done(record(outcome), larger)
+        assert loop.is_done(record(outcome=outcome, limits=old), same)
+        assert not loop.is_done(record(outcome=outcome, limits=old), larger)
 
 
 def test_times_are_doubles():

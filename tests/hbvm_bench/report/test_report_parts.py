@@ -77,7 +77,7 @@ def test_runs_are_merged_and_of_two_alike_the_later_is_taken(tmp_path):
     assert content.missing(content.runs[0]) == []
     made = document([first, second])
     assert made.title.startswith("2 runs together")
-    assert "Measured on 2026-11-21 to 2026-11-22" in markdown(made)
+    assert "Measured on 2026-01-02 to 2026-11-22" in markdown(made)
     assert [look.number for look in made.looks] == [1, 2, 3, 4]  # one look on every problem
 
 

@@ -5,25 +5,14 @@ import multiprocessing
 import numpy as np
 import pytest
 
-from hbvm_bench.campaign.file import Case
 from hbvm_bench.store.files import atomic, ensure_writable
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Compile, Timing, TimingRound, Value
 from hbvm_bench.store.store import Store
 from problems.errors import InputError
+from tests.hbvm_bench import made_up_run
 
 ID = "0123456789abcdef" * 4
-
-
-def record(**changes):
-    fields = {
-        "id": ID,
-        "case": Case(problem="p()", method="m()"),
-        "role": "peer",
-        "library": "x",
-        "order": None,
-        "result": Result(outcome="ok", metrics={"energy_max": Value(value=1e-15)}),
-    }
-    return Record(**(fields | changes))
+RECORD = made_up_run.record(id=ID, metrics={"energy_max": 1e-15})
 
 
 @pytest.fixture
@@ -35,8 +24,8 @@ def store(tmp_path):
 
 def test_what_is_saved_is_loaded(store):
     series = {"t": np.arange(3.0), "y": np.array([[1.0], [np.nan], [np.inf]])}
-    store.save(record(), series)
-    assert store.load(ID) == record()
+    store.save(RECORD, series)
+    assert store.load(ID) == RECORD
     loaded = store.series(ID)
     assert loaded.keys() == series.keys()
     assert all(np.array_equal(loaded[k], series[k], equal_nan=True) for k in series)
@@ -44,7 +33,7 @@ def test_what_is_saved_is_loaded(store):
 
 def test_a_missing_cut_or_foreign_record_is_not_there(store):
     assert store.load(ID) is None
-    store.save(record())
+    store.save(RECORD)
     path = store.cases / f"{ID[:24]}.json"
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
@@ -57,14 +46,14 @@ def test_a_missing_cut_or_foreign_record_is_not_there(store):
 
 def test_series_that_are_missing_or_cut_are_empty(store):
     assert store.series(ID) == {}
-    store.save(record(), {"t": np.arange(100.0)})
+    store.save(RECORD, {"t": np.arange(100.0)})
     path = store.cases / f"{ID[:24]}.npz"
     path.write_bytes(path.read_bytes()[:50])
     assert store.series(ID) == {}
 
 
 def test_pickles_are_not_read(store):
-    store.save(record())
+    store.save(RECORD)
     with (store.cases / f"{ID[:24]}.npz").open("wb") as stream:
         np.savez(stream, t=np.array([{"a": 1}], dtype=object))
     assert store.series(ID) == {}
@@ -113,7 +102,7 @@ def test_no_metric_is_nan_or_infinite(bad):
 
 
 def test_a_record_is_json_that_anyone_can_read(store):
-    store.save(record(result=Result(outcome="stalled", status="stalled", t_stop=8.5, reason='"<é>')))
+    store.save(made_up_run.record(id=ID, outcome="stalled", status="stalled", t_stop=8.5, reason='"<é>'))
     text = (store.cases / f"{ID[:24]}.json").read_text(encoding="utf-8")
     parsed = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert parsed["result"]["reason"] == '"<é>'

@@ -12,10 +12,11 @@ from hbvm_bench.campaign.identity import is_ours, resolve
 from hbvm_bench.cli import main
 from hbvm_bench.report.page import gather
 from hbvm_bench.store.kept import Kept
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.studies import automatic
 from problems.errors import InputError, UnknownNameError
+from tests.hbvm_bench.made_up_run import record, timed
 
 
 def made(machine, ratio=2.0, problem="kepler", worse=1.0):
@@ -27,27 +28,12 @@ def made(machine, ratio=2.0, problem="kepler", worse=1.0):
         ours = is_ours(case.method)
         times = [1.0, 1.1] if ours else [ratio, 1.1 * ratio]
         metrics = {
-            "energy_max": Value(value=1e-15 * (worse if ours else 2.0)),
-            "position_mean": Value(value=1e-12 * (1.0 if ours else 2.0)),
-            "warm_seconds": Value(value=times[0]),
-            "steps": Value(value=10.0),
+            "energy_max": 1e-15 * (worse if ours else 2.0),
+            "position_mean": 1e-12 * (1.0 if ours else 2.0),
+            "steps": 10.0,
         }
-        rounds = [
-            TimingRound(samples=[one], repeats=1, compile=Compile(seconds=0.1, cached=True), number=i)
-            for i, one in enumerate(times)
-        ]
         records.append(
-            Record(
-                id=case.id,
-                case=case.case,
-                role="ours" if ours else "peer",
-                library=case.method.library,
-                order=None,
-                result=Result(outcome="ok", status="finished", metrics=metrics),
-                timing=Timing(rounds=rounds, machine=machine),
-                versions={"numpy": "2"},
-                finished="2026-01-02T03:04:05+00:00",
-            )
+            record(case, times, metrics=metrics, timing=Timing(rounds=timed(times), machine=machine))
         )
     index = Index(
         campaign=campaign, ids=[one.id for one in records], version="0", command="hbvm-bench automatic"

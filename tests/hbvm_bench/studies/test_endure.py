@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from hbvm_bench.campaign.file import load as load_campaign
-from hbvm_bench.campaign.identity import is_ours, resolve
+from hbvm_bench.campaign.identity import resolve
 from hbvm_bench.cli import main
 from hbvm_bench.measure import drift
 from hbvm_bench.report.page import document, gather
 from hbvm_bench.report.write import write
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound
+from hbvm_bench.store.records import Timing
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.studies import endure
+from tests.hbvm_bench.made_up_run import record, timed
 
 OURS = "Gauss(s=8, h=1.0)"
 PEER = "Taylor(tol=1e-16)"
@@ -36,34 +37,22 @@ def made(directory, years=1e6, starts=8, size=1e-17, bias=0.0):
             walk = np.cumsum(rng.standard_normal(t.size - 1) * np.sqrt(np.diff(t)))
             walks[case.id].append(size * walk + bias * t[1:])
     for case, seconds in zip(cases, (0.5, 9.0), strict=True):
-        store.save(*record(case, t, np.array(walks[case.id]), seconds))
+        store.save(*drifted(case, t, np.array(walks[case.id]), seconds))
     store.write_index(
         Index(campaign=campaign, ids=[case.id for case in cases], version="0", command="hbvm-bench endure")
     )
     return endure.of(gather([store]))
 
 
-def record(case, t, errors, seconds):
-    timing = Timing(
-        rounds=[
-            TimingRound(samples=[seconds], repeats=1, compile=Compile(seconds=0.1, cached=True), number=0)
-        ],
-        machine={"processor": "one"},
-    )
+def drifted(case, t, errors, seconds):
+    timing = Timing(rounds=timed([seconds]), machine={"processor": "one"})
     series = {
         "t": t,
         "y": np.tile(case.problem.y0, (t.size, 1)),
         "drift.t": t[1:],
         "drift.energy": errors,
     }
-    result = Result(outcome="ok", status="finished", t_stop=float(t[-1]))
-    role = "ours" if is_ours(case.method) else "peer"
-    kept = Record(
-        id=case.id, case=case.case, role=role, library=case.method.library, order=None, result=result,
-        timing=timing, versions={"numpy": "2"}, machine={"processor": "one"},
-        finished="2026-01-02T03:04:05+00:00",
-    )  # fmt: skip
-    return kept, series
+    return record(case, t_stop=float(t[-1]), timing=timing, machine={"processor": "one"}), series
 
 
 def test_samples_are_whole_years_with_the_powers_of_ten():

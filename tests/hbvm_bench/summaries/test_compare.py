@@ -12,12 +12,13 @@ from hbvm_bench import cli
 from hbvm_bench.campaign.file import Campaign, MethodEntry
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.store.merge import merge
-from hbvm_bench.store.records import Compile, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Compile, Result, Timing, TimingRound, Value
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import compare as comparing
 from hbvm_bench.summaries.compare import compare
 from hbvm_bench.summaries.export import export
 from problems.errors import InputError
+from tests.hbvm_bench import made_up_run
 
 VALUES = {"energy_max": 3e-16, "position_end": 2.5e-7, "steps": 1000.0, "warm_seconds": 0.01}
 
@@ -48,18 +49,13 @@ def make(folder, count=3, seed=0, prefix="0", edit=lambda number, record: record
     store.prepare()
     store.write_index(Index(campaign=campaign, ids=ids, version="1", command="hbvm-bench run x"))
     for number, (id_, case) in enumerate(zip(ids, cases, strict=True)):
-        metrics = {key: Value(value=value) for key, value in VALUES.items()}
-        record = Record(
+        record = made_up_run.record(
+            case,
             id=id_,
-            case=case,
-            role="peer",
-            library="rebound",
-            order=15,
-            result=Result(outcome="ok", status="finished", metrics=metrics),
+            metrics=VALUES,
             timing=timing(rng),
             versions={"rebound": "5.2.2"},
             machine={"processor": "x"},
-            finished="2026-11-21T10:00:00+00:00",
         )
         if (edited := edit(number, record)) is not None:
             nowhere = dict.fromkeys(("position_t", "position", "phase"), np.empty(0))

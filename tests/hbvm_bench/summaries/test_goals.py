@@ -3,55 +3,33 @@
 import pytest
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Campaign, Case, Goal, MethodEntry, ProblemEntry, parse
+from hbvm_bench.campaign.file import Campaign, Goal, MethodEntry, ProblemEntry, parse
 from hbvm_bench.commands.run import dated
-from hbvm_bench.store.records import Compile, Load, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Load, Timing, Value
 from hbvm_bench.store.store import Index, Store
 from hbvm_bench.summaries import goals, standings
 from problems.errors import InputError, UnknownNameError
+from tests.hbvm_bench import made_up_run
 
 PROBLEM = "kepler(e=0.6)"
 TIGHT = {"energy_max": 1e-13, "position_end": 1e-10}
 
 
-def record(method, times, energy, position, role="peer", violation="", **more):
-    """Return a record timed in interleaved rounds; ``None`` for a round that it was left out of."""
-    taken = [one for one in times if one is not None]
-    rounds = [
-        TimingRound(samples=[one], repeats=1, compile=Compile(seconds=0.1, cached=True), number=i)
-        for i, one in enumerate(times)
-        if one is not None
-    ]
-    void = bool(violation)
-    metrics = {
-        "energy_max": Value(value=energy) if energy is not None else Value(why="no samples"),
-        "position_end": Value(value=position, void=void)
-        if position is not None
-        else Value(why="no reference"),
-        "warm_seconds": Value(value=sorted(taken)[len(taken) // 2], void=void)
-        if taken
-        else Value(why="not timed"),
-    }
-    return Record(
-        id=method,
-        case=Case(problem=PROBLEM, method=method, settings=more.pop("settings", "chosen")),
-        role=role,
-        library="",
-        order=None,
-        result=Result(outcome="ok", status="finished", metrics=metrics, violation=violation),
-        timing=Timing(rounds=rounds),
-    )
+def record(method, times, energy, position, **more):
+    """Return a record timed in interleaved rounds."""
+    metrics = {"energy_max": energy, "position_end": position}
+    return made_up_run.record(method, times, problem=PROBLEM, metrics=metrics, **more)
 
 
 RECORDS = [
-    record("Gauss(s=8, h=0.2)", [0.9, 1.0, 1.2], 2e-12, 1e-9, "ours"),
-    record("Gauss(s=8, h=0.1)", [1.8, 2.0, 2.4], 5e-14, 5e-11, "ours"),
-    record("HBVM(k=16, s=8, h=0.2)", [1.4, 1.5, 1.6], 1e-14, 1e-8, "ours"),
+    record("Gauss(s=8, h=0.2)", [0.9, 1.0, 1.2], 2e-12, 1e-9),
+    record("Gauss(s=8, h=0.1)", [1.8, 2.0, 2.4], 5e-14, 5e-11),
+    record("HBVM(k=16, s=8, h=0.2)", [1.4, 1.5, 1.6], 1e-14, 1e-8),
     record("Taylor(tol=1e-12)", [13.0, 15.0, 17.0], 3e-11, 2e-8),
     record("Taylor()", [27.0, 30.0, 36.0], 2e-15, 1e-12, settings="default"),
     record("IAS15()", [5.0, 5.0, 5.0], 1e-15, 1e-12, violation="another trajectory"),
     record("WHFast(h=0.1)", [None, 6.0, None], 5e-11, 3e-9),
-    record("DOP853()", [50.0, 50.0, 50.0], 1e-14, None),
+    record("DOP853()", [50.0, 50.0, 50.0], 1e-14, Value(why="no reference")),
 ]
 
 
@@ -147,7 +125,7 @@ def test_a_goal_has_a_number_of_its_own_or_a_ratio_to_a_peer(given):
 
 def test_a_ratio_lies_within_its_quartiles():
     """Where a machine changes its speed during the rounds, the ratio of the medians does not."""
-    ours = record("Gauss(s=8, h=0.1)", [1.0, 1.0, 2.0, 2.0, 2.0], 1e-14, 1e-12, "ours")
+    ours = record("Gauss(s=8, h=0.1)", [1.0, 1.0, 2.0, 2.0, 2.0], 1e-14, 1e-12)
     theirs = record("Taylor()", [3.0, 3.0, 3.0, 6.0, 6.0], 1e-14, 1e-12)
     ratio = standings.compare(ours, theirs).ratio
     # of the medians 1.5; of the rounds 3, 3, 1.5, 3, 3
@@ -157,8 +135,8 @@ def test_a_ratio_lies_within_its_quartiles():
 
 def test_the_rounds_that_choose_a_setting_do_not_compare_it():
     """A setting that was lucky in the rounds that choose is chosen, and its luck is not in the ratio."""
-    lucky = record("Gauss(s=8, h=0.1)", [1.0, 4.0, 4.0, 1.0], 1e-14, 1e-12, "ours")
-    steady = record("Gauss(s=8, h=0.2)", [2.0, 2.0, 2.0, 2.0], 1e-14, 1e-12, "ours")
+    lucky = record("Gauss(s=8, h=0.1)", [1.0, 4.0, 4.0, 1.0], 1e-14, 1e-12)
+    steady = record("Gauss(s=8, h=0.2)", [2.0, 2.0, 2.0, 2.0], 1e-14, 1e-12)
     theirs = record("Taylor()", [8.0, 8.0, 8.0, 8.0], 1e-14, 1e-12)
     found = judged(Goal(against="Taylor", ratio=3.0), [lucky, steady, theirs])
     assert found.comparison.ours.case.method == "Gauss(s=8, h=0.1)"
@@ -167,7 +145,7 @@ def test_the_rounds_that_choose_a_setting_do_not_compare_it():
 
 
 def test_a_single_round_says_that_it_chose_what_it_compares():
-    ours = [record(f"Gauss(s=8, h={h})", [1.0], 1e-14, 1e-12, "ours") for h in (0.1, 0.2)]
+    ours = [record(f"Gauss(s=8, h={h})", [1.0], 1e-14, 1e-12) for h in (0.1, 0.2)]
     found = judged(Goal(against="Taylor", ratio=3.0), [*ours, record("Taylor()", [8.0], 1e-14, 1e-12)])
     assert found.verdict == "reached"
     assert found.why == "of the rounds that chose the settings, for there are no others"

@@ -3,40 +3,23 @@ import math
 import pytest
 from msgspec.structs import replace
 
-from hbvm_bench.campaign.file import Case, Ensemble, Grid
-from hbvm_bench.store.records import Compile, Law, Load, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.campaign.file import Ensemble, Grid
+from hbvm_bench.store.records import Compile, Law, Load, Timing, TimingRound, Value
 from hbvm_bench.summaries import laws, needs, outcomes, points, rows
+from tests.hbvm_bench import made_up_run
 
 
-def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **options):
+def record(method, problem="kepler()", seconds=1.0, position=1e-9, energy=1e-14, **more):
     metrics = {
-        "warm_seconds": Value(value=seconds),
-        "position_end": Value(value=position),
-        "phase_end": Value(value=position),
-        "energy_max": Value(value=energy),
-        "distance_max": Value(value=1.0),
+        "warm_seconds": seconds,
+        "position_end": position,
+        "phase_end": position,
+        "energy_max": energy,
+        "distance_max": 1.0,
     }
-    result = Result(
-        outcome=options.pop("outcome", "ok"),
-        status=options.pop("status", "finished"),
-        reason=options.pop("reason", ""),
-        violation=options.pop("violation", ""),
-        metrics=options.pop("metrics", metrics),
-        laws=options.pop("laws", {}),
-    )
-    case = Case(problem=problem, method=method, settings=options.pop("settings", "recommended"))
-    if options.pop("many", False):
-        case = Case(problem=problem, method=method, ensemble=Ensemble(count=3))
-    return Record(
-        id=f"{problem}{method}{len(options)}",
-        case=case,
-        role="peer",
-        library="heyoka" if method.startswith("Taylor") else "hbvm-bench",
-        order=None,
-        result=result,
-        versions={"heyoka": "7.13"},
-        **options,
-    )
+    fields = {"metrics": metrics, "settings": "recommended", "versions": {"heyoka": "7.13"}} | more
+    library = "heyoka" if method.startswith("Taylor") else "hbvm-bench"
+    return made_up_run.record(method, problem=problem, library=library, **fields)
 
 
 RUN = [
@@ -64,7 +47,7 @@ def test_the_front_is_what_nothing_beats_in_both():
 
 
 def test_an_ensemble_is_in_no_summary_of_single_trajectories():
-    many = record("Taylor()", many=True)
+    many = record("Taylor()", ensemble=Ensemble(count=3))
     assert points.by_problem([many]) == {}
     assert needs.profile([many], {"position_end": 1e-4}, "warm_seconds").ratios == {}
     assert outcomes.matrix([many]) == ([], {})

@@ -6,7 +6,7 @@ from rich.console import Console
 from hbvm_bench.campaign.file import Case
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.report.terminal import results
-from hbvm_bench.store.records import Record, Result, Value
+from hbvm_bench.store.records import Value
 from hbvm_bench.summaries.rows import (
     columns,
     format_value,
@@ -19,15 +19,13 @@ from hbvm_bench.summaries.rows import (
     status_of,
 )
 from problems.errors import InputError
+from tests.hbvm_bench import made_up_run
 
 
-def record(method, *, position=None, note="", **result):
-    metrics = {"energy_max": Value(value=1e-15)}
-    if position is not None:
-        metrics["position_end"] = Value(value=position, void="violation" in result)
-    fields = {"outcome": "ok", "status": "finished", "metrics": metrics} | result
-    case = Case(problem="p()", method=method, note=note)
-    return Record(id=method, case=case, role="peer", library="x", order=None, result=Result(**fields))
+def record(method, *, position=None, **more):
+    """Return a record that is called by its method."""
+    metrics = {"energy_max": 1e-15, "position_end": position} | more.pop("metrics", {})
+    return made_up_run.record(method, id=method, metrics=metrics, **more)
 
 
 FAR = record("far()", position=1.0)
@@ -128,8 +126,7 @@ def test_columns_are_the_headline_ones_that_exist_or_those_asked_for():
 
 
 def test_a_method_has_one_number_on_all_problems():
-    other = Record(id="x", case=Case(problem="q()", method="near()"), role="peer", library="x", order=None,
-                   result=Result(outcome="ok"))  # fmt: skip
+    other = made_up_run.record("near()", id="x", problem="q()")
     assert numbers([FAR, NEAR, other]) == {"far()": 1, "near()": 2, "x": 2}
 
 

@@ -1,73 +1,39 @@
-import hashlib
-
 import msgspec
 import pytest
 
-from hbvm_bench.campaign.file import Case
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.campaign.shorter import chosen, quick_run
 from hbvm_bench.store.kept import Kept
-from hbvm_bench.store.records import Compile, Counters, Load, Record, Result, Timing, TimingRound, Value
+from hbvm_bench.store.records import Counters, Load, Timing
 from hbvm_bench.store.store import Index
 from hbvm_bench.studies.race import results
 from hbvm_bench.studies.race.probe import Probe
 from hbvm_bench.studies.race.results import Race
-from tests.hbvm_bench.made_up_run import archived
+from tests.hbvm_bench import made_up_run
+from tests.hbvm_bench.made_up_run import archived, timed
 
 MACHINE = {"processor": "<b>fast</b> | one"}
+PROBLEM = repr(make_problem("outer_solar_system(t_end=1200.0)"))
 
 
-def record(method, seconds, energy, position, role="peer", **more):
+def record(method, seconds, energy, position, **more):
     """Return a case of three rounds about a median."""
     times = more.pop("times", [0.9 * seconds, seconds, 1.2 * seconds])
-    void = more.pop("void", "")
-    timing = Timing(
-        rounds=[
-            TimingRound(
-                samples=[one],
-                repeats=2,
-                compile=Compile(seconds=0.1, cached=True),
-                calibration=[(0.0101, 0.01, 0.0102)[place]],
-                number=place,
-            )
-            for place, one in enumerate(times)
-            if one is not None
-        ],
-        machine=MACHINE,
-        process="one",
-        call=1e-5,
-        load=Load(others=0.08, stolen=0.0),
-    )
-    numbers = {
-        "energy_max": energy,
-        "position_end": position,
-        "steps": 100.0,
-        "warm_seconds": timing.summary.get("median"),
-    }
-    metrics = {
-        key: Value(value=number, void=bool(void), why=void)
-        for key, number in numbers.items()
-        if number is not None
-    }
-    problem = make_problem("outer_solar_system(t_end=1200.0)")
-    return Record(
-        id=hashlib.sha256(method.encode()).hexdigest(),
-        case=Case(problem=repr(problem), method=method, grid=results.declared().grid),
-        role=role,
+    rounds = timed(times, calibration=[0.01])
+    more["metrics"] = {"energy_max": energy, "position_end": position, "steps": 100.0}
+    made = made_up_run.record(
+        method,
+        times,
+        problem=PROBLEM,
+        grid=results.declared().grid,
+        counters=Counters(steps=100),
         library="",
-        order=None,
-        result=Result(
-            outcome=more.pop("outcome", "ok"),
-            status=more.pop("status", "finished"),
-            reason=more.pop("reason", ""),
-            violation=void,
-            counters=Counters(steps=100),
-            metrics=metrics,
-        ),
-        timing=timing if timing.rounds else None,
-        versions={"numpy": "2"},
-        finished="2026-01-02T03:04:05+00:00",
+        **more,
     )
+    timing = Timing(
+        rounds=rounds, machine=MACHINE, process="one", call=1e-5, load=Load(others=0.08, stolen=0.0)
+    )
+    return msgspec.structs.replace(made, timing=timing if rounds else None)
 
 
 @pytest.fixture
@@ -78,15 +44,15 @@ def race():
 def made_up(**said):
     """Return a small race with every kind of row, and what is said for machine, versions and command."""
     records = [
-        record("Gauss(s=8, h=2.0)", 0.001, 2e-12, 1e-9, "ours"),
-        record("Gauss(s=8, h=1.5)", 0.002, 5e-14, 5e-11, "ours"),
-        record("HBVM(k=16, s=8, h=2.0)", 0.0015, 1e-14, 1e-8, "ours"),
+        record("Gauss(s=8, h=2.0)", 0.001, 2e-12, 1e-9),
+        record("Gauss(s=8, h=1.5)", 0.002, 5e-14, 5e-11),
+        record("HBVM(k=16, s=8, h=2.0)", 0.0015, 1e-14, 1e-8),
         record("Taylor(tol=1e-12)", 0.015, 3e-11, 2e-8),
         record("Taylor()", 0.03, 2e-15, 1e-12),
         record(
             "IAS15()", 0.0, None, None, outcome="stalled", status="stalled", reason="stood still", times=[]
         ),
-        record("IAS15(mode='global')", 0.05, 1e-15, 1e-12, void="another trajectory", times=[]),
+        record("IAS15(mode='global')", 0.05, 1e-15, 1e-12, violation="another trajectory", times=[]),
         record("WHFast(h=0.5)", 0.006, 5e-11, 3e-9, times=[None, 0.006, None]),
         record("Leapfrog(h=0.1)", 0.0, None, None, outcome="refused", status="", reason="no", times=[]),
     ]
