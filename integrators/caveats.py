@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.invariants import evaluate
+from problems.analysis.ranges import leaves_range
 from problems.analysis.structure import has_kinks, switches_in_time
 from problems.calculus.function import Function
 from problems.double_double import DD
@@ -41,13 +42,24 @@ down to 1e-270, 7e-12 at 1e-283, 4e-6 at 1e-290, 0.3 at 1e-300.
 Array = NDArray[np.float64]
 
 
-def warnings(problem: Problem, caveat: str | None, extra: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the sentences on kinks, and on a start that is too small.
+def warnings(
+    problem: Problem,
+    start: Array,
+    par: Array,
+    end: Array | None,
+    caveat: str | None,
+    extra: Mapping[str, Any],
+) -> tuple[str, ...]:
+    """Return the sentences on kinks, on a start that is too small, and on units that do not suit it.
 
     Parameters
     ----------
     problem : Problem
         What was integrated.
+    start, par : ndarray, shapes (dim,) and (n_par,)
+        From where, and with which parameters.
+    end : ndarray, shape (dim,), optional
+        The last state known.
     caveat : str or None
         What the method says of the problem.
     extra : mapping
@@ -57,9 +69,16 @@ def warnings(problem: Problem, caveat: str | None, extra: Mapping[str, Any]) -> 
     if caveat is None and not kinks and implicit and implicit["steps"]:
         caveat = unseen_in_time(problem, f"kinks are not looked for in its {implicit['steps']} Newton steps")
     said = () if caveat is None else (caveat,)
-    if 0.0 < (size := float(np.abs(problem.y0).max(initial=0.0))) < TINY:
+    if 0.0 < (size := float(np.abs(start).max(initial=0.0))) < TINY:
         said += (
             f"the start is as small as {size:.1e}, where doubles have too few digits; take other units.",
+        )
+    elif any(
+        leaves_range(problem.system, problem.t0, state, par) for state in (start, end) if state is not None
+    ):
+        said += (
+            "numbers that the field is calculated from are beyond the range of doubles, though the state "
+            "is not: errors may have any size; take other units.",
         )
     if not kinks:
         return said

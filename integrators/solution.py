@@ -216,7 +216,8 @@ class Solution:
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what a user should know about a solution although it did not fail."""
         problem, extra = self.problem, self.stats.extra
-        said = warnings(problem, self.method.caveat(problem), extra)
+        end = self.y[-1] if self.t.size else None
+        said = warnings(problem, problem.y0, problem.par, end, self.method.caveat(problem), extra)
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
         conserved = {} if extra.get("sample") == "dense" else self.method.conserved(problem.system)

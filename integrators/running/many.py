@@ -91,8 +91,10 @@ class Solutions(Trajectories):
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
         lost = lost_invariants(problem.system, conserved, self.starts, self.t, self.y, self.par, self.steps)
         return [
-            warnings(problem, caveat, self.extra.get(i, {})) + of_losses(losses)
-            for i, losses in enumerate(lost)
+            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses)
+            for i, (start, par, end, losses) in enumerate(
+                zip(self.starts, self.par, self.y[:, -1], lost, strict=True)
+            )
         ]
 
     @property

@@ -150,8 +150,8 @@ def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
 def numpy(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
 
-    ``y`` is (dim,) or (dim, n), the result (m,) or (m, n). Division by zero and
-    the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
+    ``y`` is (dim,) or (dim, n), the result (m,) or (m, n), of long doubles if ``y`` is of these.
+    Division by zero and the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
     if isinstance(system, Foreign) and what == "field":
         return partial(_foreign_on_arrays, system)
@@ -188,11 +188,12 @@ def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
         inner = _executed(made, {"np": np, **_SPECIAL})
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
-            y = np.asarray(y, dtype=np.float64)
-            par = np.asarray(par, dtype=np.float64)
+            y = np.asarray(y)
+            dtype = np.longdouble if y.dtype == np.longdouble else np.float64
+            y, par = np.asarray(y, dtype), np.asarray(par, dtype)
             if par.ndim == 1 and y.ndim == 2:
                 par = par[:, np.newaxis]
-            out = np.empty((n_out, *y.shape[1:]))
+            out = np.empty((n_out, *y.shape[1:]), dtype)
             with np.errstate(all="ignore"):
                 inner(t, y, par, out)
             return out
