@@ -196,6 +196,7 @@ class Control:
     def take(self) -> None:
         """Take the step, and aim at the next one, in the lanes where that is all."""
         from integrators.kernel.step.control import SHORTEST, is_good
+        from integrators.kernel.step.sums import time_after
 
         w, b = self.w, self.w.b
         slots = Group.slots
@@ -209,8 +210,7 @@ class Control:
         )
         self.aim()
         length = w.h * self.factor
-        t, low = self.row("t0").two_sum(w.h)
-        t, low = t.two_sum(low + self.row("time_low"))
+        t, low = time_after(self.row("t0"), self.row("time_low"), w.h)
         rest, since = (self.row("stop") - t) - low, self.row("since") + 1.0
         good = self.all(
             good,

@@ -13,7 +13,7 @@ def _run() -> Any:
     return run
 
 
-run = Engine(_run, "group side budget", *SOURCES, "step/rule")
+run = Engine(_run, "group side budget", *SOURCES, "step/rule", "step/sums")
 """``run(group, side, budget)``: see `integrators.kernel.ensemble.loop`."""
 
 

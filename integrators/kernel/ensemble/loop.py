@@ -3,9 +3,9 @@
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import call_steps
 from integrators.kernel.step.rule import FIRST_RATE
+from integrators.kernel.step.sums import time_of_step
 
 group_at = view(Group)
 
@@ -68,10 +68,9 @@ def part_step(group, side, sample):
     copy(group.velocity, side.velocity, lanes * group.rows)
     copy(group.values, side.values, lanes * group.rows * group.k)
     for lane in range(lanes):
-        n, h = float(group.n), group.h[lane]
-        elapsed = n * h
-        side.t0[lane], lost = two_sum(group.t0[lane], elapsed)
-        side.time_low[lane] = lost + fma(n, h, -elapsed)
+        side.t0[lane], side.time_low[lane] = time_of_step(
+            group.t0[lane], group.time_low[lane], float(group.n), group.h[lane]
+        )
         side.h[lane] = part
         side.alive[lane], side.sweeps[lane] = group.alive[lane], 0.0
         side.rate[lane] = group.rate[lane]  # not that of another partial step

@@ -186,6 +186,8 @@ class Steps(Writer):
 
     def begin(self) -> None:
         """Set what stages have besides the state and the values, and the time of the step."""
+        from integrators.kernel.step.sums import part_of_drift, time_of_step  # imports numba
+
         b, form = self.b, self.form
 
         def row(d: Index) -> None:
@@ -198,29 +200,26 @@ class Steps(Writer):
             kh = self.h * self.get(self.velocity, d)
             if not form.unit:
                 self.put(self.h * kh if form.varying else kh, self.factor, d)
-            u, u_low = self.drift(d, kh)
+            drift = self.drift(d, kh)
 
             def stage(i: Index) -> None:
                 c, c_low = self.number(self.nodes, i), self.number(self.nodes_low, i)
-                low = c.fma(u_low, c_low.fma(u, error))
-                self.put(c.fma(u, low), self.base, self.at(i, form.rows, d))
+                self.put(part_of_drift(c, c_low, *drift, error), self.base, self.at(i, form.rows, d))
 
             self.each(form.k, stage)
 
         self.each_row(row)
-        # t0 + n h, as a sum of two doubles
         slots = Group.slots
         n = Value(b, splat(b, b.sitofp(b.load(self.word(slots["n"])), DOUBLE), form.lanes))
-        elapsed = n * self.h
-        self.t, lost = self.get(self.array(slots["t0"])).two_sum(elapsed)
-        self.t_low = lost + n.fma(self.h, -elapsed) + self.get(self.array(slots["time_low"]))
+        t0, time_low = (self.get(self.array(slots[name])) for name in ("t0", "time_low"))
+        self.t, self.t_low = time_of_step(t0, time_low, n, self.h)
 
     def drift(self, d: Index, kh: Value) -> tuple[Value, Value]:
         """Return kh (p + its error) as a sum of two doubles."""
+        from integrators.kernel.step.sums import drift  # imports numba
+
         momentum = self.at(1, self.form.rows, d)
-        p, error = self.get(self.state, momentum), self.get(self.error, momentum)
-        u = kh * p
-        return u, kh.fma(error, kh.fma(p, -u))
+        return drift(kh, self.get(self.state, momentum), self.get(self.error, momentum))
 
     def sizes(self) -> None:
         """Set what a change of the values is: that of the stages which follows from it, beside their block.

@@ -29,8 +29,9 @@ from integrators.kernel.events.value import context, forget_states, noise_at, st
 from integrators.kernel.events.zeros import find_zeros
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.lanes import two_sum
 from integrators.kernel.step.sample import write
+from integrators.kernel.step.sums import time_of_step
 from integrators.kernel.step.sweep import project
 
 DEEPEST = 8  # times that a step is halved where samples do not resolve a function
@@ -72,9 +73,7 @@ def entry(address, memory):
 @compiled
 def set_start(ctx, search):
     """Set the time and the state of the last own step."""
-    elapsed = ctx.n * ctx.h
-    search.time, lost = two_sum(ctx.t0, elapsed)
-    search.time_low = lost + fma(float(ctx.n), ctx.h, -elapsed) + ctx.time_low
+    search.time, search.time_low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
     write(ctx, ctx.state, search.step_state)
 
 

@@ -7,11 +7,12 @@ formed; the state is a compensated pair whose error enters the stages.
 
 from integrators.kernel.context import RUNNING
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
+from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.simd.operations import binary_log
 from integrators.kernel.step.size import take_sizes
 from integrators.kernel.step.stages import offset
+from integrators.kernel.step.sums import drift, part_of_drift, time_of_step
 from integrators.kernel.step.sweep import multiply, product, product_for_one, product_of_two, project, through
 from integrators.kernel.tables import PER_OCTAVE, THROUGH
 
@@ -49,13 +50,10 @@ def set_step(ctx, h):
 @compiled
 def set_times(ctx):
     """Set the stages' times to t0 + n h + c h, with t0 and n h as sums of two doubles."""
-    h, n = ctx.h, float(ctx.n)
-    elapsed = n * h
-    t, lost = two_sum(ctx.t0, elapsed)
-    low = splat8(lost + fma(n, h, -elapsed) + ctx.time_low)
+    t, low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
     times, nodes = ctx.times, ctx.nodes
     for chunk in range(ctx.chunks):
-        put(times, 8 * chunk, t + fma(get(nodes, 8 * chunk), splat8(h), low))
+        put(times, 8 * chunk, t + fma(get(nodes, 8 * chunk), splat8(ctx.h), splat8(low)))
 
 
 @compiled
@@ -73,22 +71,21 @@ def prepare(ctx):
             for d in range(rows):
                 put(base, lanes * d, spread(row_error, d))
         return
-    drift, drift_low, factor = ctx.row_drift, ctx.row_drift_low, ctx.drift_factor
+    row_drift, row_drift_low, factor = ctx.row_drift, ctx.row_drift_low, ctx.drift_factor
     for i in range((rows + 3) // 4):
         z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-        u = kh * z
+        moved, moved_low = drift(kh, z, e)
         put_upper(row_state, 4 * i, z)
         put_upper(row_error, 4 * i, e)
-        put_lower(drift, 4 * i, u)
-        put_lower(drift_low, 4 * i, fma(kh, e, fma(kh, z, -u)))
+        put_lower(row_drift, 4 * i, moved)
+        put_lower(row_drift_low, 4 * i, moved_low)
     nodes, nodes_low = ctx.nodes, ctx.nodes_low
     for chunk in range(ctx.chunks):
         c, c_low = get(nodes, 8 * chunk), get(nodes_low, 8 * chunk)
         base = ctx.base + offset(ctx, chunk)
         for d in range(rows):
-            u = spread(drift, d)
-            low = fma(c, spread(drift_low, d), fma(c_low, u, spread(row_error, d)))
-            put(base, lanes * d, fma(c, u, low))
+            moved, moved_low = spread(row_drift, d), spread(row_drift_low, d)
+            put(base, lanes * d, part_of_drift(c, c_low, moved, moved_low, spread(row_error, d)))
 
 
 # --- first stages ---------------------------------------------------------------------------------

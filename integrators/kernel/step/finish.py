@@ -11,6 +11,7 @@ from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_rests, swap, total
 from integrators.kernel.simd.operations import fma, two_sum
 from integrators.kernel.step.stages import offset
+from integrators.kernel.step.sums import drift
 
 
 @compiled
@@ -77,16 +78,16 @@ def added(state, error, h, mean, rest):
 
 
 @for_both_widths
-def moved_by(state, error, drift, drift_low, h, factor, mean, rest):
-    """As `added`, of what also drifts, by drift + drift_low, and whose increment has another factor.
+def moved_by(state, error, moved, moved_low, h, factor, mean, rest):
+    """As `added`, of what also drifts, by moved + moved_low, and whose increment has another factor.
 
     Positions are moved like that in the second-order form, with the factor h q' / p.
     """
-    drifted, left = two_sum(state, drift)
+    drifted, left = two_sum(state, moved)
     increment, rest = times(h, mean, rest)
     increment, rest = times(factor, increment, rest)
-    moved, lost = two_sum(drifted, increment)
-    return two_sum(moved, ((drift_low + error) + left) + (rest + lost))
+    whole, lost = two_sum(drifted, increment)
+    return two_sum(whole, ((moved_low + error) + left) + (rest + lost))
 
 
 @compiled
@@ -127,10 +128,9 @@ def finish(ctx):
         factor, kick = ctx.drift_factor, ctx.kick_factor
         for i in range((rows + 3) // 4):
             z, e, kh = get(state, 8 * i), get(error, 8 * i), get(factor, 8 * i)
-            drift = kh * z
-            drift_low = fma(kh, e, fma(kh, z, -drift))
+            moved, moved_low = drift(kh, z, e)
             force, rest = impulses(ctx, 4 * i)
-            new, lost = moved_by(z, e, swap(drift), swap(drift_low), splat8(h), get(kick, 8 * i), force, rest)
+            new, lost = moved_by(z, e, swap(moved), swap(moved_low), splat8(h), get(kick, 8 * i), force, rest)
             put(next_state, 8 * i, new)
             put(next_error, 8 * i, lost)
             damage += new * 0.0

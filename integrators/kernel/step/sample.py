@@ -2,7 +2,6 @@
 
 from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSEEN, UNSOLVED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import fma, two_sum
 from integrators.kernel.simd.memory import get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
@@ -11,6 +10,7 @@ from integrators.kernel.step.finish import arrive, finish
 from integrators.kernel.step.handover import settle_part
 from integrators.kernel.step.kinks import keep_end_of_part
 from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.sums import time_of_step
 from integrators.kernel.step.sweep import project
 
 
@@ -111,11 +111,8 @@ def part_step(ctx, side, part, known):
     set_step(side, part)
     copy(ctx.state, side.state, vectors_of_state(ctx))
     copy(ctx.error, side.error, vectors_of_state(ctx))
-    n, h = float(ctx.n), ctx.h
-    elapsed = n * h
     side.n = 0
-    side.t0, lost = two_sum(ctx.t0, elapsed)
-    side.time_low = lost + fma(n, h, -elapsed) + ctx.time_low
+    side.t0, side.time_low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
     rewind(side)
     prepare(side)
     if known != 0.0:

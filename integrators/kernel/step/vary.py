@@ -19,7 +19,6 @@ from integrators.kernel.context import (
     UNSOLVED,
 )
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.lanes import two_sum
 from integrators.kernel.simd.operations import binary_log, least
 from integrators.kernel.step.begin import FARTHEST, INFINITY, begin, on_table, set_step
 from integrators.kernel.step.control import (
@@ -46,6 +45,7 @@ from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import count, crosses, keep_end, kink, undo
 from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
+from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -377,7 +377,7 @@ def reject(ctx, outcome, factor, implicit):
 @compiled
 def take(ctx):
     """Take the step ahead, which is solved."""
-    t, low = two_sum(ctx.t0, ctx.h)
+    t, low = time_after(ctx.t0, ctx.time_low, ctx.h)
     keep_end(ctx)
     ctx.behind_state, ctx.state, ctx.next_state = ctx.state, ctx.next_state, ctx.behind_state
     ctx.behind_error, ctx.error, ctx.next_error = ctx.error, ctx.next_error, ctx.behind_error
@@ -385,7 +385,6 @@ def take(ctx):
     ctx.n = ctx.restful = 0
     if ctx.asks < 0:
         ctx.asks = ctx.asks + 1 if ctx.asks < -1 else 1
-    t, low = two_sum(t, low + ctx.time_low)
     ctx.t0 = t
     ctx.time_low = low
     ctx.next_length = ctx.length_after

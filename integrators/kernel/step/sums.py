@@ -1,0 +1,32 @@
+"""Sums of two doubles in a step, for one trajectory and for lanes: times, and what stages share."""
+
+from integrators.kernel.native.jit import for_both_widths
+from integrators.kernel.simd.operations import fma, two_sum
+
+
+@for_both_widths
+def time_of_step(t0, time_low, n, h):
+    """Return the time after n steps of length h, t0 + time_low + n h, and what it lacks."""
+    elapsed = n * h
+    t, lost = two_sum(t0, elapsed)
+    return t, lost + fma(n, h, -elapsed) + time_low
+
+
+@for_both_widths
+def time_after(t0, time_low, h):
+    """Return the time after a step of length h, t0 + time_low + h, and what it lacks."""
+    t, lost = two_sum(t0, h)
+    return two_sum(t, lost + time_low)
+
+
+@for_both_widths
+def drift(kh, p, error):
+    """Return kh (p + error), by which a position moves in a step without a force, and what it lacks."""
+    moved = kh * p
+    return moved, fma(kh, error, fma(kh, p, -moved))
+
+
+@for_both_widths
+def part_of_drift(c, c_low, moved, moved_low, error):
+    """Return what the stage at the node c + c_low has of a drift, and of what the state lacks."""
+    return fma(c, moved, fma(c, moved_low, fma(c_low, moved, error)))
