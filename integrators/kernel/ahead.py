@@ -7,6 +7,7 @@ from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.events.engine import look
 from integrators.kernel.implicit.engine import solver
 from integrators.kernel.line.engine import line
+from integrators.kernel.native import lowered
 from integrators.kernel.step.engine import steps
 
 ENGINES = {
@@ -37,6 +38,11 @@ def compile_ahead(processes: int = 1) -> dict[str, float | None]:
         return dict(map(_compile, ENGINES))
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         return dict(pool.map(_compile, ENGINES))
+
+
+def lower() -> None:
+    """Write the bitcode that every machine of this system can start from, where the package is built."""
+    lowered.write({engine.key: engine.lower() for engine in ENGINES.values()})
 
 
 def _compile(name: str) -> tuple[str, float | None]:

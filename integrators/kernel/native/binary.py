@@ -154,49 +154,77 @@ def build(
     numba.core.errors.NumbaError
         If it cannot be compiled for these types.
     """
-    return _compiled(
-        function, arguments, returns, lambda machine, module: machine.emit_object(module), around
-    )
+    with _alone():
+        return _optimized(_linked(function, arguments, returns, around), _object)
+
+
+def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> bytes:
+    """Return what `build` makes machine code of, as bitcode: the same for all processors of a system."""
+    with _alone():
+        return _linked(function, arguments, returns).as_bitcode()
+
+
+def build_lowered(bitcode: bytes) -> bytes:
+    """Return the object file that `build` makes, of what `lower` has returned; without numba.
+
+    Raises
+    ------
+    RuntimeError
+        If this LLVM cannot read it.
+    """
+    with _alone():
+        return _optimized(llvm.parse_bitcode(bitcode), _object)
 
 
 def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
     """Return the machine code that `build` makes, as text."""
-    return _compiled(function, arguments, returns, lambda machine, module: machine.emit_assembly(module))
+    with _alone():
+        made = _linked(function, arguments, returns)
+        return _optimized(made, lambda machine, module: machine.emit_assembly(module))
 
 
-def _compiled(
+def _linked(
     function: Any,
     arguments: Sequence[tuple[Any, str]],
     returns: str,
-    emit: Callable[[Any, Any], Made],
     around: Callable[[str], str] | None = None,
-) -> Made:
+) -> Any:
+    """Return a module of the `ENTRY` and all that it calls."""
     from integrators.kernel.native import jit  # imports numba
 
-    with lock, _uncollected():
-        module, inner = jit.module(function, tuple(kind for kind, _ in arguments))
-        entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
-        module.link_in(llvm.parse_assembly(entry))
-        for value in [*module.functions, *module.global_variables]:
-            if not value.is_declaration and value.name != ENTRY:
-                value.linkage = "internal"
-        machine = _machine()
-        options = llvm.create_pipeline_tuning_options(speed_level=3)
-        builder = llvm.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(module, builder)
-        return emit(machine, module)
+    module, inner = jit.module(function, tuple(kind for kind, _ in arguments))
+    entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
+    module.link_in(llvm.parse_assembly(entry))
+    for value in [*module.functions, *module.global_variables]:
+        if not value.is_declaration and value.name != ENTRY:
+            value.linkage = "internal"
+    return module
+
+
+def _optimized(module: Any, emit: Callable[[Any, Any], Made]) -> Made:
+    """Return what is emitted of a module that is optimized for this processor."""
+    machine = _machine()
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return emit(machine, module)
+
+
+def _object(machine: Any, module: Any) -> bytes:
+    return machine.emit_object(module)
 
 
 @contextmanager
-def _uncollected() -> Iterator[None]:
-    """Leave garbage where it is meanwhile: looking for it takes a tenth of a compiler's time."""
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collecting:
-            gc.enable()
+def _alone() -> Iterator[None]:
+    """Let one thread compile, and leave garbage where it is: looking for it takes a tenth of the time."""
+    with lock:
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            if collecting:
+                gc.enable()
 
 
 def processor() -> str:

@@ -3,17 +3,18 @@
 import ctypes
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
-from integrators.kernel.native import binary, store
+from integrators.kernel.native import binary, lowered, store
 from integrators.kernel.native.raised import Interrupts, calls_back, raise_kept
 
 # What the entry of `step` can do; see `integrators.kernel.step.entry`.
 RESET, ADVANCE, WALK, PART = range(4)
 ENTRY = "what ctx side between count times targets parts first out budget"
 
-WAIT = "integrators: compiling the kernel for this processor, once: 5 to 10 s (ahead: `hbvm-bench warm`)"
+WAIT = "integrators: compiling the kernel for this processor, once: 2 to 10 s (ahead: `hbvm-bench warm`)"
 
 
 def _say_what_is_waited_for() -> None:
@@ -43,11 +44,21 @@ class Engine:
 
         def make() -> tuple[str, bytes]:
             _say_what_is_waited_for()
-            from numba import types
-
-            return " ", binary.build(self._make(), [(types.int64, "i64")] * len(self._arguments), "i64")
+            if (bitcode := lowered.get(self.key)) is not None:
+                with suppress(RuntimeError):
+                    return " ", binary.build_lowered(bitcode)
+            return " ", binary.build(*self._compiled())
 
         return binary.obtain(self.key, make)
+
+    def lower(self) -> bytes:
+        """Return it as bitcode; see `integrators.kernel.native.lowered`."""
+        return binary.lower(*self._compiled())
+
+    def _compiled(self) -> tuple[Any, list[tuple[Any, str]], str]:
+        from numba import types
+
+        return self._make(), [(types.int64, "i64")] * len(self._arguments), "i64"
 
     @property
     def key(self) -> str:
