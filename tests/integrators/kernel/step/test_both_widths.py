@@ -1,0 +1,97 @@
+"""A rule that is written once gives the same bits for one trajectory and in lanes."""
+
+import ctypes
+from typing import Any
+
+import numpy as np
+import pytest
+from llvmlite import ir
+
+from integrators.kernel.native import binary, field
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.native.memory import aligned
+from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
+from integrators.kernel.simd.operations import opposite, where
+from integrators.kernel.simd.values import Value
+from integrators.kernel.step.control import as_errors_allow, as_iterations_allow, bounded, log_of_order
+from integrators.kernel.step.estimate import is_visible, local_error, size_in_step
+from integrators.kernel.step.finish import added, moved_by
+from integrators.kernel.step.size import inverse_sizes
+from integrators.kernel.step.stopping import further, judge, left_over, stagnates
+
+LANES, ROWS = 8, 8
+
+
+def stopping(t, y, par, out):
+    best, stalled, rate, converged, rest = judge(y[0], y[1], y[2], y[3], -y[4], y[5], y[6], 0.0)
+    over = converged | stagnates(y[7], stalled)
+    out[0], out[1], out[2] = best, stalled, rate
+    out[3] = where(over, further(left_over(converged, rest, best), rate, -61.0), -1.0)
+
+
+def sizes(t, y, par, out):
+    out[0], out[1] = inverse_sizes(y[0], y[1], 1e-6, y[2], y[3])
+    out[2] = size_in_step(y[4], y[5])
+    out[3] = where(opposite(is_visible(y[5], y[6], y[7])), local_error(y[5], y[6], y[7], y[4]), 0.0)
+
+
+def control(t, y, par, out):
+    error, defect = log_of_order(y[0], 0.05), log_of_order(y[1], 0.04)
+    factor = as_errors_allow(error, -y[2], -y[3], defect, -y[4], -y[5], y[6] < 1.0, y[7] - 1.0)
+    out[0] = factor
+    out[1] = bounded(factor, 2.0)
+    out[2] = as_iterations_allow(factor, y[2], y[3], y[4], y[5])
+    out[3] = error
+
+
+def ends(t, y, par, out):
+    out[0], out[1] = added(y[0], y[1], y[2], y[3], y[4])
+    out[2], out[3] = moved_by(y[0], y[1], y[5], y[6], y[2], y[7], y[3], y[4])
+
+
+def on_rows(rule):
+    """Return LLVM's text of the rule on rows."""
+    module, kind = ir.Module(), vector(LANES)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 4), binary.ENTRY)
+    b = ir.IRBuilder(function.append_basic_block())
+    inputs, outputs = (b.inttoptr(function.args[i], kind.as_pointer()) for i in (1, 3))
+
+    def place(base, i):
+        return b.gep(base, [ir.Constant(INTEGER, i)])
+
+    y = [Value(b, b.load(place(inputs, i), align=ALIGNMENT)) for i in range(ROWS)]
+    out: list[Any] = [None] * 4
+    rule(None, y, None, out)
+    for i, value in enumerate(out):
+        b.store(value.value, place(outputs, i), align=ALIGNMENT)
+    b.ret_void()
+    return text_of(module)
+
+
+def results(code, inputs):
+    call = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 4)(binary.load(code))
+    out = []
+    for block in inputs:
+        y, found = aligned(ROWS * LANES), aligned(4 * LANES)
+        y[:] = block.reshape(-1)
+        call(0, y.ctypes.data, 0, found.ctypes.data)
+        out.append(found)
+    return np.array(out)
+
+
+@compiled
+def nothing():
+    """Be compiled, for the text that takes its place."""
+
+
+@pytest.mark.parametrize("rule", [stopping, sizes, control, ends])
+def test_a_rule_gives_the_same_bits_for_a_number_and_for_a_row(rule):
+    random = np.random.default_rng(1)
+    inputs = 10.0 ** random.uniform(-20, 2, size=(500, ROWS, LANES))
+    chosen = random.uniform(size=inputs.shape)
+    inputs[chosen < 0.1] = random.choice([0.0, 1.0, 3.0, np.inf, np.nan], size=(chosen < 0.1).sum())
+    alone = results(field.build_one_by_one(rule, LANES), inputs)
+    in_lanes = results(binary.build(nothing, [], around=lambda inner: on_rows(rule)), inputs)
+    assert np.array_equal(alone, in_lanes, equal_nan=True)
+    assert np.isfinite(alone).mean() > 0.5
+    assert np.unique(alone).size > 1000
