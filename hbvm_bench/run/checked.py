@@ -7,6 +7,9 @@ found out hours later, or never. What types can say is said where the file is re
 import math
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from hbvm_bench.campaign.entries import Page
 from hbvm_bench.campaign.file import (
     Campaign,
     EnsembleEntry,
@@ -21,6 +24,7 @@ from hbvm_bench.campaign.grid import Grid
 from hbvm_bench.campaign.identity import Resolved, is_ours, make_problem
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.campaign.sweep import fill
+from hbvm_bench.measure.measured import PLAIN, PREFIXES
 from hbvm_bench.measure.metrics import find
 from hbvm_bench.reference import solutions
 from hbvm_bench.summaries.rows import Task, by
@@ -49,6 +53,7 @@ def check(campaign: Campaign, cases: Sequence[Resolved]) -> None:
         _settings(method)
     for many in campaign.ensembles:
         _ensemble(many)
+    _series(campaign.page, cases)
     here = _by_name(campaign, cases)
     for name, those in here.items():
         if not those:
@@ -110,6 +115,22 @@ def _ensemble(many: EnsembleEntry) -> None:
     for name in many.vary:
         if name not in known:
             raise unknown(f"parameter of {problem.system.name}", name, known)
+
+
+def _series(page: Page, cases: Sequence[Resolved]) -> None:
+    """Refuse a name that no series of these cases can have; what a method adds is not known yet."""
+    asked = [name for name in page.series if not name.startswith(PREFIXES["extra"])]
+    if not asked:
+        return
+    problems = {repr(one.problem): one.problem for one in cases}.values()
+    known = {*PLAIN, PREFIXES["drift"] + "t"}
+    for problem in problems:
+        invariants, start = problem.system.invariants, problem.y0[None]
+        known |= {PREFIXES[kind] + name for kind in ("errors", "drift") for name in invariants}
+        known |= {PREFIXES["guards"] + name for name in problem.guards(start, np.array([problem.t0]))}
+    for name in asked:
+        if name not in known:
+            raise unknown("series of the campaign's cases", name, sorted(known))
 
 
 def _by_name(campaign: Campaign, cases: Sequence[Resolved]) -> dict[str, list[Resolved]]:

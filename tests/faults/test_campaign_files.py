@@ -179,6 +179,8 @@ RIGHT\n[timing]\nshortest = 1e-4                              => shortest=0.0001
 RIGHT\n[timing]\nclock = "thread"                             => clock='thread' of timing belongs to interleav
 RIGHT\n[timing]\norder = "alternating"                        => order='alternating' of timing belongs to
 RIGHT\n[timing]\ninterleaved = true\nsamples = 5              => samples=5 of timing belongs to interleaved
+RIGHT\n[page]\nseries = ["drift.enrgy"]                      => unknown series of the campaign's cases
+RIGHT\n[page]\nseries = ["error.energy", "guard.x"]          => unknown series of the campaign's cases
 METHODS\nmethods = [{use = []}]                               => a method with use = [] has no settings; give
 METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [2]}] => there is no setting 2; there are 2, counted
 METHODS\nmethods = [{use = ["HBVM()", "IAS15()"], quick = [-1]}] => there is no setting -1; there are 2, count

@@ -217,6 +217,25 @@ def write(store, texts, count, *, missing=0):
     return store
 
 
+def finish(store, campaign):
+    """Put every case of a campaign into a store, timed by its plan, so that nothing is left to run."""
+    store.prepare()
+    here, rng = machine.describe(measure=True), np.random.default_rng(1)
+    for number, resolved in enumerate(map(resolve, campaign.cases())):
+        t = resolved.case.grid.times(resolved.problem)
+        series = {"t": t, "y": np.tile(resolved.problem.y0, (t.size, 1))}
+        if starts := campaign.checks.starts:
+            series["drift.t"] = t[1:]
+            series["drift.energy"] = np.cumsum(1e-16 * rng.standard_normal((starts, t.size - 1)), axis=1)
+        timing = Timing(
+            rounds=timed([0.01 + 0.001 * number] * campaign.timing.rounds, calibration=[0.01]),
+            plan=campaign.timing,
+            machine=here,
+            process="one",
+        )
+        store.save(record(resolved, t_stop=float(t[-1]), timing=timing, counters=Counters(steps=1)), series)
+
+
 def kepler(count):
     """Return so many problems."""
     return [f"kepler(e={0.1 + 0.8 * number / count:.6f})" for number in range(count)]
