@@ -13,7 +13,7 @@ from integrators.kernel.context import (
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_field, get, put, total
 from integrators.kernel.step.begin import INFINITY
-from integrators.kernel.step.control import CLOSE, RETREAT, SHRINK
+from integrators.kernel.step.control import CLOSE, RETREAT, SHORTEST, SHRINK
 from integrators.kernel.step.estimate import (
     NARROWEST,
     OUTSIDE,
@@ -22,6 +22,8 @@ from integrators.kernel.step.estimate import (
     estimate,
     is_gap,
 )
+
+JUST = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 
 
 @compiled
@@ -39,6 +41,7 @@ def kink(ctx, ends):
             return False
         ctx.border_ahead = EXTRAPOLATED
         suspect = ctx.crossed or ctx.kinks > 0 or (ctx.t0 - ctx.doubt_end) * ctx.h < 0.0
+        suspect = suspect or ctx.border == START or ends_at_break(ctx)
         if not (suspect or ctx.apart):
             if ctx.border == EXTRAPOLATED:
                 ctx.border = SEEN
@@ -46,6 +49,13 @@ def kink(ctx, ends):
         return jumps_at_an_end(ctx, suspect)
     count(ctx, ctx.t0, ctx.h)
     return True
+
+
+@compiled
+def ends_at_break(ctx):
+    """Whether the field may jump at the end of the solved step."""
+    close = CLOSE * max(abs(ctx.stop), abs(ctx.h))
+    return ctx.breaks == 1 and abs((ctx.stop - ctx.t0) - ctx.h) <= close
 
 
 @compiled
@@ -138,7 +148,10 @@ def end_behind(ctx, d):
 
 @compiled
 def differs_at_an_end(ctx):
-    """Whether the field at an end of the solved step is far from what its nodes say there."""
+    """Whether the field at an end of the solved step is far from what its nodes say there.
+
+    Where it may jump, at a breakpoint, it is looked at just inside the step.
+    """
     h, t = abs(ctx.h), ctx.t0
     ctx.undone = 0
     if h <= NARROWEST * abs(t):
@@ -146,9 +159,11 @@ def differs_at_an_end(ctx):
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
     stages, times, values = ctx.stages, ctx.times, ctx.sums
-    times[0] = t
+    inside = max(JUST * h, 2.0 * SHORTEST * abs(t))
+    inside = inside if ctx.h > 0.0 else -inside
+    times[0] = t + inside if ctx.border == START else t
     for lane in range(1, lanes):
-        times[lane] = t + ctx.h
+        times[lane] = t + ctx.h - inside if ends_at_break(ctx) else t + ctx.h
     for d in range(rows):
         place = 8 * (d // 4) + 4 + d % 4 if second else d
         stages[lanes * d] = ctx.state[place]
@@ -156,14 +171,12 @@ def differs_at_an_end(ctx):
             stages[lanes * d + lane] = ctx.next_state[place]
     call_field(ctx.field, times, stages, ctx.par, values)
     ctx.evaluations += 2
-    begins = ctx.border == START
-    breaks = ctx.breaks == 1 and abs((ctx.stop - t) - ctx.h) <= CLOSE * max(abs(ctx.stop), h)
     # Unseen for no longer than the part of the step before the first node.
     least = ctx.negligible / (h * ctx.nodes[0])
     undone = 0
     for d in range(rows):
-        before = 0.0 if begins else abs(values[lanes * d] - total(coefficient(ctx, d, AT_START)))
-        after = 0.0 if breaks else abs(values[lanes * d + 1] - total(get(ctx.borders, 8 * d)))
+        before = abs(values[lanes * d] - total(coefficient(ctx, d, AT_START)))
+        after = abs(values[lanes * d + 1] - total(get(ctx.borders, 8 * d)))
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
         smooth = 0.0 if ctx.crossed else OUTSIDE * ctx.lasts[d]
