@@ -2,12 +2,13 @@
 
 import os
 import sys
+import time
 from importlib.metadata import version as installed
 from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
-os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # the notebooks' kernel says nothing about its debugger
+os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # the notebooks' kernel then prints no warning about its debugger
 
 project = "hbvm-bench"
 author = "hbvm-bench contributors"
@@ -33,6 +34,7 @@ templates_path = ["_templates"]
 # --- pages in MyST, executed where they have code cells ---
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+myst_substitutions = {"version": version, "year": time.strftime("%Y")}  # for pages that enable them
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "executed")
 nb_execution_timeout = 300
@@ -50,6 +52,7 @@ numpydoc_xref_param_type = False
 html_theme = "pydata_sphinx_theme"
 html_title = "hbvm-bench"
 html_static_path = ["_static"]
+html_favicon = "_static/favicon.svg"
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_copy_source = False
