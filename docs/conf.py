@@ -8,7 +8,9 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
-os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"  # the notebooks' kernel then prints no warning about its debugger
+os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = (
+    "1"  # the notebooks' kernel then prints no warning about its debugger
+)
 
 project = "hbvm-bench"
 author = "hbvm-bench contributors"

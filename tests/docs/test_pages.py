@@ -1,6 +1,8 @@
 """Links of the documentation lead somewhere, and what its pages show runs."""
 
+import doctest
 import os
+import re
 import tempfile
 
 import matplotlib as mpl
@@ -31,6 +33,23 @@ def test_every_link_leads_to_a_file_and_to_a_heading_in_it(page):
         if not pages.page(name, page).is_file():
             broken.append(name)
     assert broken == []
+
+
+@pytest.mark.parametrize("page", pages.sources(), ids=_name)
+def test_every_file_of_the_repository_that_a_page_names_is_there(page):
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"`((?:tests|examples|integrators|problems|hbvm_bench|docs)/[\w/]+\.\w+)`", text)
+    examples = {
+        "problems/catalogue/NAME.py",
+        "hbvm_bench/campaign/shipped/NAME.toml",
+        "problems/catalogue/quartic.py",
+    }
+    assert [name for name in named if name not in examples and not (pages.ROOT / name).is_file()] == []
+
+
+def test_the_example_of_the_first_page_is_true():
+    failed, tried = doctest.testfile(str(pages.DOCS / "index.md"), module_relative=False)
+    assert (failed, tried > 4) == (0, True)
 
 
 @pytest.mark.parametrize("name", TUTORIALS)

@@ -40,6 +40,18 @@ ANSWERS = {
         "howto/reading_a_report",
         ["Round brackets", "relative to the largest distance", "median and quartiles"],
     ),
+    "How do I integrate a satellite with J2 and drag?": (
+        "howto/satellite",
+        ["par.J2", "VectorField(", "relative[0]", "terminal=True"],
+    ),
+    "Does it use my 64 cores?": ("howto/clusters", ["threads=64", "--jobs 64"]),
+    "What is the licence?": ("faq", ["### What is the licence?", "3-clause BSD"]),
+    "How do I treat a chaotic system?": ("faq", ["### How do I treat a chaotic system?", "advise"]),
+    "How do I use a force of my own?": ("tutorials/driven", ["## Any first-order system", "VectorField"]),
+    "Does it run on a GPU?": ("faq", ["### Does it run on a GPU?", 'backend="jax"']),
+    "How do I choose s?": ("howto/which_method", ["### s", "The order is 2s."]),
+    "How do I cite it?": ("faq", ["### How do I cite it?", "CITATION.cff", "hbvm-bench cite"]),
+    "Does it run on Windows?": ("faq", ["### Which systems and Pythons does it run on?", "Windows"]),
     "When should I not use it, and why is the first call slow?": (
         "faq",
         ["When should I not use it?", "Why is my first call slow?", "hbvm-bench warm"],
