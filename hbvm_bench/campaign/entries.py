@@ -59,6 +59,9 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     clock : {"wall", "thread", "process"}
         Of interleaved times: of the wall, or of the processor's time for this thread, or for all threads
         of this process, in which other work on the machine does not count.
+    compilations : int
+        Of interleaved times: fresh processes with empty caches among which the rounds are shared, for one
+        compilation of a method may be slower than the next. Those that choose a setting do not compare it.
     """
 
     rounds: Annotated[int, Meta(ge=0, le=10_000)] = 3
@@ -68,6 +71,7 @@ class TimingPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     interleaved: bool = False
     order: Literal["shuffled", "alternating"] = "shuffled"
     clock: Literal["wall", "thread", "process"] = "wall"
+    compilations: Annotated[int, Meta(ge=1, le=100)] = 1
 
 
 class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

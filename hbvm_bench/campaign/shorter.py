@@ -47,8 +47,14 @@ def chosen(campaign: Campaign, names: list[str]) -> Campaign:
 
 
 def with_rounds(campaign: Campaign, rounds: int | None) -> Campaign:
-    """Return a campaign with another number of rounds of timing; with its own for ``None``."""
-    return replace(campaign, timing=replace(campaign.timing, rounds=rounds)) if rounds else campaign
+    """Return a campaign with another number of rounds of timing; with its own for ``None``.
+
+    Every compilation keeps at least two rounds.
+    """
+    if not rounds:
+        return campaign
+    compilations = max(1, min(campaign.timing.compilations, rounds // 2))
+    return replace(campaign, timing=replace(campaign.timing, rounds=rounds, compilations=compilations))
 
 
 def quick_run(campaign: Campaign) -> Campaign:

@@ -143,15 +143,27 @@ def chooses(number: int) -> bool:
     return number % 4 in (0, 3)
 
 
-def spread_evenly(count: int, rounds: int) -> list[int]:
+def shared(rounds: int, compilations: int) -> list[list[int]]:
+    """Return the rounds of each process: those that choose are not in one with those that compare."""
+    if compilations == 1:
+        return [list(range(rounds))]
+    kinds = [[one for one in range(rounds) if chooses(one) is kind] for kind in (True, False)]
+    counts = compilations - compilations // 2, compilations // 2
+    parts = [kind[place::count] for kind, count in zip(kinds, counts, strict=True) for place in range(count)]
+    return [part for part in parts if part]
+
+
+def spread_evenly(count: int, rounds: Sequence[int]) -> list[int]:
     """Return so many of the rounds, at least two and at most all, spread evenly.
 
-    Some of them choose settings, and others compare them.
+    Where some of the rounds choose settings and others compare them, so do those returned.
     """
-    count = max(min(2, rounds), min(rounds, count))
-    chosen = [number * rounds // count for number in range(count)]
-    if rounds > 1 and len({*map(chooses, chosen)}) == 1:  # 0 chooses, 1 does not
-        chosen = [0, 1, *(number for number in chosen if number > 1)][: len(chosen)]
+    most = len(rounds)
+    count = max(min(2, most), min(most, count))
+    chosen = [rounds[place * most // count] for place in range(count)]
+    if len({*map(chooses, chosen)}) == 1 < len({*map(chooses, rounds)}):
+        both = [next(one for one in rounds if chooses(one) is kind) for kind in (True, False)]
+        chosen = sorted({*both, *(one for one in chosen[1:] if one > max(both))})[:count]
     return chosen
 
 
@@ -201,12 +213,14 @@ def time_alone(run: Timeable, plan: TimingPlan) -> Timing:
     return Timing(rounds=[TimingRound(samples=samples, calibration=calibration, share=share, **fixed)])
 
 
-def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
-    """Take all samples of the runs of one problem, interleaved round by round in this process.
+def time_together(
+    runs: Sequence[Timeable], plan: TimingPlan, rounds: Sequence[int], compilation: int = 0
+) -> list[Timing]:
+    """Take the samples of the runs of one problem, interleaved round by round in this process.
 
-    Every round begins with a garbage collection and one sample of the calibration. A run
-    that is too slow for all rounds within the plan's budget takes part in fewer of them; one that
-    does not reach the end has none, with the reason.
+    ``rounds`` are the numbers of this process's, its ``compilation`` among the plan's. Every round begins
+    with a garbage collection and one sample of the calibration. A run that is too slow for all rounds within
+    the plan's budget takes part in fewer of them; one that does not reach the end has none, with the reason.
     """
     clock = CLOCKS[plan.clock]
     firsts, calls = [], []
@@ -216,8 +230,9 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
         calls.append(run.until(NOWHERE).seconds(CALLS, clock)[0])
     fine = [i for i, (_, reached) in enumerate(firsts) if reached.status is Status.FINISHED]
     repeats = {i: repeats_for(firsts[i][0], plan.shortest) for i in fine}
-    fitting = {i: int(plan.budget / max(firsts[i][0] * repeats[i], 1e-9)) for i in fine}
-    turns = {i: spread_evenly(count, plan.rounds) for i, count in fitting.items()}
+    budget = plan.budget * len(rounds) / plan.rounds
+    fitting = {i: int(budget / max(firsts[i][0] * repeats[i], 1e-9)) for i in fine}
+    turns = {i: spread_evenly(count, rounds) for i, count in fitting.items()}
     calibration: list[float] = []
 
     def begin(number: int) -> None:
@@ -226,19 +241,19 @@ def time_together(runs: Sequence[Timeable], plan: TimingPlan) -> list[Timing]:
 
     before = busy()
     samples = [lambda i=i: runs[i].seconds(repeats[i], clock)[0] for i in fine]
-    mine = [turns[i] for i in fine]
-    taken = interleaved(samples, plan.rounds, order=plan.order, turns=mine, begin=begin)
+    mine = [[place for place, number in enumerate(rounds) if number in turns[i]] for i in fine]
+    taken = interleaved(samples, len(rounds), order=plan.order, turns=mine, begin=begin)
     load = load_between(before, busy())
     made = [_unfinished(reached) for _, reached in firsts]
     for i, seconds in zip(fine, taken, strict=True):
-        fixed = {"repeats": repeats[i], "compile": _compilation(runs[i])}
-        rounds = [
-            TimingRound(samples=[sample], calibration=[calibration[n]], number=n, **fixed)
+        fixed = {"repeats": repeats[i], "compile": _compilation(runs[i]), "compilation": compilation}
+        taking = [
+            TimingRound(samples=[sample], calibration=[calibration[rounds.index(n)]], number=n, **fixed)
             for n, sample in zip(turns[i], seconds, strict=True)
         ]
-        few = f"{len(rounds)} of {plan.rounds} rounds: a run takes {firsts[i][0]:.2g} s"
-        why = few * (len(rounds) < plan.rounds)
-        made[i] = Timing(rounds=rounds, why=why, call=calls[i], load=load)
+        few = f"{len(taking)} of {len(rounds)} rounds: a run takes {firsts[i][0]:.2g} s"
+        why = few * (len(taking) < len(rounds))
+        made[i] = Timing(rounds=taking, why=why, call=calls[i], load=load)
     return made
 
 

@@ -6,6 +6,7 @@ import platform
 import sys
 import tempfile
 import threading
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
@@ -127,7 +128,25 @@ def stay_on(core: int) -> None:
     _thread.core = core
 
 
-def start(scratch: Path, request: Request, loads: tuple[str, str] | None = None) -> Ended:
+def empty_caches(directory: Path) -> dict[str, str]:
+    """Return the environment in which every library compiles anew: its caches are in this directory.
+
+    All libraries keep their compiled code below the user's own directories, so these are moved.
+    """
+    return {
+        "HOME": str(directory),
+        "XDG_CACHE_HOME": str(directory / "cache"),
+        "HBVM_BENCH_CACHE": str(directory / "kernel"),
+        "NUMBA_CACHE_DIR": str(directory / "numba"),
+    }
+
+
+def start(
+    scratch: Path,
+    request: Request,
+    loads: tuple[str, str] | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> Ended:
     """Start the worker process of a request and wait for its end.
 
     Parameters
@@ -139,6 +158,8 @@ def start(scratch: Path, request: Request, loads: tuple[str, str] | None = None)
     loads : (str, str), optional
         Library and problem of a case that may find loaded what others of both have loaded. By
         default the process begins with nothing, as whatever is timed does.
+    environment : mapping, optional
+        What is added to the environment of a process that begins with nothing.
 
     Raises
     ------
@@ -159,7 +180,8 @@ def start(scratch: Path, request: Request, loads: tuple[str, str] | None = None)
                 raise ConnectionError  # the nest is of no more use
     if ended is None:
         command = [sys.executable, "-m", "hbvm_bench.run.worker", str(path), str(os.getpid())]
-        ended = supervise.watch(supervise.Fresh(command, ENVIRONMENT), request.limits, compiled)
+        fresh = supervise.Fresh(command, {**ENVIRONMENT, **(environment or {})})
+        ended = supervise.watch(fresh, request.limits, compiled)
     if ended.cause == "stopped":
         raise InterruptedRunError
     return ended

@@ -1,9 +1,12 @@
 """The timing pass: one case at a time, alone and without output, round by round; or a problem's in turn."""
 
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from statistics import median
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -11,7 +14,8 @@ from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.measure import machine, reading
-from hbvm_bench.run.task import decoded, start
+from hbvm_bench.measure.timing import shared
+from hbvm_bench.run.task import decoded, empty_caches, start
 from hbvm_bench.run.worker import REPLY, Request
 from hbvm_bench.store.records import Record, Timing
 from hbvm_bench.store.store import Store
@@ -129,7 +133,7 @@ def _together(
     core: int | None,
     here: Machine,
 ) -> list[Timing]:
-    """Time the cases of a problem in turn in one process, but for those on another trajectory."""
+    """Time the cases of a problem in turn, but for those on another trajectory."""
     on = [one for one, record in zip(group, records, strict=True) if not record.result.violation]
     process = datetime.now(UTC).isoformat()
     together = replace(
@@ -137,17 +141,37 @@ def _together(
         wall_seconds=limits.wall_seconds * len(on),
         compile_seconds=limits.compile_seconds * len(on),
     )
-    made = zip((one.id for one in on), _asked(on, plan, together, core), strict=True) if on else ()
+    parts = [
+        _asked(on, plan, together, core, rounds=numbers, compilation=place)
+        for place, numbers in enumerate(shared(plan.rounds, plan.compilations))
+        if on
+    ]
+    made = zip((one.id for one in on), map(_joined, zip(*parts, strict=True)), strict=True) if on else ()
     timings = {one.id: Timing(why=OFF) for one in group} | dict(made)
     return [replace(one, plan=plan, machine=here, process=process) for one in timings.values()]
 
 
-def _asked(cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None) -> list[Timing]:
+def _joined(parts: Sequence[Timing]) -> Timing:
+    """Return the times of several processes as one, round by round."""
+    rounds = sorted((one for part in parts for one in part.rounds), key=lambda one: one.number or 0)
+    loads = [part.load for part in parts if part.load is not None]
+    return Timing(
+        rounds=rounds,
+        why="; ".join(dict.fromkeys(part.why for part in parts if part.why)),
+        call=median([part.call for part in parts if part.call is not None] or [math.nan]) if rounds else None,
+        load=max(loads, key=lambda load: max(load.others, load.stolen), default=None),
+    )
+
+
+def _asked(
+    cases: Sequence[Resolved], plan: TimingPlan, limits: Limits, core: int | None, **part: Any
+) -> list[Timing]:
     """Return what a worker process answers; without an answer each timing says why."""
     asked, beside = {one.id: one.case for one in cases}, own.beside(cases[0].problem)
-    request = Request(cases=asked, limits=limits, plan=plan, beside=beside, core=core)
+    request = Request(cases=asked, limits=limits, plan=plan, beside=beside, core=core, **part)
     with tempfile.TemporaryDirectory(prefix="hbvm-bench-") as scratch:
-        ended = start(Path(scratch), request)
+        caches = empty_caches(Path(scratch) / "caches") if plan.compilations > 1 else {}
+        ended = start(Path(scratch), request, environment=caches)
         reply = decoded(Path(scratch) / REPLY, list[Timing])
     if reply is not None and len(reply) == len(cases):
         return reply

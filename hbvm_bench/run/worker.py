@@ -67,6 +67,10 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
         Behind the ids, to name what differs elsewhere.
     beside : own.Beside
         What must be known of their problem.
+    rounds : list of int
+        Of interleaved times, those that are this process's.
+    compilation : int
+        Which of the plan's compilations they are of.
     core : int or None
         The core to stay on.
     """
@@ -76,6 +80,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
     plan: TimingPlan | None = None
     versions: dict[str, str] = {}
     beside: own.Beside = own.Beside()
+    rounds: list[int] = []
+    compilation: int = 0
     core: int | None = None
 
 
@@ -190,7 +196,7 @@ def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:
     runs = [_run(one) for one in _resolved(request)]
     (directory / COMPILED).touch()
     if plan.interleaved:
-        return timing.time_together(runs, plan)
+        return timing.time_together(runs, plan, request.rounds, request.compilation)
     return [timing.time_alone(run, plan) for run in runs]
 
 

@@ -105,6 +105,8 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
         Seconds of a fixed computation before each sample and after the last.
     number : int or None
         Of the interleaved round, from 0; ``None`` for a visit by itself.
+    compilation : int
+        Of interleaved rounds: which of the plan's processes, each with a compilation of its own.
     """
 
     samples: list[float]
@@ -113,6 +115,7 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     share: float = 1.0
     calibration: list[float] = []
     number: int | None = None
+    compilation: int = 0
 
     def __post_init__(self) -> None:
         if not self.samples or not all(0.0 < s < math.inf for s in [*self.samples, *self.calibration]):

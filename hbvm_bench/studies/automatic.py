@@ -121,7 +121,15 @@ def kinds(results: Results) -> list[Section]:
 def _run(run: Kept) -> list[Block]:
     libraries = ", ".join(f"{name} {number}" for name, number in run.versions.items())
     return [
-        Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)])),
+        Note(
+            " ".join(
+                [
+                    machine.sentence(run.machine),
+                    *outcomes.compilations(run.records),
+                    *outcomes.beside(run.records),
+                ]
+            )
+        ),
         *attempt(("errors and times", partial(sides, duels(run)))),
         f"Measured on {run.started[:10]} with {libraries}: `{run.command}`",
     ]

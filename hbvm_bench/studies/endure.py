@@ -189,7 +189,15 @@ def about(results: Results) -> str:
 def measured_on(results: Results) -> Note:
     """Return on what machine, and what else it did."""
     run = of(results).run
-    return Note(" ".join([machine.sentence(run.machine), *outcomes.beside(run.records)]))
+    return Note(
+        " ".join(
+            [
+                machine.sentence(run.machine),
+                *outcomes.compilations(run.records),
+                *outcomes.beside(run.records),
+            ]
+        )
+    )
 
 
 @block

@@ -153,6 +153,32 @@ def beside(records: Sequence[Record]) -> list[str]:
     ]
 
 
+def compilations(records: Sequence[Record]) -> list[str]:
+    """Return a sentence on how the times of several compilations differ, where there are several."""
+    ratios = sorted(
+        (max(times) / min(times), record.case.method)
+        for record in records
+        if len(times := _by_compilation(record)) > 1
+    )
+    if not ratios:
+        return []
+    count = 1 + max(one.compilation for one in _rounds(records))
+    middle, (most, method) = ratios[len(ratios) // 2][0], ratios[-1]
+    return [
+        f"Compiled {count} times, in fresh processes with empty caches; those that chose a setting did not "
+        f"compare it. Of one setting, the slowest compilation takes {middle:.2f} times as long as the "
+        f"fastest in the median, and at most {most:.2f} times ({method})."
+    ]
+
+
+def _by_compilation(record: Record) -> list[float]:
+    """Return the median times of the compilations of a case."""
+    found: dict[int, list[float]] = {}
+    for one in record.timing.rounds if record.timing else ():
+        found.setdefault(one.compilation, []).extend(one.samples)
+    return [median(samples) for samples in found.values() if samples]
+
+
 def busy(records: Sequence[Record]) -> bool:
     """Whether the machine had so much other work that interleaved times are doubtful."""
     return any(max(load.others, load.stolen) > BUSY for load in _loads(records))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from hbvm_bench.run.task import empty_caches
 from hbvm_bench.run.worker import ENVIRONMENT
 from hbvm_bench.studies.race.families import OURS
 
@@ -117,17 +118,10 @@ def _probes(name: str, problem: str, family: str, method: str) -> list[Probe]:
 
 
 def _ask(problem: str, method: str, cache: Path) -> tuple[float, Answer]:
-    # Every library keeps its compiled code below the user's own directories, so these are moved.
-    homes = {
-        "HOME": str(cache),
-        "XDG_CACHE_HOME": str(cache / "cache"),
-        "HBVM_BENCH_CACHE": str(cache / "kernel"),
-        "NUMBA_CACHE_DIR": str(cache / "numba"),
-    }
     start = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-m", "hbvm_bench.studies.race.probe", problem, method],
-        env={**os.environ, **ENVIRONMENT, **homes},
+        env={**os.environ, **ENVIRONMENT, **empty_caches(cache)},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

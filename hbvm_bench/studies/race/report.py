@@ -181,7 +181,7 @@ def remarks(race: Race) -> list[str]:
             f"A fixed computation beside it took {calibration * 1e3:.2f} ms, and in its worst round "
             f"{worst:.0%} more or less."
         )
-    return said + outcomes.beside(race.records)
+    return said + outcomes.compilations(race.records) + outcomes.beside(race.records)
 
 
 def commands(races: Sequence[Race]) -> str:

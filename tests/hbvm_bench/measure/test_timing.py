@@ -153,17 +153,28 @@ def test_short_runs_are_repeated_until_a_sample_is_long_enough(seconds, repeats)
 
 
 def test_a_setting_too_slow_for_all_rounds_takes_part_in_some_of_them():
-    assert timing.spread_evenly(3, 9) == [0, 3, 6]
-    assert timing.spread_evenly(0, 9) == [0, 1]  # one chooses, the other compares
-    assert timing.spread_evenly(0, 1) == [0]
+    assert timing.spread_evenly(3, range(9)) == [0, 3, 6]
+    assert timing.spread_evenly(0, range(9)) == [0, 1]  # one chooses, the other compares
+    assert timing.spread_evenly(0, range(1)) == [0]
     for rounds in range(2, 30):
         for count in range(40):
-            chosen = timing.spread_evenly(count, rounds)
+            chosen = timing.spread_evenly(count, range(rounds))
             assert sorted(set(chosen)) == chosen
             assert {*map(timing.chooses, chosen)} == {False, True}
             assert max(chosen) < rounds
     taken = timing.interleaved([lambda: 1.0, lambda: 2.0], 3, turns=[[0, 1, 2], [1]])
     assert taken == [[1.0, 1.0, 1.0], [2.0]]
+
+
+@pytest.mark.parametrize("compilations", [1, 2, 3, 5])
+def test_the_rounds_of_a_plan_are_shared_so_that_no_compilation_both_chooses_and_compares(compilations):
+    parts = timing.shared(20, compilations)
+    assert len(parts) == compilations
+    assert sorted(one for part in parts for one in part) == list(range(20))
+    kinds = [{*map(timing.chooses, part)} for part in parts]
+    assert kinds == [{True, False}] if compilations == 1 else all(len(kind) == 1 for kind in kinds)
+    assert {kind for found in kinds for kind in found} == {True, False}
+    assert timing.spread_evenly(0, parts[-1])[0] in parts[-1]
 
 
 def test_shuffled_rounds_are_in_another_order_each_and_the_same_every_time():
@@ -184,7 +195,7 @@ def test_the_calibration_of_thread_times_is_by_the_same_clock(monkeypatch):
     asked = []
     monkeypatch.setattr(timing, "calibrate", lambda clock: asked.append(clock) or 0.01)
     plan = TimingPlan(rounds=2, interleaved=True, clock="thread", shortest=1e-6)
-    timing.time_together([timing.Run.of(problems.load("pendulum", t_end=1.0), Landing())], plan)
+    timing.time_together([timing.Run.of(problems.load("pendulum", t_end=1.0), Landing())], plan, [0, 1])
     assert asked == 2 * [time.thread_time]
 
 

@@ -234,6 +234,31 @@ def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
     timing_pass.time_cases(cases, store, TOGETHER, GENEROUS, lambda *visit: pytest.fail("timed again"))
 
 
+def test_compilations_share_the_rounds_and_are_processes_of_their_own(toys, store):
+    plan = msgspec.structs.replace(TOGETHER, rounds=8, compilations=4)
+    cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]
+    for one in cases:
+        run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases(cases, store, plan, GENEROUS)
+    for one in cases:
+        timing = store.load(one.id).timing
+        assert [round_.number for round_ in timing.rounds] == list(range(8))
+        assert [round_.compilation for round_ in timing.rounds] == [0, 2, 3, 1, 0, 2, 3, 1]
+    timing_pass.time_cases(cases, store, plan, GENEROUS, lambda *visit: pytest.fail("timed again"))
+    assert timing_pass.outdated(cases, store, TOGETHER) == 2
+
+
+@pytest.mark.slow  # our kernel is compiled twice from nothing
+def test_each_compilation_begins_with_empty_caches(store):
+    plan = TimingPlan(rounds=2, shortest=1e-6, interleaved=True, compilations=2)
+    one = resolve(case("Gauss(s=2, h=0.1)"))
+    run_case(one.case, str(store.directory), GENEROUS)
+    timing_pass.time_cases([one], store, plan, GENEROUS)
+    rounds = store.load(one.id).timing.rounds
+    assert [round_.compile.cached for round_ in rounds] == [False, False]
+    assert min(round_.compile.seconds for round_ in rounds) > 0.5  # of the order of 5 s
+
+
 def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_rounds(toys, store):
     """As after a kill between two records: rounds of different processes do not belong together."""
     cases = [resolve(case(f"Steady(h={h})")) for h in (0.1, 0.2)]

@@ -76,6 +76,16 @@ def test_the_report_says_what_is_doubtful_void_refused_and_quick(race):
     assert rows["IAS15()"][-1] == "stalled: stood still"
 
 
+def test_the_times_of_several_compilations_are_compared(race):
+    assert not any("Compiled" in said for said in report.remarks(race))
+    first = race.records[0]
+    rounds = [msgspec.structs.replace(one, compilation=i) for i, one in enumerate(first.timing.rounds)]
+    timed = msgspec.structs.replace(first, timing=msgspec.structs.replace(first.timing, rounds=rounds))
+    (said,) = [one for one in report.remarks(replace(race, records=[timed])) if "Compiled" in one]
+    assert "Compiled 3 times" in said
+    assert "at most 1.33 times (Gauss(s=8, h=2.0))" in said  # 1.2 over 0.9, the record's rounds
+
+
 def test_compile_times_are_shown_where_the_machine_had_no_other_work(race):
     assert tables.compiling(race) is None  # some of a core went elsewhere
     quiet = [
