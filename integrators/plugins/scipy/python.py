@@ -35,6 +35,9 @@ KEEP = 1.2  # Newton's factorisations are kept when the step could only grow by 
 NEWTON_ITERATIONS = 12
 FEW_NODES, MOST_NODES = 16, 64  # more than few only where Newton takes long steps: shorter ones cost less
 HIDDEN = 10.0  # times what may be hidden from the nodes, above which a step is taken again, shorter
+# After so many cuts that do not let the coefficients fall off, they are rounding: for so many steps, those
+# below such a part of `atol` are no reason to cut.
+CUTS, NOISY_STEPS, NOISE = 3, 64, 1e-3
 SEEN = 1e-8  # size of the last two coefficients that k nodes determine, relative, for an automatic k
 
 CLOSE = 1e-9  # part of a constant step that is not made for its own sake
@@ -74,6 +77,7 @@ class PythonSteps:
         self._newton = Newton(solver, s, jac, jac_sparsity)
         self._stiff = False
         self._limited = 0  # steps in a row that only the fixed point keeps so short
+        self._noisy = 0  # steps for which small coefficients are taken for rounding
         self._constant = None if h is None else h * solver.direction
         self._start, self._count = solver.t, 0  # of steps of constant length
         self._length = first_step
@@ -101,7 +105,7 @@ class PythonSteps:
         least = 10 * abs(np.nextafter(t, solver.direction * np.inf) - t)
         h_abs = self._first(t, y)
         h_abs = solver.max_step if h_abs > solver.max_step else max(h_abs, least)
-        rejected = False
+        rejected, cuts, uncut, unseen_uncut = False, 0, h_abs, 0.0
         while h_abs >= least:
             t_new = t + h_abs * solver.direction
             if solver.direction * (t_new - solver.t_bound) > 0.0:
@@ -121,8 +125,15 @@ class PythonSteps:
             if unseen > 1.0 and self.k < (MOST_NODES if self._stiff else FEW_NODES):
                 self._stages = self._stages.with_nodes(self.k + max(2, self.k // 4))
             elif unseen > HIDDEN and not self._stiff:
-                h_abs, rejected = h_abs * max(SHRINK, SAFETY * unseen ** (-1.0 / self.k)), True
+                if cuts == 0:
+                    uncut, unseen_uncut = h_abs, unseen
+                cuts, rejected = cuts + 1, True
+                if cuts == CUTS and self._noisy == 0 and unseen > SHRINK * unseen_uncut:
+                    h_abs, self._noisy = uncut, NOISY_STEPS
+                else:
+                    h_abs *= max(SHRINK, SAFETY * unseen ** (-1.0 / self.k))
             else:
+                self._noisy = max(self._noisy - 1, 0)
                 factor = self._factor(h_abs, error, solved.rate, rejected)
                 if unseen > 0.0 and not self._stiff and self.k >= FEW_NODES:
                     factor = max(SHRINK, min(factor, SAFETY * unseen ** (-1.0 / self.k)))
@@ -235,10 +246,13 @@ class PythonSteps:
 
         The coefficients must have decayed to the root of that; what moves a component by less than ``atol``
         counts as moving it by so much, else a field whose rounding is all there is at first had no step.
+        Where steps were cut in vain the coefficients are rounding: what ``atol`` allows is let be.
         """
         sizes = np.abs(self._stages.coefficients(solved.values))
         top = sizes.max(axis=0)
         floor = SEEN * np.maximum(np.maximum(top, 1e-3 * top.max()), self._solver.atol)
+        if self._noisy:
+            floor = np.maximum(floor, NOISE * self._solver.atol)
         return float((sizes[-2:] / np.where(floor > 0.0, floor, 1.0)).max())
 
     def dense_output(self) -> DenseOutput:
