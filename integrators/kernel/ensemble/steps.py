@@ -302,6 +302,8 @@ class Steps(Writer):
 
     def predict_elsewhere(self) -> None:
         """As `predict`, by the polynomial's coefficients: this step's length may be another one."""
+        from integrators.kernel.step.begin import behind, next_polynomial  # imports numba
+
         slots, rows, modes = Group.slots, self.form.rows, self.form.modes
         ratio, begin = (self.get(self.array(slots[name])) for name in ("ratio", "begin"))
         recurrence = self.array(slots["recurrence"])
@@ -309,11 +311,11 @@ class Steps(Writer):
         self.product(self.table(slots["into_modes"]), modes)
 
         def stage(i: Index) -> None:
-            x = ratio.fma(self.number(self.nodes, i), begin) * 2.0 - 1.0
+            x = behind(self.number(self.nodes, i), begin, ratio)
             basis, before = [self.one], self.zero
             for j in range(modes - 1):
                 a, b = (self.number(recurrence, 2 * j + part) for part in (0, 1))
-                basis.append((a * x).fma(basis[j], -(b * before)))
+                basis.append(next_polynomial(a, b, x, basis[j], before))
                 before = basis[j]
 
             def row(d: Index) -> None:

@@ -6,7 +6,7 @@ formed; the state is a compensated pair whose error enters the stages.
 """
 
 from integrators.kernel.context import RUNNING
-from integrators.kernel.native.jit import compiled
+from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, put, put_lower, put_upper, splat8, spread
 from integrators.kernel.simd.operations import binary_log
@@ -115,18 +115,30 @@ def start_extrapolated(ctx):
     ctx.predicted = 1
 
 
+@for_both_widths
+def behind(c, first, ratio):
+    """Return where ``first + ratio * c`` of another step is in [-1, 1], on which Legendre polynomials are."""
+    return 2.0 * (first + ratio * c) - 1.0
+
+
+@for_both_widths
+def next_polynomial(a, b, x, here, before):
+    """Return P_{j+1} of P_j and P_{j-1} at x; see `Context.recurrence`."""
+    return fma(a * x, here, -b * before)
+
+
 @compiled
 def start_elsewhere(ctx, source, first, ratio):
     """First stages from the values of the context ``source``; there the nodes are ``first + ratio * c``."""
     rows, chunks, groups = ctx.rows, ctx.chunks, ctx.mode_groups
     nodes, basis, recurrence = ctx.nodes, ctx.basis, ctx.recurrence
     for chunk in range(chunks):
-        x = 2.0 * (first + ratio * get(nodes, 8 * chunk)) - 1.0
+        x = behind(get(nodes, 8 * chunk), first, ratio)
         before = splat8(0.0)
         here = splat8(1.0)
         for j in range(ctx.modes):
             put(basis, 8 * (chunk * 8 * groups + j), here)
-            after = fma(recurrence[2 * j] * x, here, -recurrence[2 * j + 1] * before)
+            after = next_polynomial(recurrence[2 * j], recurrence[2 * j + 1], x, here, before)
             before = here
             here = after
     project(source, ctx.mode_projection, groups)
