@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems.analysis.invariants import evaluate
-from problems.analysis.ranges import leaves_range
 from problems.analysis.structure import has_kinks, switches_in_time
 from problems.calculus.function import Function
 from problems.double_double import DD
+from problems.emit.leaving import leaves_range
 from problems.problem import Problem, System
 from problems.trace.graph import T
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from problems import emit
+from problems.emit import numpy as numpy_function
 from problems.systems.base import System
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ def leaves_range(system: System, t: float, y: Array, par: Array) -> bool:
     extreme = (sizes > EXTREME) | ((sizes > 0.0) & (sizes < 1.0 / EXTREME))
     if not system.traced or not extreme.any() or np.finfo(np.longdouble).maxexp <= np.finfo(float).maxexp:
         return False
-    field = emit.numpy(system, "field")
+    field = numpy_function(system, "field")
     there = field(t, y.astype(np.longdouble), par.astype(np.longdouble))
     apart = np.abs(field(t, y, par) - there)
     beside = np.repeat(np.abs(there).reshape(2, -1).max(axis=1), system.dof) if system.dof else 0.0
