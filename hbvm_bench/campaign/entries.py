@@ -185,6 +185,8 @@ class Page(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Paragraphs at the top; the campaign's description by default.
     colours : str
         Whether every method has a colour of its own, or every family.
+    looks : list of str
+        What else has a colour in its figures, see `hbvm_bench.report.figures.style.METHODS`.
     by_processor : bool
         Whether a report keeps the results of several kinds of processor side by side.
     series : list of str
@@ -195,6 +197,7 @@ class Page(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     name: Annotated[str, Meta(pattern=rf"^{FILE_NAME}$")] = "report.md"
     lead: list[str] = []
     colours: Literal["method", "family"] = "method"
+    looks: list[str] = []
     by_processor: bool = False
     series: list[str] = []
 

@@ -49,6 +49,9 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         Shared by all cases.
     page : Page
         Which blocks its page has.
+    computes : str
+        What a study computes beside the cases, such as ``"paper.report:compute"``: a function in
+        ``COMPUTATIONS`` of a module of `hbvm_bench.studies`.
     quick : bool
         Whether only those settings are run that are marked for a quick run.
     """
@@ -65,6 +68,7 @@ class Campaign(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     timing: TimingPlan = TimingPlan()
     checks: Checks = Checks()
     page: Page = Page()
+    computes: str = ""
     quick: bool = False
 
     def __post_init__(self) -> None:

@@ -110,23 +110,29 @@ def typed_problem(text: str) -> Problem:
 def make_method(text: str) -> MethodBase:
     """Make the method that ``text`` specifies; ``peers.alone:Taylor(...)`` is one of a study's own."""
     spec = parse_spec(text)
-    study, _, name = spec.name.rpartition(":")
     try:
-        if study:
-            return _of_study(study, name)(**spec.arguments)
-        return integrators.registry.create(name, **spec.arguments)
+        if ":" in spec.name:
+            return of_study(spec.name, "METHODS")(**spec.arguments)
+        return integrators.registry.create(spec.name, **spec.arguments)
     except (InputError, ImportError) as error:
         raise InputError(f"{spec}: {error}") from None
 
 
-def _of_study(study: str, name: str) -> type[MethodBase]:
-    """Return a method of `hbvm_bench.studies`, which has them by name in ``METHODS`` of a module."""
+def of_study(place: str, table: str) -> Any:
+    """Return what a module of `hbvm_bench.studies` offers: ``"paper.report:compute"`` of a table in it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If there is no such module with this table, or no such name in it.
+    """
+    study, _, name = place.rpartition(":")
     try:
-        known = import_module(f"hbvm_bench.studies.{study}").METHODS
+        known = getattr(import_module(f"hbvm_bench.studies.{study}"), table)
     except (ModuleNotFoundError, AttributeError):
-        raise InputError(f"there is no study {study!r} with methods of its own.") from None
+        raise InputError(f"there is no study {study!r} with {table.lower()} of its own.") from None
     if name not in known:
-        raise unknown(f"method of {study}", name, known)
+        raise unknown(f"name in the {table.lower()} of {study}", name, known)
     return known[name]
 
 

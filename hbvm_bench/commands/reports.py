@@ -47,9 +47,9 @@ def report(
         if show:
             webbrowser.open((target / "index.html").resolve().as_uri())
     if pages is not None:
-        from hbvm_bench.studies.pages import write
+        from hbvm_bench.report.index import write_pages
 
-        for path in write(pages):
+        for path in write_pages(pages):
             print(path)
     if index is not None:
         from hbvm_bench.report.index import write_index

@@ -13,11 +13,11 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Campaign, Goal, Grid, MethodEntry, ProblemEntry, file_of, load
-from hbvm_bench.campaign.identity import Resolved, make_method
+from hbvm_bench.campaign.identity import Resolved, make_method, of_study
 from hbvm_bench.campaign.shorter import quick_run
 from hbvm_bench.campaign.spec import file_of as python_file_of
 from hbvm_bench.commands.live import Live
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.run import checked, executors, loop, references, supervise, timing_pass
 from hbvm_bench.run.estimate import Estimate
@@ -174,6 +174,9 @@ def carry_out(
             store.write_index(index)
             try:
                 _run(campaign, cases, store, pool, timing)
+                if campaign.computes:
+                    compute = of_study(campaign.computes, "COMPUTATIONS")
+                    compute(store, jobs or len(machine.cores()), _say)
             except (KeyboardInterrupt, InterruptedRunError):
                 raise _given_up("interrupted", ids, store, INTERRUPTED) from None
             except UnfinishedRunError as error:

@@ -1,10 +1,14 @@
-"""The list of the reports in a directory, with a picture of each."""
+"""What is made of the reports in a directory: the page of each, and their list with a picture of each."""
 
 import re
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
+from hbvm_bench.report.html import page
 from hbvm_bench.report.markdown import plain
+from hbvm_bench.report.page import document
+from hbvm_bench.store import archive
 from hbvm_bench.store.files import write_all
 from problems.errors import InputError
 
@@ -17,6 +21,21 @@ LEAD = (
 )
 WIDTH = 360  # pixels of a thumbnail
 LONGEST = 400  # characters of a description
+
+
+def write_pages(directory: Path) -> Iterator[Path]:
+    """Draw ``index.html`` of every report in a directory from its archive, and yield its path.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If what is stored is damaged, or a directory cannot be written.
+    """
+    for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
+        if (folder / archive.NAME).is_file():
+            path = folder / "index.html"
+            write_all({path: page(document(archive.read(folder / archive.NAME))).encode()})
+            yield path
 
 
 def write_index(directory: Path) -> Path:

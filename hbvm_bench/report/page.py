@@ -76,7 +76,7 @@ class Results:
     def look(self) -> dict[str, Look]:
         """The colour and marker of each method, or of each family where the page has it so."""
         name = family_of if self.page.colours == "family" else lambda record: record.case.method
-        return looks(map(name, self.records))
+        return looks([*map(name, self.records), *self.page.looks])
 
     def missing(self, run: Kept) -> list[Case]:
         """Return the cases of a run that have no result yet."""

@@ -153,10 +153,10 @@ endure -m "nosuch()" --quick                               | nosuch(): unknown m
 endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
 endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x
 endure -m "Leapfrog(h=0.1)" -m "Leapfrog(h=0.1)" --quick --out /dev/null/x | is given twice
-paper nosuch                                               | unknown part of the paper 'nosuch'; known:
+paper nosuch                                               | Got unexpected extra argument
 paper --jobs 0                                             | Invalid value for '--jobs': Input should be
-paper claims --jobs a                                      | Invalid value for '--jobs': Input should be a
-paper claims --out /dev/null/x                             | cannot write to the directory
+paper --jobs a                                             | Invalid value for '--jobs': Input should be a
+paper --out /dev/null/x                                    | cannot write to the directory
 compare                                                    | Missing argument 'first'
 compare a                                                  | Missing argument 'second'
 compare nowhere1 nowhere2                                  | the directory 'nowhere1' does not exist; make

@@ -8,11 +8,15 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from hbvm_bench.campaign.file import load
 from hbvm_bench.cli import main
-from hbvm_bench.commands.paper import PARTS
 from hbvm_bench.report.figures.canvas import new, small
-from hbvm_bench.studies.paper import report, results
+from hbvm_bench.store.archive import NAME
+from hbvm_bench.store.files import write_json
+from hbvm_bench.store.store import Store
+from hbvm_bench.studies.paper import properties_part, report, results
 from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
@@ -73,19 +77,22 @@ def work(count: int) -> list[results.Task]:
 
 
 def ran(tasks, directory, jobs=1):
-    """Run tasks and return what is kept, and their keys in the order in which they ended."""
-    (directory / "data").mkdir(exist_ok=True)
+    """Run tasks and return what is kept, and what was said of those that ended, in order."""
     said: dict[str, str] = {}
-    kept = results.run_all(tasks, jobs, "hbvm-bench paper", directory, said.__setitem__)
+    kept = results.run_all(tasks, jobs, Store(directory), said.__setitem__)
     return kept, said
+
+
+def stored(directory):
+    return results.load(Store(directory).beside())
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_tasks_give_the_same_results_here_and_in_processes(tmp_path, jobs):
     kept, said = ran(work(3), tmp_path, jobs)
-    found = results.Results(part(3), results.load(tmp_path))
+    found = results.Results(part(3), stored(tmp_path))
     assert [found["0"], found["1"], found["2"]] == [0, 1, 4]
-    assert results.load(tmp_path) == kept
+    assert stored(tmp_path) == kept
     if jobs == 1:
         assert list(said) == ["squares/2", "squares/1", "squares/0"]  # the long ones first
 
@@ -98,22 +105,38 @@ def test_what_was_divided_is_put_together_again(tmp_path):
     runs = results.split("rows", row, [1.0, 2.0, 3.0, 4.0, 5.0], 2, cost=1)
     whole = results.Part("p", "P", runs, lambda found: [], lambda found: [])
     ran(whole.tasks, tmp_path)
-    assert results.Results(whole, results.load(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
+    assert results.Results(whole, stored(tmp_path))["rows"] == [2.0, 3.0, 4.0, 5.0, 6.0]
 
 
 def test_a_computation_that_fails_loses_no_other_and_says_why(tmp_path):
     ran(work(4), tmp_path)
-    found = results.Results(part(4), results.load(tmp_path))
+    found = results.Results(part(4), stored(tmp_path))
     assert found["2"] == 4
     with pytest.raises(InputError, match=r"'squares/3' failed with ValueError: three is too many \(test_pa"):
         found["3"]
 
 
-def test_a_run_that_was_interrupted_goes_on_and_a_whole_one_starts_anew(tmp_path):
+def test_a_run_goes_on_where_it_was_but_not_by_other_code(tmp_path):
     ran(work(2), tmp_path)
-    said = ran(work(3), tmp_path)[1]
-    assert [key for key, what in said.items() if what.startswith("kept")] == ["squares/1", "squares/0"]
-    assert not any(what.startswith("kept") for what in ran(work(3), tmp_path)[1].values())
+    assert list(ran(work(3), tmp_path)[1]) == ["squares/2"]
+    assert list(ran(work(3), tmp_path)[1]) == []
+    kept = stored(tmp_path)
+    write_json(tmp_path / "paper.json", results.Kept(kept.results, {}, code="another"))
+    assert len(ran(work(3), tmp_path)[1]) == 3
+
+
+def test_a_failure_is_tried_again(tmp_path):
+    ran(work(4), tmp_path)
+    assert list(ran(work(4), tmp_path)[1]) == ["squares/3"]
+
+
+@pytest.mark.parametrize(
+    ("beside", "says"),
+    [({}, "were not run"), ({"paper": {"results": 3}}, "damaged"), ({"paper": {}}, "damaged")],
+)
+def test_what_is_missing_or_damaged_is_told(beside, says):
+    with pytest.raises(InputError, match=says):
+        results.load(beside)
 
 
 @dataclass(frozen=True)
@@ -137,7 +160,7 @@ def test_what_is_kept_comes_back_to_the_last_bit():
 
 def test_every_result_of_the_paper_can_be_kept():
     """Its function says what it returns; else it could not be read again."""
-    for task in report.tasks(PARTS):
+    for task in report.tasks():
         assert get_type_hints(results.function_of(task.run))["return"]
 
 
@@ -171,46 +194,42 @@ def test_pictures_are_kept_small_without_a_visible_difference():
     assert np.abs(before - after).mean() < 1.5  # of 255; measured 1.04: the palette has white as 254
 
 
-def test_an_unknown_part_is_refused_with_the_nearest_name(capsys):
-    assert main(["paper", "sitnikof"]) == 2
-    assert "sitnikov" in capsys.readouterr().err
+@pytest.fixture
+def small_paper(monkeypatch):
+    """Return the campaign with one method, and one of the paper's parts."""
+    campaign = load("paper")
+    methods = [replace(campaign.methods[0], use=["HBVM(k=18, s=2, h=0.5)"])]
+    monkeypatch.setattr(report, "PARTS", (properties_part.PART,))
+    monkeypatch.setattr("hbvm_bench.commands.paper.load", lambda name: replace(campaign, methods=methods))
 
 
-def test_a_part_is_written_whole_drawn_again_and_loses_little_where_a_result_is_missing(tmp_path, capsys):
-    assert main(["paper", "claims", "--jobs", "1", "--out", str(tmp_path)]) == 0
-    files = {
-        str(path.relative_to(tmp_path)): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()
-    }
+@pytest.mark.slow
+def test_a_report_is_written_whole_drawn_again_and_loses_little_where_a_result_is_missing(
+    small_paper, tmp_path, capsys
+):
+    assert main(["paper", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    folder = tmp_path / "report"
+    files = {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     html, markdown = files["index.html"].decode(), files["report.md"].decode()
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
-    for link in re.findall(r"\]\(((?:figures|data)/[^)]+)\)", markdown) + re.findall(
-        r'href="((?:figures|data)/[^"]+)"', html
-    ):
-        assert link in files, link
     assert "**8** confirmed · **0** confirmed in part · **0** not found" in markdown
 
-    for path in ("index.html", "report.md"):
-        (tmp_path / path).unlink()
-    assert main(["paper", "claims", "--redraw", "--out", str(tmp_path)]) == 0
-    for name, content in files.items():
-        assert (tmp_path / name).read_bytes() == content, name
+    for place in (tmp_path, folder):  # from the store, and from the archive alone
+        assert main(["report", str(place), "--out", str(tmp_path / "again")]) == 0
+        for name in ("index.html", "report.md", NAME):
+            assert (tmp_path / "again" / name).read_bytes() == files[name], (place, name)
 
-    kept = results.load(tmp_path)
+    kept = stored(tmp_path)
     del kept.results["claims/orders"]
-    results.save(kept, tmp_path)
-    assert main(["paper", "claims", "--redraw", "--out", str(tmp_path)]) == 1
+    write_json(tmp_path / "paper.json", kept)
+    assert main(["report", str(tmp_path), "--out", str(tmp_path / "again")]) == 1
     assert (
         "not made: the order: InputError: the computation 'claims/orders' was not run."
         in capsys.readouterr().err
     )
-    text = (tmp_path / "report.md").read_text(encoding="utf-8")
+    text = (tmp_path / "again" / "report.md").read_text(encoding="utf-8")
     assert "**Not made: the order**" in text
     assert "Conservation from k ≥ νs/2" in text
-
-
-def test_what_is_not_there_cannot_be_drawn_again(tmp_path, capsys):
-    assert main(["paper", "--redraw", "--out", str(tmp_path)]) == 2
-    assert "run hbvm-bench paper first" in capsys.readouterr().err
 
 
 def test_a_library_that_refuses_is_a_row_with_its_reason():

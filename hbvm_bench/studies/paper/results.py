@@ -1,7 +1,8 @@
-"""The computations behind the report on the paper: run side by side, kept, and read again.
+"""The computations behind the page on the paper: run side by side, kept beside the cases, and read again.
 
-What a computation returns is kept as MessagePack, in which not-a-number and every bit of a
-double survive; the type that its function is annotated with says how it is read again.
+They are what no integration of a campaign is: bisections, maps of many starts, sections, orders. What one
+returns is kept as MessagePack, in which not-a-number and every bit of a double survive; the type that its
+function is annotated with says how it is read again.
 """
 
 import functools
@@ -9,8 +10,9 @@ import re
 import time
 import traceback
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -21,12 +23,13 @@ import numpy as np
 from hbvm_bench.campaign.identity import digest_of
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.run import executors
-from hbvm_bench.store.files import atomic
+from hbvm_bench.store.files import write_json
+from hbvm_bench.store.records import Record
+from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 POOL = "concurrent.futures:ProcessPoolExecutor"
-NAME = "data/results.msgpack"  # beside the report
-SCHEMA = 1
+NAME = "paper"  # of what a store keeps beside its cases
 
 
 @dataclass(frozen=True)
@@ -66,23 +69,21 @@ class Part:
 
 
 class Kept(msgspec.Struct, frozen=True):
-    """What came out, by task: the packed result, or why there is none; and how it was made."""
+    """What came out, by task: the packed result, or why there is none; and by what code."""
 
     results: dict[str, bytes]
     failed: dict[str, str]
-    command: str
     code: str
-    schema: int = SCHEMA
 
 
 class Results:
     """What the computations of a part returned, by their names; asking for one that failed says why.
 
-    What `split` divided is put together again.
+    What `split` divided is put together again. ``records`` are the cases of the run, by method.
     """
 
-    def __init__(self, part: Part, kept: Kept) -> None:
-        self.part, self.kept = part.key, kept
+    def __init__(self, part: Part, kept: Kept, records: Mapping[str, Record] | None = None) -> None:
+        self.part, self.kept, self.records = part.key, kept, records or {}
         self.tasks = {task.key: task for task in part.tasks}
         self.read: dict[str, Any] = {}
 
@@ -104,37 +105,26 @@ class Results:
         return unpacked(self.kept.results[key], self.tasks[key].run)
 
 
-def run_all(
-    tasks: Sequence[Task], jobs: int, command: str, directory: Path, done: Callable[[str, str], None]
-) -> Kept:
+def run_all(tasks: Sequence[Task], jobs: int, store: Store, done: Callable[[str, str], None]) -> Kept:
     """Run tasks in so many processes, or here; keep each result at once, so that an end loses no other.
 
-    Where an earlier run of the same code did not come to its end, this one goes on. ``command`` is printed
-    as the way to get it all again, ``directory`` is the report's, and ``done`` is called with the key of
-    each task that has ended and what to say of it.
+    Those that this code has computed for the store are not run again. ``done`` is called with the key of each
+    task that has ended and what to say of it.
     """
     code = digest_of(tuple({function_of(task.run).__module__ for task in tasks}))
-    kept = _unfinished(directory, tasks, code) or Kept({}, {}, command, code)
-    for key in kept.results:
-        done(key, "kept from the run before")
+    kept = Kept({}, {}, code)
+    with suppress(InputError):
+        before = load(store.beside())
+        kept = Kept(before.results, {}, code) if before.code == code else kept
     left = sorted((task for task in tasks if task.key not in kept.results), key=lambda task: -task.cost)
     for key, data, why, seconds in _outcomes(left, jobs):
         if why:
             kept.failed[key] = why
         else:
             kept.results[key] = data
-        save(kept, directory)
+        write_json(store.directory / f"{NAME}.json", kept)
         done(key, why or f"{seconds:.1f} s")
     return kept
-
-
-def _unfinished(directory: Path, tasks: Sequence[Task], code: str) -> Kept | None:
-    try:
-        kept = load(directory)
-    except InputError:
-        return None
-    whole = {task.key for task in tasks} <= set(kept.results)
-    return None if whole or kept.code != code else msgspec.structs.replace(kept, failed={})
 
 
 def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, str, float]]:
@@ -152,32 +142,20 @@ def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, st
                 yield futures[future], b"", f"ended with {type(error).__name__}: {error}", 0.0
 
 
-def save(kept: Kept, directory: Path) -> None:
-    """Write the results beside their report, all of them or nothing."""
-    with atomic(directory / NAME) as temporary:
-        temporary.write_bytes(msgspec.msgpack.encode(kept))
-
-
-def load(directory: Path) -> Kept:
-    """Read the results that lie beside a report.
+def load(beside: Mapping[str, object]) -> Kept:
+    """Return what a store or an archive keeps beside its cases.
 
     Raises
     ------
     problems.errors.InputError
-        If there are none, or they were written by another version.
+        If there is nothing, or something else.
     """
-    path = directory / NAME
+    if NAME not in beside:
+        raise InputError("the paper's computations were not run; run hbvm-bench paper first.")
     try:
-        kept = msgspec.msgpack.decode(path.read_bytes(), type=Kept)
-    except OSError as error:
-        raise InputError(
-            f"cannot read {str(path)!r}: {error.strerror}; run hbvm-bench paper first."
-        ) from None
-    except msgspec.MsgspecError as error:
-        raise InputError(f"{str(path)!r} does not hold the paper's results: {error}.") from None
-    if kept.schema != SCHEMA:
-        raise InputError(f"{str(path)!r} was written by another version; run hbvm-bench paper again.")
-    return kept
+        return msgspec.convert(beside[NAME], Kept)
+    except msgspec.ValidationError as error:
+        raise InputError(f"what is kept of the paper's computations is damaged: {error}.") from None
 
 
 def packed(value: Any) -> bytes:

@@ -81,7 +81,10 @@ def rows(text):
     return sorted(re.findall(r"^\| \d+ \| `.*$", text, re.MULTILINE))
 
 
-@pytest.mark.parametrize("name", [name for name in ARCHIVED if (REPORTS / name / "report.md").is_file()])
+ROWS = [name for name in ARCHIVED if name != "paper" and (REPORTS / name / "report.md").is_file()]
+
+
+@pytest.mark.parametrize("name", ROWS)  # the other pages are compared whole, in report/test_document.py
 def test_a_committed_archive_has_the_numbers_of_its_text(name):
     folder = REPORTS / name
     made = document(archive.opened([folder]))

@@ -1,4 +1,4 @@
-"""The paper's three problems with the established libraries, at one setting each, chosen for accuracy."""
+"""Two of the paper's problems with the established libraries, at one setting each, chosen for accuracy."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 
 from hbvm_bench.campaign.identity import make_method
-from hbvm_bench.reference import solutions
-from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus, sitnikov
+from hbvm_bench.studies.paper.experiments import henon_heiles, period_annulus
 from hbvm_bench.summaries.table import NONE, Table
 from integrators import Solution, integrate
 from integrators.protocol import MethodBase
@@ -24,10 +23,6 @@ GLOBAL = 'IAS15(mode="global")'
 MAPS = ("WHFast(h=0.02)", "SemiImplicitEuler(h=0.02)")
 EXPLICIT = ("Dopri8(rtol=1e-13, atol=1e-15)", "DOP853(rtol=3e-14, atol=1e-16)")
 LIBRARIES = (TAYLOR, GLOBAL, "Leapfrog(h=0.05, order=8)", *MAPS, *EXPLICIT)
-SITNIKOV = (
-    *("Gauss(s=2, h=0.5)", "HBVM(k=18, s=2, h=0.5)", "HBVM(k=16, s=8, h=0.125)"),
-    *(TAYLOR, "IAS15()", GLOBAL, "Leapfrog(h=0.02, order=8)", *MAPS, *EXPLICIT),
-)
 HENON_HEILES = ("Gauss(s=2, h=1.0)", "HBVM(k=4, s=2, h=1.0)", "HBVM(k=12, s=8, h=0.5)", *LIBRARIES)
 PERIOD_ANNULUS = ("Gauss(s=2, h=1.0)", "HBVM(k=5, s=2, h=1.0)", "HBVM(k=15, s=6, h=0.25)", *LIBRARIES)
 HENON_SPAN = 5000.0
@@ -76,24 +71,6 @@ def measured(place: str, text: str) -> Row:
     return Row(text, {}, refused) if refused is not None else Row(text, *run(method, problem))
 
 
-def _on_sitnikov(method: MethodBase, problem: Problem) -> Found:
-    """Return largest errors of H and M, distance off the axis, error of z at the end, field evaluations."""
-    solution = integrate(problem, method, times=np.arange(0.0, sitnikov.T_END + 0.5, 0.5))
-    if solution.status.failed:
-        return {}, _ended(solution)
-    errors, known = solution.errors(), solutions.find(problem)
-    numbers = {
-        "energy": float(errors["energy"].max()),
-        "momentum": float(errors["angular_momentum"].max()),
-        "off_axis": float(solution.guards()["off_axis"].max()),
-    }
-    if known is not None:
-        numbers["z"] = float(abs(solution.y[-1, 8] - known.high[-1, 8]))
-    if solution.stats.evaluations:
-        numbers["evaluations"] = float(solution.stats.evaluations)
-    return numbers, ""
-
-
 def _on_henon_heiles(method: MethodBase, problem: Problem) -> Found:
     """Return the largest error of H, the distance beyond the triangle, and how long the orbit is true."""
     times = np.arange(0.0, HENON_SPAN + 1.0)
@@ -120,7 +97,6 @@ def _ended(solution: Solution) -> str:
 
 
 PLACES: dict[str, tuple[Callable[[MethodBase, Problem], Found], Callable[[], Problem]]] = {
-    "sitnikov": (_on_sitnikov, sitnikov.problem),
     "henon-heiles": (_on_henon_heiles, partial(henon_heiles.start, HENON_SPAN)),
     "period-annulus": (_on_period_annulus, lambda: period_annulus.PROBLEM),
 }
