@@ -1,5 +1,6 @@
 """Formulas as drawings inside the page: no script and no font from elsewhere, alike in every browser."""
 
+import re
 from typing import Any
 from xml.etree import ElementTree
 
@@ -9,6 +10,7 @@ from sphinx.application import Sphinx
 from ziamath.nodes import msubsup
 
 SIZE = 18  # pixels of the formula's em; the page's text has 16
+SUM = re.compile(r"(\\sum(?:[_^](?:\{[^{}]*\}|\w))*) *")  # with its limits, which may be wider than the sign
 KERN = 0.35  # part of the library's kerning of subscripts that is left
 
 ziamath.config.math.color = "currentColor"  # light on dark pages
@@ -31,7 +33,7 @@ msubsup.place_sub = _spaced
 
 
 def _drawn(latex: str, *, inline: bool) -> str:
-    formula = ziamath.Latex(latex, size=SIZE, inline=inline)
+    formula = ziamath.Latex(SUM.sub(r"\1\\,", latex), size=SIZE, inline=inline)
     drawing = formula.svgxml()
     drawing.set("role", "img")
     drawing.set("aria-label", latex)

@@ -1,6 +1,7 @@
 """Links to the reports of the repository: to their pages, which are put beside the site."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.osutil import relative_uri
+
+LINK = re.compile(r'href="([\w./-]+)"')
 
 
 class Reports(SphinxPostTransform):
@@ -32,6 +35,16 @@ class Reports(SphinxPostTransform):
             target = Path(self.app.outdir) / address
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(page, target)
+            _copy_what_it_links_to(page, target.parent)
+
+
+def _copy_what_it_links_to(page: Path, folder: Path) -> None:
+    """Put the files beside a report that its page links to, such as its results, beside the page's copy."""
+    for name in set(LINK.findall(page.read_text(encoding="utf-8"))):
+        source = (page.parent / name).resolve()
+        if page.parent in source.parents and source.is_file() and source != page:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, folder / name)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -16,6 +16,7 @@ CELL = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```", re.MULTILINE | re.DOTALL)
+TITLED = re.compile(r"^.* <(.*)>$")  # a page under another title
 CARD = re.compile(r"^:link: (\S+)$", re.MULTILINE)
 DOC = re.compile(r"\{doc\}`(?:[^`<]*<)?([^`>]+)>?`")
 FIGURE = re.compile(r"^```\{figure\} (\S+)", re.MULTILINE)
@@ -43,7 +44,8 @@ def listed(path: Path) -> list[str]:
     lines = [
         line for block in TOCTREE.findall(text) for line in block.split("\n") if not line.startswith(":")
     ]
-    return [line.strip() for line in [*lines, *CARD.findall(text), *DOC.findall(text)] if line.strip()]
+    named = [line.strip() for line in [*lines, *CARD.findall(text), *DOC.findall(text)] if line.strip()]
+    return [TITLED.sub(r"\1", name) for name in named]
 
 
 def page(name: str, source: Path) -> Path:
