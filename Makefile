@@ -27,12 +27,13 @@ test-all: venv  ## with the slow tests: studies that are run whole, and killed i
 test-aarch64: venv  ## each way through the kernel once on an emulated aarch64, 5 minutes; needs Debian's apt-get and qemu-user-static
 	.ci/aarch64
 
-docs: pages  ## the site: docs/_build/html/index.html
+docs: pages  ## the site, docs/_build/html/index.html, and its links checked
 	@lock="$$(sha256sum < requirements-docs.lock)"; \
 	if [ "$$(cat $(VENV)/.docs 2>/dev/null)" != "$$lock" ]; then \
 	  $(PIP) --require-hashes -r requirements-docs.lock && echo "$$lock" > $(VENV)/.docs; \
 	fi
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m tests.docs.links docs/_build/html
 
 lint: venv  ## ruff, pyright, import-linter
 	$(BIN)/ruff check .
