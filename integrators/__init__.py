@@ -11,6 +11,7 @@ from integrators import registry
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.running.integrate import integrate
 from integrators.running.many import Solutions, integrate_many
+from integrators.running.run import Run, start
 from integrators.running.watch import Progress
 from integrators.solution import Solution, load
 from problems import deprecated
@@ -30,6 +31,7 @@ __all__ = [
     "Gauss",
     "MethodBase",
     "Progress",
+    "Run",
     "Samples",
     "Solution",
     "Solutions",
@@ -43,6 +45,7 @@ __all__ = [
     "registry",
     "section",
     "stability",
+    "start",
 ]
 
 _LATER = {  # imported when first used

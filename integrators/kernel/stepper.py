@@ -5,6 +5,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 from typing import Any, ClassVar, Protocol
 
@@ -284,9 +285,29 @@ class HBVMStepper(ABC):
     @one_thread
     def step(self) -> Status:
         """Take one step; after a failure, do nothing."""
-        if not self._status.failed:
+        plain = self.search is None and self.stop is None and self._implicit is None
+        if not self._status.failed and not (plain and self._one()):
             self.take(1)
         return self._status
+
+    @abstractmethod
+    def _one(self) -> bool:
+        """Take one step by one call of the kernel; return whether it is taken, or has failed for good."""
+
+    def _is_one(self, outcome: int, taken: int) -> bool:
+        """Whether such a call, which comes back with ``taken`` after a step, is all there is to do."""
+        if outcome == taken and self._context.made == 1:
+            return True
+        outcome = self._handled(outcome)
+        if outcome != BUDGET:
+            self._samples(np.empty(0), np.empty((0, self._dim)), outcome)
+        return outcome != BUDGET
+
+    @cached_property
+    def _room(self) -> tuple[Array, Array, int, int]:
+        """Two numbers and two states for the kernel to write to, and where they are."""
+        numbers, states = np.zeros(2), np.empty((2, self._dim))
+        return numbers, states, address(numbers), address(states)
 
     @abstractmethod
     def take(self, count: int) -> Samples:
@@ -406,14 +427,23 @@ class HBVMStepper(ABC):
         """Call the kernel once; put the implicit solver to work where it is wanted."""
         if self._wants_solver:
             self._take_implicit()
+        with self._pace:
+            outcome = self._enter(
+                what, self._context.address, self._side.address, between, times.size,
+                address(times), targets, parts, made, address(out), budget,
+            )  # fmt: skip
+        return self._handled(outcome)
+
+    def _enter(self, *arguments: int) -> int:
+        """Return how the kernel came back."""
         try:
-            with self._pace:
-                outcome = steps(
-                    what, self._context.address, self._side.address, between, times.size,
-                    address(times), targets, parts, made, address(out), budget,
-                )  # fmt: skip
+            return steps(*arguments)
         except UserError as raised:
-            outcome, self.error = NOT_FINITE, raised.error
+            self.error = raised.error
+            return NOT_FINITE
+
+    def _handled(self, outcome: int) -> int:
+        """Do what the kernel came back for; return whether it may go on, or what it ended with."""
         if self.stop is not None and self.stop.is_set():
             raise KeyboardInterrupt
         for workspace in self._implicit or ():

@@ -75,6 +75,15 @@ class AdaptiveStepper(HBVMStepper):
             extra["kinks"] = [(float(t), float(h)) for t, h in kept]
         return extra
 
+    def _one(self) -> bool:
+        if self._breakpoints.size or self._max_steps is not None:
+            return False
+        (ends, _, place, out), ctx = self._room, self._context
+        ends[0] = math.copysign(sys.float_info.max, ctx.next_length)
+        return self._is_one(
+            self._enter(engine.WALK, ctx.address, self._side.address, SIDE, 2, place, 0, 0, 0, out, 1), BUDGET
+        )
+
     @one_thread
     def take(self, count: int) -> Samples:
         """Take ``count`` own steps and return them."""
@@ -159,8 +168,8 @@ class AdaptiveStepper(HBVMStepper):
                 self._restart(stop)
         return self._samples(times[:made], out[:made], outcome, why)
 
-    def _call(self, what: int, between: int, times: Array, out: Array, *more: int) -> int:
-        outcome = super()._call(what, between, times, out, *more)
+    def _handled(self, outcome: int) -> int:
+        outcome = super()._handled(outcome)
         if outcome != UNSCALED:
             return outcome
         self._look_ahead()

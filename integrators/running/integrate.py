@@ -132,9 +132,9 @@ def integrate(
                 progress=bar, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
             )  # fmt: skip
 
-    program, known = _compiled(method, problem.system)
+    program, known = prepared(method, problem.system)
     grid = _grid(problem, times)
-    wanted = _wanted(events, sample)
+    wanted = wanted_events(events, sample)
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
@@ -145,7 +145,7 @@ def integrate(
             kept = read(earlier, belongs)
         watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)
 
-    stepper = _start(program, method, problem, wanted, end)
+    stepper = started(program, method, problem, wanted, problem.y0, problem.par, problem.t0, end)
     if (checkpoint is not None or resume is not None) and not offers(stepper, Checkpoints):
         raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
     if grid.size and offers(stepper, Destination):
@@ -234,7 +234,7 @@ def _lost(problem: Problem, method: MethodBase, samples: Samples, steps: int) ->
     )[0]  # fmt: skip
 
 
-def _compiled(method: MethodBase, system: System) -> tuple[Program, float | None]:
+def prepared(method: MethodBase, system: System) -> tuple[Program, float | None]:
     """Return the method compiled for the system, and the seconds it took if that was for an earlier call.
 
     The last programs of a system are kept with it, and end with it.
@@ -249,7 +249,7 @@ def _compiled(method: MethodBase, system: System) -> tuple[Program, float | None
     return program, None
 
 
-def _wanted(events: Any, sample: str | None) -> dict[str, Event]:
+def wanted_events(events: Any, sample: str | None) -> dict[str, Event]:
     """Return the events to look for, by name."""
     if isinstance(events, tuple | list) and not events:
         return {}
@@ -260,15 +260,15 @@ def _wanted(events: Any, sample: str | None) -> dict[str, Event]:
     return named(events)
 
 
-def _start(
-    program: Program, method: MethodBase, problem: Problem, events: dict[str, Event], end: float
-) -> Any:
-    """Return a stepper at the problem's start; what a function of the user raises there is raised."""
+def started(
+    program: Program, method: MethodBase, problem: Problem, events: dict[str, Event],
+    y: Array, par: Array, t: float, end: float,
+) -> Any:  # fmt: skip
+    """Return a stepper at a start; what a function of the user raises there is raised."""
     try:
         if events:
-            start = started_with_events(program, method, problem, events)
-            return start(problem.y0, problem.par, problem.t0, end)
-        return program.start(problem.y0, problem.par, problem.t0)
+            return started_with_events(program, method, problem, events)(y, par, t, end)
+        return program.start(y, par, t)
     except UserError as raised:
         raise raised.error from None
 
