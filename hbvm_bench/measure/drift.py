@@ -106,6 +106,12 @@ def told(starts: int) -> str:
     )
 
 
+def uncertainty(starts: int) -> str:
+    """Return how well so many starts know a root mean square; nothing for one start."""
+    share = 100.0 / math.sqrt(2.0 * starts) if starts > 1 else 0.0
+    return f" A root mean square over {starts} starts is known to ±{share:.0f} %." if share else ""
+
+
 def mean(t: ArrayLike, errors: ArrayLike) -> Law:
     """Return the mean over the starts of what the errors have grown by at the end, without a law.
 

@@ -44,7 +44,8 @@ steps, by a partial step aside, by its own step's polynomial at full order, or b
 
 heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels
 come, built for any processor of the kind. SciPy's solvers are Python and call a vector field
-compiled by numba.
+compiled by numba: on a small system most of their time is Python's, and a ratio of times to them is
+one of implementations. The evaluations compare the methods.
 
 A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; the
 numbers of the part that it did run are void.

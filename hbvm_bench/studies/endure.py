@@ -23,7 +23,7 @@ from hbvm_bench.store.records import Law
 from hbvm_bench.summaries import outcomes, standings
 from hbvm_bench.summaries.goals import Verdict, verdicts
 from hbvm_bench.summaries.goals import table as goals_table
-from hbvm_bench.summaries.laws import power_of
+from hbvm_bench.summaries.laws import SHORT, power_of
 from hbvm_bench.summaries.points import number
 from hbvm_bench.summaries.rows import seconds
 from hbvm_bench.summaries.table import NONE, Table
@@ -257,7 +257,7 @@ def tables(result: Endurance) -> list[Table]:
             "error, after the offset of each has been taken off. "
             + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
             + "Power of t and the drift a year with 95 % "
-            "intervals over the starts. Time: median of one trajectory.",
+            "intervals over the starts. Time: median of one trajectory." + drift.uncertainty(result.starts),
             words=(0, 2 + len(heads)),
             groups=(("", 2), ("rms", len(heads)), ("", 2), ("drift", 2), ("", 2)),
         )
@@ -268,7 +268,9 @@ def tables(result: Endurance) -> list[Table]:
 
 
 def _named(law: Law) -> str:
-    return drift.LAWS[law.law].removeprefix("grows like ") if law.law else law.why
+    if law.law is None:
+        return law.why
+    return "grows" if SHORT[law.law] == "t^a" else drift.LAWS[law.law]
 
 
 def _mean(law: Law) -> str:

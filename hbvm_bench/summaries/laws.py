@@ -2,61 +2,67 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from statistics import median
 
+from hbvm_bench.measure import drift
 from hbvm_bench.store.records import Law, Record
 from hbvm_bench.summaries.points import by_family
 from hbvm_bench.summaries.rows import reached
-from hbvm_bench.summaries.table import Table
+from hbvm_bench.summaries.table import NONE, Table
 
 SHORT = {
     "bounded": "bounded",
-    "square root": "t^1/2",
-    "linear": "t",
+    "square root": "t^a",
+    "linear": "t^a",
     "power": "t^a",
     "exponential": "exp t",
     "drift": "drift",
 }
-"""Every law in a few signs, by the keys of `hbvm_bench.measure.drift.LAWS`."""
+"""Every law in a few signs, by the keys of `hbvm_bench.measure.drift.LAWS`; powers have exponents."""
+NOT_CLEAR = "not clear"
 
 
-def counts(records: Sequence[Record]) -> dict[str, Counter[str]]:
-    """Return for each family how many cases have which law of the energy; ``"none"`` where none is clear."""
+def by_method(records: Sequence[Record]) -> dict[str, list[Law]]:
+    """Return for each family the laws of the energy of its cases on their trajectory."""
     found = [one for one in records if "energy" in one.result.laws and reached(one)]
-    return {
-        family: Counter(one.result.laws["energy"].law or "none" for one in members)
-        for family, members in by_family(found).items()
-    }
+    return {family: [one.result.laws["energy"] for one in each] for family, each in by_family(found).items()}
 
 
 def table(records: Sequence[Record]) -> Table | None:
     """Return how many cases of each method follow which law; ``None`` where no law was sought."""
-    counted = counts(records)
-    if not counted:
+    found = by_method(records)
+    if not found:
         return None
-    kinds = [*SHORT, "none"]
+    kinds = [*dict.fromkeys(SHORT.values()), NOT_CLEAR]
+    rows = []
+    for family, laws in found.items():
+        counted = Counter(SHORT[law.law] if law.law else NOT_CLEAR for law in laws)
+        powers = sorted(
+            law.slope for law in laws if law.slope is not None and SHORT.get(law.law or "") == "t^a"
+        )
+        middle = f"{median(powers):.2f} ({powers[0]:.2f} to {powers[-1]:.2f})" if powers else NONE
+        rows.append((family, *(str(counted.get(kind, NONE)) for kind in kinds), middle))
+    starts = max(law.starts for laws in found.values() for law in laws)
     return Table(
-        "The law of the energy's drift",
-        ("method", *(SHORT.get(kind, "not clear") for kind in kinds)),
-        [(family, *(str(by.get(kind, "–")) for kind in kinds)) for family, by in counted.items()],
-        "How many cases of each method follow which law.",
+        "How the energy error grows",
+        ("method", *kinds, "a"),
+        rows,
+        "How many cases of each method follow which law; a: median of the exponents, in brackets the least "
+        "and the largest. The interval of each exponent is beside its case." + drift.uncertainty(starts),
     )
 
 
 def text(law: Law) -> str:
-    """Return a law in a few signs: ``"t^1/2 (0.52, 0.41 to 0.63)"``, ``"drift (-8.5e-14 ± 9e-15)"``."""
+    """Return a law in a few signs: ``"t^0.52 (0.41 to 0.63)"``, ``"drift (-8.5e-14 ± 9e-15)"``."""
     if law.law is None:
-        return law.why or "not clear"
+        return law.why or NOT_CLEAR
     if law.law == "bounded":
         return "0" if law.floor == 0 else f"bounded at {law.floor:.1e}"
     if law.law == "exponential":
         return SHORT[law.law] if law.growth is None else f"exp({law.growth:.2g} t)"
     if law.law == "drift" and law.mean is not None and law.mean_error is not None:
         return f"drift ({law.mean:+.1e} ± {law.mean_error:.0e})"
-    if law.slope is None:
-        return SHORT[law.law]
-    if law.slope_low is None or law.slope_high is None:
-        return f"{SHORT[law.law]} ({law.slope:.2f})"
-    return f"{SHORT[law.law]} ({law.slope:.2f}, {law.slope_low:.2f} to {law.slope_high:.2f})"
+    return SHORT[law.law] if law.slope is None else f"t^{power_of(law)}"
 
 
 def power_of(law: Law) -> str:

@@ -49,6 +49,9 @@ the method nothing; it is evaluated in double-double arithmetic.
 
 The position error is that of the end state of the very run that is timed. {position}
 
+SciPy's DOP853 is Python and calls a compiled vector field: on a small system most of its time is Python's,
+and a ratio of times to it is one of implementations. The evaluations compare the methods.
+
 A setting too slow for all rounds takes part in fewer, and the table says so. What did not finish, or
 does not apply, is a row with its reason.
 """
