@@ -1,7 +1,6 @@
 """What the command line shows while a run is under way."""
 
 import time
-from collections import Counter
 from collections.abc import Sequence
 
 from rich.console import Group, RenderableType
@@ -12,12 +11,11 @@ from rich.text import Text
 
 from hbvm_bench.campaign.identity import Resolved
 from hbvm_bench.report.terminal import console
-from hbvm_bench.run.estimate import Estimate, in_words
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.rows import seconds, status_of
 
 SHOWN = 12  # running cases with a line of their own
-EVERY = 30.0  # seconds between two estimates where the output is a file
+EVERY = 30.0  # seconds between two lines on what runs where the output is a file
 
 
 class Live:
@@ -28,10 +26,7 @@ class Live:
         self._start = time.monotonic()
         self._title = ""
         self._total = self._count = 0
-        self._left: Counter[str] = Counter()
         self._since: dict[str, tuple[Resolved, float]] = {}
-        self._slots = 1
-        self._estimate = Estimate({}, 0.0)
         self._round = -1
         self._told = self._start
         self._live = RichLive(
@@ -47,11 +42,9 @@ class Live:
         if self._live.is_started:
             self._live.stop()
 
-    def phase(self, title: str, left: Sequence[str], done: int, estimate: Estimate) -> None:
-        """Begin a phase: with the ids of the cases to come, each as often as it comes, after those done."""
-        self._title, self._estimate = title, estimate
-        self._total, self._count, self._left = len(left) + done, done, Counter(left)
-        self._since = {}
+    def phase(self, title: str, left: int, done: int) -> None:
+        """Begin a phase: with how many cases are to come, after those done."""
+        self._title, self._total, self._count, self._since = title, left + done, done, {}
         kept = f", {done} already there" if done else " to do"
         self._console.print(f"{title}: {self._total}{kept}")
 
@@ -59,13 +52,12 @@ class Live:
         """Say which cases run now."""
         now = time.monotonic()
         self._since = {case.id: self._since.get(case.id, (case, now)) for case in cases}
-        self._slots = max(len(cases), 1)
-        if not cases and self._left.total():
+        if not cases and self._count < self._total:
             self._say_sometimes("no worker is there; waiting for one")
 
     def case(self, record: Record) -> None:
         """Report a case that has ended."""
-        self._ended(record.id, record.seconds)
+        self._count += 1
         status = status_of(record)
         self._console.print(
             Text.assemble(
@@ -87,8 +79,7 @@ class Live:
 
     def visited(self) -> None:
         """Say that the visit under way has ended."""
-        for key, (_, since) in self._since.items():
-            self._ended(key, time.monotonic() - since)
+        self._count += len(self._since)
         self._since = {}
 
     def say(self, words: str) -> None:
@@ -100,19 +91,8 @@ class Live:
         """Seconds since the start."""
         return time.monotonic() - self._start
 
-    def _ended(self, key: str, taken: float) -> None:
-        self._count += 1
-        self._left[key] -= 1
-        self._estimate.learn(key, taken)
-
     def _summary(self) -> str:
-        waiting = Counter(self._left)
-        waiting.subtract(self._since.keys())
-        now = time.monotonic()
-        running = {key: now - since for key, (_, since) in self._since.items()}
-        left = self._estimate.left(list(waiting.elements()), running, self._slots)
-        words = f"{self._count} of {self._total} done, {len(running)} running"
-        return words if self._count == self._total else f"{words}, {in_words(left)}"
+        return f"{self._count} of {self._total} done, {len(self._since)} running"
 
     def _say_sometimes(self, words: str) -> None:
         if not self._live.is_started and time.monotonic() - self._told > EVERY:

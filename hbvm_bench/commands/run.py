@@ -20,7 +20,6 @@ from hbvm_bench.commands.live import Live
 from hbvm_bench.measure import machine, reading
 from hbvm_bench.report import terminal
 from hbvm_bench.run import checked, executors, loop, references, supervise, timing_pass
-from hbvm_bench.run.estimate import Estimate
 from hbvm_bench.run.executors import Pool
 from hbvm_bench.run.task import InterruptedRunError, UnfinishedRunError
 from hbvm_bench.store.files import ensure_writable
@@ -246,9 +245,7 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, ti
     missing = [case for case in cases if not loop.is_kept(case, store, campaign.limits)]
     with Live() as live:
         try:
-            estimate = Estimate(_known_seconds(store, missing), campaign.limits.wall_seconds)
-            ids = [case.id for case in missing]
-            live.phase(f"measuring {pool.where}", ids, len(cases) - len(missing), estimate)
+            live.phase(f"measuring {pool.where}", len(missing), len(cases) - len(missing))
             for record in loop.run_accuracy(missing, store, campaign.limits, pool, live.running):
                 live.case(record)
             if timing:
@@ -259,22 +256,12 @@ def _run(campaign: Campaign, cases: list[Resolved], store: Store, pool: Pool, ti
         live.say(f"done in {live.elapsed:.0f} s; results in {store.directory}")
 
 
-def _known_seconds(store: Store, missing: list[Resolved]) -> dict[str, float]:
-    """Return what the same problems and methods took in this directory before, stale or not."""
-    if not missing:
-        return {}
-    before = {(one.case.problem, one.case.method): one.seconds for one in store.everything()}
-    keys = {case.id: (case.case.problem, case.case.method) for case in missing}
-    return {id_: before[key] for id_, key in keys.items() if key in before}
-
-
 def _time(campaign: Campaign, cases: list[Resolved], store: Store, live: Live) -> None:
     visits = timing_pass.missing_visits(cases, store, campaign.timing)
     if not visits:
         return
     if old := timing_pass.outdated(cases, store, campaign.timing):
         live.say(f"the plan of the timing has changed: {old} cases are timed again")
-    known = {key: record.seconds for key in set(visits) if (record := store.load(key)) is not None}
-    live.phase("timing, one at a time", visits, 0, Estimate(known, campaign.limits.wall_seconds))
+    live.phase("timing, one at a time", visits, 0)
     timing_pass.time_cases(cases, store, campaign.timing, campaign.limits, live.visit)
     live.visited()

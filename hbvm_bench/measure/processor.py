@@ -2,7 +2,9 @@
 
 AVX-512 says how many numbers an instruction takes, not how many the processor works on
 at once: AMD's Zen 4 takes 512 bits in two halves, Zen 5's servers take them whole. The
-throughput of fused multiply-adds of 512 bits against those of 256 bits tells.
+throughput of fused multiply-adds of 512 bits against those of 256 bits tells. No table of
+processors does: archspec 0.2.7 lists instructions, not how they are executed, and on a virtual
+machine that hides some of them it says "zen2" of a Zen 3, which LLVM calls znver3.
 """
 
 import ctypes

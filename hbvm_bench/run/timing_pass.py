@@ -76,9 +76,9 @@ def time_cases(
                 store.save(replace(record, timing=timing))
 
 
-def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> list[str]:
-    """Return the ids that `time_cases` has to visit, each as often as it does, at most."""
-    return [group[0].id for _, group in _missing(cases, store, plan, machine.describe())]
+def missing_visits(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:
+    """Return how many visits `time_cases` has to make, at most."""
+    return len(_missing(cases, store, plan, machine.describe()))
 
 
 def outdated(cases: Sequence[Resolved], store: Store, plan: TimingPlan) -> int:

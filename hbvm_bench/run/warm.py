@@ -6,6 +6,11 @@ one that has done a case well; the next case of that library on that problem is 
 Every case has a process, a memory and an end of its own, and none is done in a process that did
 another one: what it finds there was loaded, and no more.
 
+``multiprocessing``'s fork server is not used. It forks only from a process that has imported, never from
+one that has loaded compiled code: a case of about 100 steps took 0.40 s with it, 0.07 s here and 1.36 s in a
+fresh interpreter (medians of 12 in a row, beside other work). It also cannot be replaced where it is stopped,
+and has one environment and one set of cores for all that it starts.
+
 A warm process is asked over a socket::
 
     runner -> warm process    the path of a request; with it the case's own socket and its output

@@ -157,7 +157,7 @@ def test_timing_keeps_all_samples_and_is_not_taken_twice(toys, store):
     cases = [resolve(case(method)) for method in ("Steady()", "Crashing()", "Stalling()")]
     for one in cases:
         run_case(one.case, str(store.directory), GENEROUS)
-    assert timing_pass.missing_visits(cases, store, PLAN) == 2 * [cases[0].id]
+    assert timing_pass.missing_visits(cases, store, PLAN) == 2
     visits = []
     timing_pass.time_cases(
         cases, store, PLAN, GENEROUS, lambda round_, one: visits.append((round_, one.case.method))
@@ -201,11 +201,11 @@ def test_a_timing_that_fails_says_why(toys, store):
     record = reading.kept(store, store.load(one.id))
     assert record.timing.why == "not timed: the time limit"
     assert record.result.metrics["warm_seconds"].why == "not timed: the time limit"
-    assert set(timing_pass.missing_visits([one], store, PLAN)) == {one.id}
+    assert timing_pass.missing_visits([one], store, PLAN) > 0
     once = TimingPlan(rounds=1, samples=1, shortest=1e-4, budget=0.1)
     timing_pass.time_cases([one], store, once, GENEROUS)
     assert store.load(one.id).timing.why == ""
-    assert timing_pass.missing_visits([one], store, once) == []
+    assert timing_pass.missing_visits([one], store, once) == 0
 
 
 def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
@@ -213,7 +213,7 @@ def test_the_cases_of_a_problem_are_timed_in_turn_by_one_process(toys, store):
     cases = [resolve(case(method)) for method in methods]
     for one in cases:
         run_case(one.case, str(store.directory), GENEROUS)
-    assert timing_pass.missing_visits(cases, store, TOGETHER) == [cases[0].id]
+    assert timing_pass.missing_visits(cases, store, TOGETHER) == 1
     visits = []
     timing_pass.time_cases(
         cases, store, TOGETHER, GENEROUS, lambda round_, one: visits.append(one.case.method)
@@ -267,7 +267,7 @@ def test_a_problem_is_timed_again_as_a_whole_where_one_of_its_cases_has_no_round
     timing_pass.time_cases(cases, store, TOGETHER, GENEROUS)
     before = store.load(cases[0].id)
     store.save(msgspec.structs.replace(store.load(cases[1].id), timing=None))
-    assert timing_pass.missing_visits(cases, store, TOGETHER) == [cases[0].id]
+    assert timing_pass.missing_visits(cases, store, TOGETHER) == 1
     timing_pass.time_cases(cases, store, TOGETHER, GENEROUS)
     first, second = (store.load(one.id).timing for one in cases)
     assert first.process == second.process != before.timing.process
@@ -279,7 +279,7 @@ def test_an_interleaved_timing_that_ends_at_its_limit_says_why(toys, store):
     run_case(one.case, str(store.directory), GENEROUS)
     timing_pass.time_cases([one], store, TOGETHER, Limits(wall_seconds=0.1))
     assert store.load(one.id).timing.why == "not timed: the time limit"
-    assert timing_pass.missing_visits([one], store, TOGETHER) == [one.id]
+    assert timing_pass.missing_visits([one], store, TOGETHER) == 1
 
 
 def test_a_stopped_run_stores_nothing_and_leaves_no_process(toys, store):
