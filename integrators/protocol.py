@@ -434,6 +434,37 @@ class EventStepper(Protocol):
         ...
 
 
+class Variations(Protocol):
+    """A stepper that tangent vectors can follow.
+
+    Attributes
+    ----------
+    variations : ndarray, shape (m, dim, n), or None
+        The vectors at the samples of the last ``advance``.
+    """
+
+    variations: Array | None
+
+    def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
+        """Let tangent vectors follow the trajectory from here on.
+
+        They are the derivatives of the steps that are taken, with the steps' lengths held fixed.
+
+        Parameters
+        ----------
+        state : array_like, shape (dim, n)
+            Their parts in the state.
+        parameters : array_like, shape (n_par, n)
+            Their parts in the parameters.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a system without a formula, and steps that are not those of a Runge-Kutta method.
+        """
+        ...
+
+
 class Events(Protocol):
     """A program whose steps can be searched for events."""
 

@@ -87,6 +87,8 @@ class Solution:
         What was integrated, and how.
     events : dict of str to Occurrences
         Times, states and directions of the events that were asked for, by name.
+    variations : ndarray, shape (n, dim, m), or None
+        Tangent vectors at these times, where they were asked for: columns in the order of what was asked.
     error : Exception or None
         What a function of the user raised, where ``status`` is ``USER_ERROR``.
 
@@ -111,6 +113,7 @@ class Solution:
     method: MethodBase
     events: Mapping[str, Occurrences] = field(default_factory=dict)
     error: Exception | None = None
+    variations: Array | None = None
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times that the trajectory covers.
@@ -336,6 +339,8 @@ class Solution:
             For a method that is not registered, or a file that cannot be written.
         """
         arrays: dict[str, NDArray[Any]] = {"t": self.t, "y": self.y}
+        if self.variations is not None:
+            arrays["variations"] = self.variations
         for name, found in self.events.items():
             arrays |= {f"event_{key}:{name}": value for key, value in vars(found).items()}
         words = {
@@ -407,6 +412,7 @@ def load(path: File, problem: Problem | None = None) -> Solution:
             problem=found,
             method=unpacked_method(words["method"], arrays),
             events={name: _occurrences(name, arrays, dim) for name in words["events"]},
+            variations=_variations(arrays, n, dim),
             error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
             reason=_of(str, words["reason"]),
             t_stop=_of(float, words["t_stop"]),
@@ -457,6 +463,11 @@ def _occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occ
         raise TypeError(f"the directions of {shown(name)} are not as many as its times")
     n = np.size(t)
     return Occurrences(doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64))
+
+
+def _variations(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> Array | None:
+    vectors = arrays.get("variations")
+    return None if vectors is None else doubles(vectors, (n, dim, vectors.shape[-1]), "variations")
 
 
 def write_whole(path: Path, write: Any) -> None:

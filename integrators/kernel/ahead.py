@@ -9,6 +9,7 @@ from integrators.kernel.implicit.engine import solver
 from integrators.kernel.line.engine import line
 from integrators.kernel.native import lowered
 from integrators.kernel.step.engine import steps
+from integrators.kernel.tangent.engine import follow
 
 ENGINES = {
     "steps": steps,
@@ -17,6 +18,7 @@ ENGINES = {
     "ensembles": run,
     "ensembles with own steps": run_own,
     "events": look,
+    "variations": follow,
 }
 
 

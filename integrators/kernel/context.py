@@ -46,6 +46,10 @@ MEASURE, EVALUATE = 1, 2
 # What a line integral does; see `Context.line`.
 VALUES, END, ARRIVE = range(3)
 
+# What vectors follow; see `Context.follow`: a solved STEP, a sample at the present STATE, or at the end of a
+# solved PART, and the present state's LANDING there.
+STEP, STATE, PART_END, LANDING = range(4)
+
 KINKS_KEPT = 64
 MOST_SIDES = 1 + MOST  # rows of what tells the sides of switching surfaces
 
@@ -224,6 +228,8 @@ class Context(Memory):
     left = Integer()  # steps of these that are left
     look = Integer()  # address of int64(context, memory), which looks for events in each step; 0: none
     look_memory = Integer()
+    follow = Integer()  # address of int64(what, context, memory), which vectors follow the steps by; 0: none
+    follow_memory = Integer()
 
     # --- counters ---
     steps = Integer()
@@ -334,6 +340,25 @@ class Context(Memory):
             return state[:rows].copy()
         places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
         return state[np.concatenate([places + 4, places])]
+
+    def write(self, y: Numbers) -> None:
+        """Set the state, given as `read` returns it."""
+        rows = self.shape.rows
+        if not self.shape.second:
+            self.state[:rows] = y
+            return
+        places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+        self.state[np.concatenate([places + 4, places])] = y
+
+    @property
+    def tables(self) -> dict[str, Numbers]:
+        """The tables of coefficients that it points to."""
+        slots = self.slots
+        return {
+            name: array
+            for name, array in self._pointed.items()
+            if isinstance(slot := slots[name], Array) and slot.of is float
+        }
 
     def set_factors(self, h: float) -> None:
         """Set h and what is h times the velocities."""

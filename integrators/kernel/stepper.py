@@ -29,11 +29,12 @@ from integrators.kernel.events.search import KernelSearch
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
 from integrators.kernel.line.kept import Kept
-from integrators.kernel.native import engine
+from integrators.kernel.native import binary, engine
 from integrators.kernel.native.memory import address
 from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
+from integrators.kernel.tangent.vectors import Directions, Vectors
 from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
@@ -60,6 +61,7 @@ class Program(Protocol):
     solver: Solver
     second: bool
     varying: bool
+    compile_seconds: float
 
     @property
     def description(self) -> str: ...
@@ -132,6 +134,9 @@ class HBVMStepper(ABC):
     crawl: Crawl | None = None
     """What watches the way to the destination; see `integrators.running.watchdog`."""
     time_limit = math.inf  # seconds after which ``advance`` returns what it has
+    variations: Array | None = None
+    """Tangent vectors at the last samples, shape (m, dim, n); see `follow`."""
+    _vectors: Vectors | None = None
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: Program, y: Array, par: Array, t0: float):
@@ -153,6 +158,19 @@ class HBVMStepper(ABC):
         self.search = KernelSearch(events, functions, contexts, code, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
+
+    def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
+        """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
+        system, program = self._program.system, self._program
+        if not system.traced or program.kept:
+            need = (
+                "a Runge-Kutta method: line integrals are none; use Gauss" if system.traced else "a formula"
+            )
+            raise InputError(f"variations of {system.name} need {need}.")
+        started = binary.clock()
+        directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))
+        self._vectors = Vectors(system, (self._context, self._side), directions)
+        program.compile_seconds += binary.clock() - started
 
     def look_to(self, end: float) -> Status:
         """Look for events from the last own step to a time that lies in the step ahead."""
@@ -214,7 +232,8 @@ class HBVMStepper(ABC):
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
         from others. With steps of varying length also the method's ``"k"`` and ``"s"`` and, where the field
         jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a step had to be cut for and the
-        length at which it was found, of the first 64 places.
+        length at which it was found, of the first 64 places. With variations ``"variations"``, a dict: their
+        iterations.
         """
         ctx = self._context
         return Stats(
@@ -242,6 +261,8 @@ class HBVMStepper(ABC):
                 "switches": ctx.switches,
                 **report(*self._implicit),
             }
+        if self._vectors is not None:
+            extra["variations"] = {"iterations": self._vectors.iterations}
         return extra
 
     @property
@@ -402,6 +423,8 @@ class HBVMStepper(ABC):
         times, *given = [np.ascontiguousarray(each) for each in (times, *steps_and_parts)]
         addresses = [address(array) for array in given]
         out = np.empty((times.size, self._dim))
+        if self._vectors:
+            self._vectors.room(times.size)
         outcome, made, why, ctx = BUDGET, 0, None, self._context
         late = perf_counter() + self.time_limit
         while outcome == BUDGET and why is None and not (made and perf_counter() > late):
@@ -410,6 +433,8 @@ class HBVMStepper(ABC):
             made = ctx.made
             if outcome == BUDGET:
                 why = self._ended(ctx.steps - before)
+        if self._vectors:
+            self._vectors.note(times[:made])
         return out[:made], outcome, why
 
     def _budget(self) -> int:
@@ -462,12 +487,19 @@ class HBVMStepper(ABC):
             why = self._failure(outcome)
         if why is not None:
             self._status, self._reason = why
+        if self._vectors:
+            self.variations = self._vectors.take(t)
         return Samples(t, y, Status.FINISHED if why is None else why[0], self._reason)
 
     def _failure(self, outcome: int) -> tuple[Status, str]:
         """Return the status that an outcome stands for, and the reason as a sentence."""
         if self.error is not None:
             return Status.USER_ERROR, f"{UserError(self.error)} in the step from t = {self.t!r}."
+        if self._vectors is not None and self._vectors.failed:
+            return Status.NONLINEAR_DIVERGENCE, (
+                f"the equations of the variations were not solved in the step from t = {self.t!r}, "
+                f"h = {self._context.h!r}; take a smaller h."
+            )
         if outcome == HALTED and self.search is not None:
             return Status.EVENT, self.search.hits.reason
         return failure(outcome, self._program, (self._context, self._side), self.t, self._solver)

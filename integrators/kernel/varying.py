@@ -298,6 +298,8 @@ class AdaptiveStepper(HBVMStepper):
             Whether the present state is to come first.
         """
         pieces = [(np.array([self.t]), self.y[np.newaxis])] if present else []
+        if present and self._vectors:
+            self._vectors.note_now(self.t)
         self._face(end)
         outcome, steps, why, ctx = BUDGET, 0, None, self._context
         self._watch = crawl(self, self.t, end)
@@ -310,6 +312,8 @@ class AdaptiveStepper(HBVMStepper):
             stop = self._stop()
             passes = (end - stop) * ctx.next_length >= 0.0
             times, out = np.full(n + 1, stop if passes else end), np.empty((n + 1, self._dim))
+            if self._vectors:
+                self._vectors.room(n + 1)
             outcome = self._call(engine.WALK, SIDE, times, out, 0, n)
             made = self._context.made
             steps += made
@@ -321,6 +325,8 @@ class AdaptiveStepper(HBVMStepper):
                 self._restart(stop)
             elif outcome == BUDGET and (n == 0 or (limit is None and self._budget(1))):
                 why = self._ended(made)
+            if self._vectors:
+                self._vectors.note(times[:made])
         t, y = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return self._samples(t, y, DONE if outcome == BUDGET else outcome, why)
 

@@ -32,6 +32,7 @@ from integrators.protocol import (
     offers,
 )
 from integrators.refusals import as_numbers, check_times
+from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
 from problems import limits
@@ -59,6 +60,7 @@ def integrate(
     sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     *,
+    variations: Any = None,
     progress: bool | Report = False,
     checkpoint: File | None = None,
     every_seconds: NotNegative = SECONDS,
@@ -85,6 +87,12 @@ def integrate(
         `integrators.events.Event`. They change nothing of the steps and samples, but a
         terminal event ends them. They are looked for in the steps themselves;
         ``stats.extra["event_search"]`` counts the partial steps that they take.
+    variations : array_like, shape (dim, n), or str, or sequence of str, optional
+        Tangent vectors at the start, or what to differentiate the trajectory with respect to: ``"y0"`` (dim
+        vectors), ``"t0"`` (one), names of parameters (one for each number; the start stays where it is).
+        ``solution.variations`` has them at the samples. They are the exact derivatives of the steps that
+        are taken, with the steps' lengths held fixed; ``"t0"`` begins with minus the field at the start.
+        For HBVM and Gauss, problems with a formula, and without checkpoints.
     progress : bool or callable, optional
         True: a bar on the terminal, if there is one. A function: it is called about ten times a second
         with an `integrators.Progress`.
@@ -128,7 +136,7 @@ def integrate(
     if progress is True:
         with Bar() as bar:
             return integrate(
-                problem, method, times, sample, events,
+                problem, method, times, sample, events, variations=variations,
                 progress=bar, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
             )  # fmt: skip
 
@@ -150,6 +158,12 @@ def integrate(
         raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
     if grid.size and offers(stepper, Destination):
         stepper.destination = end
+    vectors: list[Array] | None = None
+    if variations is not None:
+        if checkpoint is not None or resume is not None:
+            raise InputError("variations are in no checkpoint; leave out checkpoint= and resume=.")
+        count = follow(stepper, method, problem, variations, sample)
+        vectors = [np.empty((0, problem.system.dim, count))]
     t, y, made = [grid[:0]], [np.empty((0, problem.system.dim))], 0
     lost: Losses = {}
     here, status, reason, before = problem.t0, Status.FINISHED, "", None
@@ -177,6 +191,8 @@ def integrate(
             if how == sample:
                 t.append(samples.t)
                 y.append(samples.y)
+                if vectors is not None:
+                    vectors.append(stepper.variations)
                 made += count if sample == "steps" else samples.t.size
             if watch is not None:
                 stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
@@ -213,6 +229,7 @@ def integrate(
     solution = Solution(
         t=reached,
         y=np.concatenate(y),
+        variations=None if vectors is None else np.concatenate(vectors),
         status=status,
         reason=reason,
         t_stop=float(reached[-1]) if status is Status.FINISHED and reached.size else here,
@@ -316,6 +333,7 @@ def _with_events(solution: Solution, search: Finder) -> Solution:
     return replace(
         solution, t=solution.t[:n], y=solution.y[:n], status=end.status, reason=end.reason, t_stop=end.stop,
         stats=stats, events=search.hits.occurrences(), error=end.error or solution.error,
+        variations=None if solution.variations is None else solution.variations[:n],
     )  # fmt: skip
 
 

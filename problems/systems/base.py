@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problems import limits
+from problems.calculus.forward import forward
 from problems.calculus.function import Function, function_of, stacked
 from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
@@ -118,6 +119,7 @@ class System:
     def _start_memories(self) -> None:
         self._jacobians: dict[str, Jacobian | None] = {}
         self._gradients: dict[Function, Function] = {}
+        self._tangents: dict[tuple[str, int, bool], Function] = {}
         self._together: dict[tuple[Function, ...], Function] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -357,6 +359,33 @@ class System:
             name = "jacobian" if what == "field" else f"jacobian_{what}"
             self._jacobians[what] = jacobian(self.function(what), name) if self.traced else None
         return self._jacobians[what]
+
+    def tangent(self, what: str, directions: int, *, parameters: bool = False) -> Function:
+        """Return the derivatives of a function along directions; see `problems.calculus.forward`.
+
+        Parameters
+        ----------
+        what : {"field", "force", "velocity_scale"}
+            The function.
+        directions : int
+            Their number, n >= 1.
+        parameters : bool
+            Whether directions have a part in the parameters too.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For another name, or a system that has no such function.
+        """
+        key = what, directions, parameters
+        if key not in self._tangents:
+            function = self.function(what)
+            self._tangents[key] = forward(
+                function, size={"field": self.dim, "force": len(function.outputs)}.get(what, 0),
+                directions=directions, parameters=self.n_par if parameters else None,
+                name=f"{what}_along_{directions}",
+            )  # fmt: skip
+        return self._tangents[key]
 
     def is_vector(self, invariant: str) -> bool:
         """Whether an invariant is a list of numbers."""

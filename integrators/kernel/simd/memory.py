@@ -248,6 +248,8 @@ call_line = _caller(2, types.int64)
 """``call_line(line, what, ctx)``: a line integral, see `integrators.kernel.context.Context.line`."""
 call_look = _caller(2, types.int64)
 """``call_look(look, ctx, memory)``: the search for events, see `integrators.kernel.events`."""
+call_follow = _caller(3, types.int64)
+"""``call_follow(follow, what, ctx, memory)``: vectors along a trajectory, `integrators.kernel.tangent`."""
 call_factors = _caller(2, types.int64)
 """``call_factors(factors, what, which)``: whoever keeps the factors of large matrices."""
 call_steps = _caller(2)

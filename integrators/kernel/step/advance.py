@@ -8,9 +8,9 @@ at the stages and makes new ones of its values; a test of how much they still ch
 at the end, with what rounding took from it.
 """
 
-from integrators.kernel.context import DONE
+from integrators.kernel.context import DONE, STEP
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import call_look
+from integrators.kernel.simd.memory import call_follow, call_look
 from integrators.kernel.step.begin import begin
 from integrators.kernel.step.finish import commit, finish
 from integrators.kernel.step.handover import reconsider, solve_implicitly
@@ -31,9 +31,18 @@ def solve(ctx):
 
 
 @compiled
+def watched(ctx):
+    """Whether anybody wants to see each step before it is taken, and so no step that is undone."""
+    return ctx.look != 0 or ctx.follow != 0
+
+
+@compiled
 def looked(ctx):
-    """Look for events in the step ahead, if anybody wants that; return DONE or HALTED."""
-    return call_look(ctx.look, ctx, ctx.look_memory) if ctx.look else DONE
+    """Look for events in the step ahead, and let vectors follow it, if anybody wants that; the outcome."""
+    outcome = call_look(ctx.look, ctx, ctx.look_memory) if ctx.look else DONE
+    if outcome == DONE and ctx.follow:
+        outcome = call_follow(ctx.follow, STEP, ctx, ctx.follow_memory)
+    return outcome
 
 
 @compiled

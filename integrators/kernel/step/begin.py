@@ -217,6 +217,12 @@ def begin(ctx):
     """Prepare the step from the state and choose its first stages."""
     rewind(ctx)
     prepare(ctx)
+    choose(ctx)
+
+
+@compiled
+def choose(ctx):
+    """Choose the first stages of a step that is prepared."""
     if ctx.length == ctx.h and not ctx.varying:
         start_extrapolated(ctx)
         ctx.older_length = ctx.h

@@ -158,7 +158,7 @@ def differs_at_an_end(ctx):
         return False
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
     # Stages at both ends, in memory that the solved step does not need any more; idle lanes repeat the last.
-    stages, times, values = ctx.stages, ctx.times, ctx.sums
+    stages, times, values = ctx.old_stages, ctx.times, ctx.sums
     inside = max(JUST * h, 2.0 * SHORTEST * abs(t))
     inside = inside if ctx.h > 0.0 else -inside
     times[0] = t + inside if ctx.border == START else t
@@ -275,7 +275,7 @@ def arrived(ctx):
     if ctx.breaks == 1 and abs(ctx.stop - ctx.t0) <= CLOSE * abs(ctx.stop):
         return True
     rows, lanes, second = ctx.rows, ctx.lanes, ctx.second
-    stages, times, values = ctx.stages, ctx.times, ctx.sums
+    stages, times, values = ctx.old_stages, ctx.times, ctx.sums
     for lane in range(lanes):
         times[lane] = ctx.t0
     for d in range(rows):

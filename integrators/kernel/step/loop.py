@@ -1,16 +1,25 @@
 """Whole trajectories: own steps to the times asked for."""
 
-from integrators.kernel.context import ALWAYS_IMPLICIT, BUDGET, DONE, NOTHING, UNSEEN, UNSOLVED, Context
+from integrators.kernel.context import (
+    ALWAYS_IMPLICIT,
+    BUDGET,
+    DONE,
+    NOTHING,
+    STATE,
+    UNSEEN,
+    UNSOLVED,
+    Context,
+)
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
-from integrators.kernel.step.advance import looked, step
+from integrators.kernel.step.advance import looked, step, watched
 from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.rule import FIRST_RATE
-from integrators.kernel.step.sample import dimension, read, sample, vectors_of_state, write
+from integrators.kernel.step.sample import dimension, followed, read, sample, vectors_of_state, write
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
 context = view(Context)
@@ -45,7 +54,7 @@ def approach(ctx, t, budget):
             rest = remaining(ctx, t)
         rest, h = abs(rest), abs(ctx.h)
         inside = rest < h - CLOSE * abs(t)
-        if (ctx.look or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
+        if (watched(ctx) or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
             continue
         if inside:
             return DONE, budget
@@ -129,7 +138,7 @@ def walk(ctx, times, out, budget):
             ctx.made = made
         if outcome != DONE:
             return outcome
-        if over or (ctx.look and not holds(ctx)):
+        if over or (watched(ctx) and not holds(ctx)):
             continue
         if abs(remaining(ctx, end)) < abs(ctx.h) - CLOSE * abs(end):
             return DONE
@@ -141,6 +150,7 @@ def walk(ctx, times, out, budget):
         take(ctx)
         times[made] = ctx.t0
         write(ctx, ctx.state, out + dim * made)
+        followed(ctx, ctx, STATE)
         made += 1
 
 

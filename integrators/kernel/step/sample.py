@@ -1,8 +1,8 @@
 """States between steps, and where a state is in memory."""
 
-from integrators.kernel.context import DENSE, DONE, LAND, SIDE, UNSEEN, UNSOLVED
+from integrators.kernel.context import DENSE, DONE, LAND, LANDING, PART_END, SIDE, STATE, UNSEEN, UNSOLVED
 from integrators.kernel.native.jit import compiled
-from integrators.kernel.simd.memory import get, put
+from integrators.kernel.simd.memory import call_follow, get, put
 from integrators.kernel.step.advance import solve
 from integrators.kernel.step.begin import predict, prepare, rewind, set_step
 from integrators.kernel.step.estimate import ALIKE
@@ -175,10 +175,20 @@ def land(ctx, side, t):
 
 
 @compiled
+def followed(ctx, step, what):
+    """Let vectors that follow ``ctx`` know of ``what`` of a step, in ``ctx`` or of its side; the outcome."""
+    if ctx.follow == 0:
+        return DONE
+    step.made = ctx.made
+    return call_follow(ctx.follow, what, step, ctx.follow_memory)
+
+
+@compiled
 def sample(ctx, side, between, t, part, out):
     """Write the state ``part`` beyond the present one; return the outcome."""
     if part == 0.0:
         write(ctx, ctx.state, out)
+        followed(ctx, ctx, STATE)
         if between == LAND:
             low = (ctx.t0 - t) + ctx.time_low if ctx.varying else 0.0
             set_time(ctx, t)
@@ -201,7 +211,10 @@ def sample(ctx, side, between, t, part, out):
         ctx.rejections += 1
         return UNSEEN
     if outcome == DONE:
+        outcome = followed(ctx, side, PART_END)
+    if outcome == DONE:
         write(side, side.next_state, out)
         if between == LAND:
+            followed(ctx, side, LANDING)
             land(ctx, side, t)
     return outcome

@@ -1,0 +1,154 @@
+r"""Tangent vectors in a step: the derivative of the step, its length held fixed.
+
+A Runge-Kutta method on ``y' = f(y)`` together with ``d' = f'(y) d`` makes of a vector ``d`` the derivative
+of what it makes of ``y``:
+
+    D_i = d + h sum_j a_ij f'(Y_j) D_j,    d_1 = d + h sum_j b_j f'(Y_j) D_j,
+
+and where the vector has a part in the parameters, ``f'(Y_j) D_j`` has that of ``f`` too. The stages
+``Y_j`` are known, so these equations are linear. They are solved by the same iteration, with the same
+matrices, first stages and stopping rule as those of the step: the vectors of a group are the rows of a
+`Context`, whose field is the derivative of the trajectory's along them. It finds ``Y_j`` in the rows that
+follow those of the vectors. In second-order form, ``q' = v(par) p`` with a derivative ``v' dpar`` adds
+``(v' dpar / v) (Q_i - q)`` to the stages of positions, and the same with ``q_1`` to the end.
+"""
+
+from integrators.kernel.context import DONE, LANDING, PART_END, STATE, UNSOLVED, Context
+from integrators.kernel.native.attributes import view
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import get, put, spread
+from integrators.kernel.simd.views import doubles
+from integrators.kernel.step.begin import choose, predict, prepare, rewind, set_factors, set_step
+from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.iterate import settle, test
+from integrators.kernel.step.sample import copy, vectors_of_state, write
+from integrators.kernel.step.size import take_sizes
+from integrators.kernel.step.stages import offset
+from integrators.kernel.step.sweep import sweep_measured
+from integrators.kernel.tangent.memory import Tangents
+
+context, tangents = view(Context), view(Tangents)
+
+
+@compiled
+def position(ctx, d):
+    """Return where position d is in a state in second-order form."""
+    return 8 * (d // 4) + 4 + d % 4
+
+
+@compiled
+def show_stages(ctx, vectors):
+    """Copy the stages of a solved step to behind the rows of the vectors."""
+    lanes = ctx.lanes
+    for chunk in range(ctx.chunks):
+        source, target = offset(ctx, chunk), offset(vectors, chunk) + lanes * vectors.rows
+        for d in range(ctx.rows):
+            stage = get(ctx.stages, source + lanes * d)
+            put(vectors.stages, target + lanes * d, stage)
+            put(vectors.old_stages, target + lanes * d, stage)
+
+
+@compiled
+def pull_stages(ctx, vectors, pulls):
+    """Add to the positions' stages what follows from the derivative of the velocities."""
+    lanes, rows = ctx.lanes, ctx.rows
+    for chunk in range(ctx.chunks):
+        source, target = offset(ctx, chunk), offset(vectors, chunk)
+        for d in range(vectors.rows):
+            moved = get(ctx.stages, source + lanes * (d % rows)) - spread(ctx.state, position(ctx, d % rows))
+            i = target + lanes * d
+            put(vectors.base, i, get(vectors.base, i) + pulls[d] * moved)
+
+
+@compiled
+def pull_end(ctx, vectors, pulls):
+    """Add the same to the end of the step."""
+    for d in range(vectors.rows):
+        i = position(ctx, d % ctx.rows)
+        vectors.next_state[position(vectors, d)] += pulls[d] * (ctx.next_state[i] - ctx.state[i])
+
+
+@compiled
+def differentiate(ctx, vectors, earlier, part, pulls):
+    """Find the derivative of a step that is solved in ``ctx``; return the outcome.
+
+    Parameters
+    ----------
+    ctx : Context
+        Of the trajectory, or of a partial step.
+    vectors : Context
+        Of the vectors at the start of the step; `Context.next_state` becomes those at its end.
+    earlier : Context
+        Of the vectors in the step before: the same, but for a ``part`` of a step.
+    part : bool
+        Whether it is one.
+    pulls : int
+        Address of relative derivatives of velocities, or 0.
+    """
+    vectors.t0, vectors.time_low, vectors.n = ctx.t0, ctx.time_low, ctx.n
+    if vectors.h != ctx.h:
+        set_factors(vectors, ctx.h)
+    if ctx.varying:
+        set_step(ctx, ctx.h)
+    vectors.matrix = ctx.matrix
+    show_stages(ctx, vectors)
+    rewind(vectors)
+    prepare(vectors)
+    if pulls != 0:
+        pull_stages(ctx, vectors, doubles(pulls))
+    if part:
+        predict(vectors, earlier, earlier.length, 1.0)
+        take_sizes(vectors)
+    else:
+        choose(vectors)
+    test(vectors, sweep_measured(vectors, vectors.free if vectors.predicted else 0))
+    outcome = settle(vectors)
+    if outcome == DONE:
+        outcome = finish(vectors)
+    if outcome == DONE and pulls != 0:
+        pull_end(ctx, vectors, doubles(pulls))
+    return outcome
+
+
+@compiled
+def write_vectors(memory, g, first, vectors, state, made):
+    """Write the vectors of a group to sample number ``made``."""
+    count, dim, rows, room = memory.count, memory.dim, memory.rows, memory.room
+    write(vectors, state, room)
+    for v in range(memory.vectors[g]):
+        for i in range(dim):
+            half, d = i // rows, i % rows
+            memory.out[(made * dim + i) * count + first + v] = room[half * vectors.rows + v * rows + d]
+
+
+@compiled
+def entry(what, address, place):
+    """Do what `Context.follow` promises; return DONE, or how the equations of the vectors were not solved."""
+    ctx, memory = context(address), tangents(place)
+    first = 0
+    for g in range(memory.groups):
+        own, side = context(memory.own[g]), context(memory.side[g])
+        outcome = DONE
+        if what == STATE:
+            write_vectors(memory, g, first, own, own.state, ctx.made)
+        elif what == LANDING:
+            copy(side.next_state, own.state, vectors_of_state(own))
+            copy(side.next_error, own.error, vectors_of_state(own))
+            copy(side.values, own.values, own.calls * own.padded * own.lanes // 8)
+            own.length, own.older_length = side.h, 0.0
+        elif what == PART_END:
+            copy(own.state, side.state, vectors_of_state(own))
+            copy(own.error, side.error, vectors_of_state(own))
+            outcome = differentiate(ctx, side, own, True, memory.pulls[g])
+            if outcome == DONE:
+                write_vectors(memory, g, first, side, side.next_state, ctx.made)
+        else:
+            outcome = differentiate(ctx, own, own, False, memory.pulls[g])
+            if outcome == DONE:
+                commit(own)
+        if outcome != DONE:
+            own.solved = side.solved = UNSOLVED
+            memory.failed = 1
+            return outcome
+        first += memory.vectors[g]
+    return DONE

@@ -1,0 +1,151 @@
+"""Tangent vectors of one trajectory, as Python sees them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from integrators.kernel.context import Context, Shape
+from integrators.kernel.native.field import compile_field
+from integrators.kernel.native.memory import aligned
+from integrators.kernel.step.rule import FIRST_RATE
+from integrators.kernel.tangent.engine import follow
+from integrators.kernel.tangent.memory import Tangents
+from integrators.protocol import Array
+from problems import emit
+from problems.problem import System
+from problems.trace.graph import reachable
+
+MOST = 8  # vectors in a group
+OPERATIONS = 1000  # of the derivatives of a group, about: what is written out takes its time to be compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Tangent vectors at the start of a trajectory.
+
+    Attributes
+    ----------
+    state : ndarray, shape (dim, n)
+        Their parts in the state.
+    parameters : ndarray, shape (n_par, n)
+        Their parts in the parameters, which stay as they are.
+    """
+
+    state: Array
+    parameters: Array
+
+
+class Vectors:
+    """Tangent vectors that follow a trajectory.
+
+    Parameters
+    ----------
+    system : System
+        The trajectory's; traced.
+    contexts : pair of Context
+        Of the trajectory, and for its partial steps; complete, with the start.
+    directions : Directions
+        The vectors at the start.
+    """
+
+    def __init__(self, system: System, contexts: tuple[Context, Context], directions: Directions):
+        self._context = contexts[0]
+        self.shape = directions.state.shape
+        dim, count = self.shape
+        moves = bool(directions.parameters.any())
+        operations = len(reachable(system.function(self._what).roots))
+        most = max(1, min(MOST, OPERATIONS // operations))
+        parts = np.array_split(np.arange(count), -(-count // most))
+        self._pairs, pulls = [], []
+        for part in parts:
+            chosen = Directions(directions.state[:, part], directions.parameters[:, part])
+            self._pairs.append(tuple(self._follower(system, base, chosen, moves) for base in contexts))
+            pulls.append(self._pulls(system, chosen))
+        self._memory = memory = Tangents(
+            {
+                "dim": dim, "rows": self._context.shape.rows, "count": count, "groups": len(parts),
+                "room_size": dim * len(parts[0]),
+            },
+            {},
+        )  # fmt: skip
+        memory.own[:] = [own.address for own, _ in self._pairs]
+        memory.side[:] = [side.address for _, side in self._pairs]
+        memory.vectors[:] = [part.size for part in parts]
+        self._kept_pulls = pulls
+        memory.pulls[:] = [0 if pull is None else pull.ctypes.data for pull in pulls]
+        self._known: dict[float, Array] = {}
+        self._context.point({"follow_memory": memory.words})  # keeps it alive
+        self._context.follow = follow.code().address
+
+    @property
+    def _what(self) -> str:
+        return "force" if self._context.shape.second else "field"
+
+    def _follower(self, system: System, base: Context, chosen: Directions, moves: bool) -> Context:
+        """Return the context of a group that follows one of the trajectory's."""
+        shape, n = base.shape, chosen.state.shape[1]
+        c, rows = shape.constants, n * shape.rows
+        field = compile_field(system, system.tangent(self._what, n, parameters=moves), c.lanes)
+        halves = 2 if not shape.second and system.dof is not None else 1
+        block = np.arange(rows) // (shape.rows // halves)
+        wider = Shape(
+            rows, shape.second, shape.unit, field.address, 0,
+            system.n_par * (1 + n if moves else 1), block, np.arange(halves * n), c,
+        )  # fmt: skip
+        padded = -(-rows // 8) * 8 + -(-shape.rows // 8) * 8
+        made = Context(wider, base.tables, {"padded": padded})
+        made.tolerance, made.log_rest, made.varying = base.tolerance, base.log_rest, base.varying
+        made.rate = FIRST_RATE
+        parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
+        made.par[:] = np.concatenate(parameters)
+        if shape.second:
+            made.velocity[:rows] = np.tile(base.velocity[: shape.rows], n)
+        made.write(chosen.state.T.reshape(n, -1, shape.rows).swapaxes(0, 1).reshape(-1))
+        return made
+
+    def _pulls(self, system: System, chosen: Directions) -> Array | None:
+        """Return the derivatives of the velocities relative to these, by row; ``None`` where they are 0."""
+        shape = self._context.shape
+        if not shape.second or shape.unit or not chosen.parameters.any():
+            return None
+        n = chosen.parameters.shape[1]
+        along = system.tangent("velocity_scale", n, parameters=True)
+        par = np.concatenate([self._context.par, *chosen.parameters.T])
+        slopes = emit.numpy(system, along)(0.0, np.zeros(0), par)
+        pulls = aligned(slopes.size)
+        pulls[:] = slopes / np.tile(self._context.velocity[: shape.rows], n)
+        return pulls if pulls.any() else None
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of all groups, own and partial steps."""
+        return sum(context.iterations for pair in self._pairs for context in pair)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the equations of a step's derivative were not solved."""
+        return bool(self._memory.failed)
+
+    def room(self, count: int) -> None:
+        """Make room for the vectors at so many samples."""
+        self._out = np.empty((count, *self.shape))
+        self._memory.point({"out": self._out})
+
+    def note(self, times: Array) -> None:
+        """Keep the vectors of the samples that have been made, by their times."""
+        for i, t in enumerate(times.tolist()):
+            self._known[t] = self._out[i]
+
+    def note_now(self, t: float) -> None:
+        """Keep the vectors at the last own step, at time t."""
+        found = []
+        for own, _ in self._pairs:
+            rows = self._context.shape.rows
+            vectors = own.read().reshape(-1, own.shape.rows // rows, rows)
+            found.append(vectors.swapaxes(0, 1).reshape(vectors.shape[1], -1).T)
+        self._known[t] = np.concatenate(found, axis=1)
+
+    def take(self, times: Array) -> Array:
+        """Return the vectors at samples, shape (m, dim, n); forget them, and those between."""
+        known, self._known = self._known, {}
+        return np.array([known[t] for t in times.tolist()]).reshape(-1, *self.shape)

@@ -1,0 +1,226 @@
+"""Variations are the derivatives of the steps that are taken, to rounding."""
+
+import mpmath
+import numpy as np
+import pytest
+
+import problems
+from integrators import HBVM, Gauss, Status, integrate, load
+from integrators.coefficients.legendre import tables
+from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField
+from problems.analysis.wide import evaluate
+
+_MP = mpmath.MPContext()
+_MP.dps = 36
+NUDGE = 1e-11  # of differences: their own error is 1e-22, and what 36 digits leave 1e-25
+
+
+def wide(numbers):
+    return np.array([_MP.mpf(float(x)) for x in np.ravel(numbers)], dtype=object)
+
+
+def flow(problem, k, s, lengths, y, par):
+    """Return where steps of HBVM(k, s) of these lengths lead to, calculated with 36 digits."""
+    table, t = tables(k, s), _MP.mpf(problem.t0)
+    nodes, weights, integrals, projection = (
+        (wide(part.hi) + wide(part.lo)).reshape(part.hi.shape)
+        for part in (table.nodes, table.weights, table.integrals, table.projection)
+    )
+    matrix = integrals.dot(projection)
+    for h in lengths:
+        values = np.array([evaluate(problem.system.field, t, y, par)] * k, dtype=object)
+        change = 1
+        while change > 1e-32:
+            stages = y + h * matrix.dot(values)
+            new = np.array(
+                [
+                    evaluate(problem.system.field, t + c * h, stage, par)
+                    for c, stage in zip(nodes, stages, strict=True)
+                ]
+            )
+            change = max(abs(x) for x in (new - values).ravel())
+            values = new
+        y, t = y + h * weights.dot(values), t + h
+    return y
+
+
+def difference(problem, k, s, lengths, state, parameters):
+    """Return the derivative of `flow` along one direction."""
+    y, par, e = wide(problem.y0), wide(problem.par), _MP.mpf(NUDGE)
+    ends = [
+        flow(problem, k, s, lengths, y + i * e * wide(state), par + i * e * wide(parameters)) for i in (1, -1)
+    ]
+    return ((ends[0] - ends[1]) / (2 * e)).astype(float)
+
+
+def top(q, p, par, m):
+    """Not separable."""
+    return p[0] ** 2 * (1.0 + q[0] ** 2) / 2 + par.a * m.cos(q[0])
+
+
+def masses(q, p, par, m):
+    """Separable, with velocities that depend on parameters."""
+    kinetic = p[0] ** 2 / (2 * par.m[0]) + p[1] ** 2 / (2 * par.m[1])
+    return kinetic + m.exp(q[0] - q[1]) + par.k * (q[0] ** 2 + q[1] ** 2) / 2
+
+
+def summed(q, p, m):
+    """With a sum that stays a loop."""
+    return m.sum(lambda i: p[i] ** 2, range(3)) / 2 + m.sum(
+        lambda i, j: 1 / m.sqrt(1.0 + (q[i] - q[j]) ** 2), [(i, j) for i in range(3) for j in range(i)]
+    )
+
+
+def swing(t, q, v, par, m):
+    """A pendulum of varying length, as a Lagrangian."""
+    length = 1.0 + par.a * m.cos(t)
+    return length**2 * v[0] ** 2 / 2 + length * m.cos(q[0])
+
+
+def driven(t, y, par, m):
+    return [y[1], -m.sin(y[0]) + par.a * m.cos(par.w * t), m.where(y[0] > 9.0, 0.0, y[0] * y[2])]
+
+
+def euler(y, par):
+    return (y[0] ** 2 / par.I[0] + y[1] ** 2 / par.I[1] + y[2] ** 2 / par.I[2]) / 2
+
+
+def cross(y):
+    return [[0.0, -y[2], y[1]], [y[2], 0.0, -y[0]], [-y[1], y[0], 0.0]]
+
+
+SYSTEMS = {
+    "separable": lambda: problems.load("henon_heiles"),
+    "not separable": lambda: Problem(
+        Hamiltonian(top, dof=1, parameters={"a": 0.7}), q0=[0.3], p0=[0.8], t_end=10.0
+    ),
+    "masses": lambda: Problem(
+        Hamiltonian(masses, dof=2, parameters={"m": [1.0, 2.5], "k": 1.5}),
+        q0=[0.3, -0.2],
+        p0=[0.8, 0.1],
+        t_end=10.0,
+    ),
+    "sums": lambda: Problem(Hamiltonian(summed, dof=3), q0=[0.3, -0.2, 0.9], p0=[0.8, 0.1, 0.3], t_end=10.0),
+    "Lagrangian": lambda: Problem(
+        Lagrangian(swing, dof=1, parameters={"a": 0.1}), q0=[0.3], v0=[0.8], t_end=10.0
+    ),
+    "driven": lambda: Problem(
+        VectorField(driven, dim=3, parameters={"a": 0.4, "w": 1.3}), y0=[0.3, 0.4, 0.7], t_end=10.0, t0=0.5
+    ),
+    "Poisson": lambda: Problem(
+        Poisson(euler, cross, dim=3, parameters={"I": [1.0, 2.0, 3.5]}), y0=[0.3, 0.4, 0.7], t_end=10.0
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("k", [3, 10])
+def test_they_are_the_derivatives_of_the_steps_to_rounding(name, k):
+    problem, rng = SYSTEMS[name](), np.random.default_rng(len(name) + k)
+    s, h = {3: (3, 0.2), 10: (4, 0.3)}[k]
+    if problem.system.kind == "poisson":
+        k = s  # with more stages HBVM is no Runge-Kutta method there
+    n_par = problem.system.n_par
+    state, parameters = rng.standard_normal((problem.system.dim, 2)), rng.standard_normal((n_par, 2))
+    method = Gauss(s=s, h=h) if k == s else HBVM(k=k, s=s, h=h)
+    stepper = method.compile(problem.system).start(problem.y0, problem.par, problem.t0)
+    stepper.follow(state, parameters)
+    times = problem.t0 + np.array([h, 1.4 * h])  # a step, and a part of one
+    assert stepper.advance(times).status is Status.FINISHED
+    lengths = [
+        _MP.mpf(float(times[0])) - _MP.mpf(problem.t0),
+        _MP.mpf(float(times[1])) - _MP.mpf(float(times[0])),
+    ]
+    for i in range(2):
+        found = difference(problem, k, s, lengths[: i + 1], state[:, 0], parameters[:, 0])
+        error = np.abs(stepper.variations[i, :, 0] - found).max() / np.abs(found).max()
+        assert error < 2e-15  # measured: at most 1e-15
+
+
+def test_with_many_stages_too():
+    problem = problems.load("pendulum")
+    state = np.array([0.3, 0.7])
+    solution = integrate(problem, HBVM(k=20, s=3, h=0.5), [0.5], variations=state[:, np.newaxis])
+    found = difference(problem, 20, 3, [_MP.mpf(0.5)], state, np.zeros(0))
+    assert np.abs(solution.variations[0, :, 0] - found).max() < 1e-15  # measured: 1e-16
+
+
+def test_the_steps_of_a_tolerance_are_differentiated_as_they_are_taken():
+    problem = SYSTEMS["driven"]()
+    solution = integrate(
+        problem, Gauss(s=4, tol=1e-5), [problem.t0, 2.5], "steps", variations=["y0", "a", "w"]
+    )
+    assert 5 < solution.t.size < 20
+    assert np.array_equal(solution.variations[0], np.eye(3, 5))
+    lengths = np.diff(wide(solution.t))
+    for column, state, parameters in ((1, [0, 1, 0], [0, 0]), (3, [0, 0, 0], [1, 0])):
+        found = difference(problem, 4, 4, lengths, state, parameters)
+        error = np.abs(solution.variations[-1, :, column] - found).max() / np.abs(found).max()
+        assert error < 1e-14  # measured: 2e-15
+
+
+@pytest.mark.parametrize("method", [Gauss(s=3, h=0.5), Gauss(s=8, h=0.75), Gauss(s=6, tol=1e-9)], ids=repr)
+def test_the_map_of_gauss_is_symplectic(method):
+    problem = problems.load("henon_heiles")
+    solution = integrate(problem, method, np.arange(0.0, 100.0, 0.7), variations="y0")
+    J = np.kron([[0, 1], [-1, 0]], np.eye(2))
+    maps = solution.variations
+    error = np.abs(np.swapaxes(maps, 1, 2) @ J @ maps - J).max(axis=(1, 2)) / np.linalg.norm(
+        maps, axis=(1, 2)
+    )
+    assert error.max() < 1e-14  # measured: 4e-15
+
+
+def test_they_change_nothing_of_the_trajectory():
+    problem, times = problems.load("kepler", e=0.6), np.linspace(0.0, 30.0, 40)
+    for method in (HBVM(), Gauss(s=8, h=0.1)):
+        plain = integrate(problem, method, times)
+        assert np.array_equal(plain.y, integrate(problem, method, times, variations=["y0", "t0"]).y)
+
+
+@pytest.mark.parametrize("sample", ["side", "steps", "land"])
+def test_every_way_to_sample_has_them(sample):
+    problem, times = problems.load("pendulum"), np.linspace(0.0, 5.0, 4)
+    exact = integrate(problem, Gauss(s=8, tol=1e-15), times, variations=["y0", "t0"])
+    for method in (Gauss(s=6, h=0.1), HBVM(tol=1e-14)):
+        made = integrate(problem, method, times, sample, variations=["y0", "t0"])
+        assert made.variations.shape == (*made.y.shape, 3)
+        assert np.abs(made.variations[-1] - exact.variations[-1]).max() < 1e-9 or sample == "steps"
+        # The derivative with respect to t0 is minus the velocity of where the trajectory has come to.
+        slope = np.array([made.y[:, 1], -np.sin(made.y[:, 0])]).T
+        assert np.abs(made.variations[:, :, 2] + slope).max() < 1e-9  # measured: 3e-11
+
+
+def test_backwards_many_vectors_and_events():
+    problem = problems.load("fput")
+    times = [0.0, -1.0, -1.3]
+    made = integrate(problem, Gauss(s=8, h=0.1), times, events=lambda q: q[1] - q[2], variations="y0")
+    assert made.variations.shape == (3, problem.system.dim, problem.system.dim)  # in groups
+    one = integrate(problem, Gauss(s=8, h=0.1), times, variations=np.eye(problem.system.dim)[:, [5]])
+    assert np.abs(one.variations[:, :, 0] - made.variations[:, :, 5]).max() < 1e-14  # measured: 1e-15
+
+
+def test_a_solution_keeps_them_in_its_file(tmp_path):
+    made = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [0.0, 1.0], variations="y0")
+    made.save(tmp_path / "solution.npz")
+    assert np.array_equal(load(tmp_path / "solution.npz").variations, made.variations)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "words"),
+    [
+        ({"variations": "z0"}, "unknown variation 'z0'"),
+        ({"variations": np.eye(3)}, "vectors of 2 components"),
+        ({"variations": [[np.nan], [0.0]]}, "finite"),
+        ({"variations": "y0", "sample": "dense"}, "sample='dense'"),
+        ({"variations": "y0", "checkpoint": "file"}, "no checkpoint"),
+    ],
+)
+def test_what_cannot_be_is_said(keywords, words):
+    with pytest.raises(InputError, match=words):
+        integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [1.0], **keywords)
+
+
+def test_line_integrals_have_none():
+    with pytest.raises(InputError, match="Runge-Kutta"):
+        integrate(problems.load("rigid_body"), HBVM(k=4, s=2, h=0.1), [1.0], variations="y0")
