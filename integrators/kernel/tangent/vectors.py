@@ -16,6 +16,7 @@ from problems.problem import System
 from problems.trace.graph import reachable
 
 MOST = 8  # vectors in a group
+FEWEST = 2  # samples that there is room for, of which nobody may want to know: those of single steps
 OPERATIONS = 1000  # of the derivatives of a group, about: what is written out takes its time to be compiled
 
 
@@ -74,6 +75,7 @@ class Vectors:
         self._kept_pulls = pulls
         memory.pulls[:] = [0 if pull is None else pull.ctypes.data for pull in pulls]
         self._known: dict[float, Array] = {}
+        self.room(FEWEST)
         self._context.point({"follow_memory": memory.words})  # keeps it alive
         self._context.follow = follow.code().address
 
@@ -128,7 +130,7 @@ class Vectors:
 
     def room(self, count: int) -> None:
         """Make room for the vectors at so many samples."""
-        self._out = np.empty((count, *self.shape))
+        self._out = np.empty((max(count, FEWEST), *self.shape))
         self._memory.point({"out": self._out})
 
     def note(self, times: Array) -> None:
