@@ -90,6 +90,8 @@ class HBVMProgram(Compiled):
     """Length of the first step, where steps vary; ``None``: chosen."""
     threaded = True
     """Whether `batch` takes threads."""
+    for_many: "Callable[[], HBVMProgram] | None" = None
+    """What makes the program that takes trajectories in lanes, where that is one of another k and s."""
     _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
@@ -138,6 +140,7 @@ class HBVMProgram(Compiled):
         self.from_cache = all(made.from_cache for made in parts if made is not None)
         self._workspace: Workspace | None = None
         self._in_lanes: tuple[Lanes | None] | None = None
+        self._many: HBVMProgram | None = None
         if self.solver.strategy == ALWAYS_IMPLICIT:
             self.implicit()
         self.compile_seconds = binary.clock() - started
@@ -213,7 +216,8 @@ class HBVMProgram(Compiled):
         """Integrate many starts to the same times, one in each lane of the vector unit.
 
         The numbers of a trajectory depend on nothing in the others, nor on their order or the
-        threads. They are those of ``start`` and ``advance`` up to rounding; bit for bit where
+        threads. They are those of ``start`` and ``advance`` up to rounding, or where k and s
+        are chosen, and others for lanes, up to the tolerance; bit for bit where
         trajectories go one by one, see `integrators.kernel.batch`.
 
         Parameters
@@ -236,13 +240,25 @@ class HBVMProgram(Compiled):
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        return prepare_batch(self, Y0, par, times, check_start(t0), sample, threads)()
+        program = self._program_of_lanes() if sample in (None, "side") else self
+        return prepare_batch(program, Y0, par, times, check_start(t0), sample, threads)()
 
     def prepare_batch(
         self, Y0: ArrayLike, par: ArrayLike | None = None, *, times: ArrayLike, t0: float = 0.0
     ) -> Callable[[], Batch]:
         """Check and allocate all that `batch` needs; return what then does it, once."""
-        return prepare_batch(self, Y0, par, times, check_start(t0))
+        return prepare_batch(self._program_of_lanes(), Y0, par, times, check_start(t0))
+
+    def _program_of_lanes(self) -> "HBVMProgram":
+        """Return the program for many trajectories: itself, unless another takes them in lanes."""
+        if self.for_many is None:
+            return self
+        if self._many is None:
+            made = self.for_many()
+            self._many = self if made.in_lanes() is None else made
+            self.compile_seconds += made.compile_seconds
+            self.from_cache = self.from_cache and made.from_cache
+        return self._many
 
     def in_lanes(self) -> Lanes | None:
         """Return the method on trajectories in lanes, compiled the first time; ``None`` where it has none."""

@@ -50,7 +50,8 @@ class HBVM(MethodBase):
     With a tolerance the steps vary, each as long as its estimated local error allows.
     This costs an energy-preserving method nothing, whereas a symplectic one, such as
     Gauss, loses its long-time behaviour (`test_adaptive`). Without k and s these are
-    chosen too (`integrators.methods.automatic`), and the length of a step is bounded such that
+    chosen too, by what a unit of time costs, for one trajectory and for many side by side
+    (`integrators.methods.automatic`), and the length of a step is bounded such that
     the error of the quadrature, by which the energy changes, is at round-off. Stiff
     systems run too: the method is A-stable, but it damps nothing, so that a transient that was
     left at the size of the tolerance stays and keeps the steps shorter than those of a method
@@ -241,21 +242,30 @@ class HBVM(MethodBase):
         return made
 
     def _compiled(self, system: System) -> Any:
-        k, s, defect = self.k, self.s, None
-        if k is None or s is None:
-            from integrators.methods.automatic import choose
-
-            assert self.tol is not None
-            k, s, defect = choose(system, self.tol)
         keep = () if system.kind == "poisson" else None
-        if self.tol is not None:
+        tol = self.tol
+        if tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 
-            return AdaptiveProgram(
-                system, k=k, s=s, tol=self.tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
-                **self.control(),
-            )  # fmt: skip
+            def program(choice: tuple[int, int, float | None]) -> AdaptiveProgram:
+                k, s, defect = choice
+                return AdaptiveProgram(
+                    system, k=k, s=s, tol=tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
+                    **self.control(),
+                )  # fmt: skip
+
+            if self.k is not None and self.s is not None:
+                return program((self.k, self.s, None))
+            from integrators.methods.automatic import choose
+
+            alone, many = choose(system, tol), choose(system, tol, lanes=True)
+            made = program(alone)
+            if many != alone:
+                made.for_many = lambda: program(many)
+            return made
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 
         assert self.h is not None
-        return HBVMProgram(system, k=k, s=s, h=self.h, solver=self.solver, keep=keep)
+        assert self.k is not None
+        assert self.s is not None
+        return HBVMProgram(system, k=self.k, s=self.s, h=self.h, solver=self.solver, keep=keep)

@@ -9,7 +9,7 @@ import integrators
 import problems
 from integrators import HBVM, Gauss, testing
 from integrators.kernel import tables
-from integrators.methods.automatic import choose
+from integrators.methods.automatic import DEFECTS, choose
 from integrators.protocol import Status
 from problems import Problem, VectorField
 from problems.errors import InputError
@@ -35,15 +35,14 @@ def position_error(problem, solution):
 
 def test_energy_stays_at_round_off_over_1000_revolutions_and_gauss_drifts_at_the_same_steps():
     problem = kepler(1000)
-    loose = integrators.integrate(problem, HBVM(tol=1e-4), sample="steps")
+    loose = integrators.integrate(problem, HBVM(k=16, s=4, tol=1e-4), sample="steps")
     assert loose.status is Status.FINISHED
     assert loose.errors()["energy"].max() <= 1e-13  # measured 2.5e-14
     lengths = np.diff(loose.t)
     assert lengths.max() > 3 * lengths.min()
     # Landing on each of these times makes them the steps of Gauss too.
-    s = loose.stats.extra["s"]
     times = loose.t[: np.searchsorted(loose.t, 50 * 2 * np.pi)]
-    same = integrators.integrate(problem, Gauss(s=s, h=1e6), times, sample="land")
+    same = integrators.integrate(problem, Gauss(s=4, h=1e6), times, sample="land")
     assert same.stats.extra["partial_steps"] == times.size - 1
     assert same.errors()["energy"].max() > 1e-6  # measured 6.1e-4
 
@@ -201,16 +200,40 @@ def test_a_field_that_is_not_finite_from_some_place_on_says_so():
     assert 0.9 < solution.t_stop <= 1.0
 
 
-def test_the_choice_of_k_and_s_follows_tolerance_and_degree():
-    loose, tight = (choose(kepler(1).system, tol) for tol in (1e-4, 3e-16))
-    assert loose[:2] == (16, 4)
-    assert tight[:2] == (16, 14)
-    assert loose[2] == tight[2] < 1e-15
-    cubic = problems.load("henon_heiles").system
-    k, s, defect = choose(cubic, 1e-4)
+def test_k_and_s_are_the_cheapest_under_the_bound_of_the_quadrature():
+    tight, loose = 3e-16, 1e-3
+    # Few components: sixteen stages cost little more than eight, and steps are three times as long.
+    assert choose(kepler(1).system, tight) == choose(kepler(1).system, loose) == (16, 14, DEFECTS[16])
+    # Many: the product takes four times as long.
+    planets = problems.load("outer_solar_system").system
+    assert choose(planets, tight) == (16, 14, DEFECTS[16])
+    assert choose(planets, 1e-6) == (8, 7, DEFECTS[8])
+    # Trajectories side by side: the product takes four times as long for all.
+    assert choose(kepler(1).system, tight, lanes=True) == (8, 7, DEFECTS[8])
+    # A cubic energy is kept exactly, and needs no bound.
+    k, s, defect = choose(problems.load("henon_heiles").system, loose)
     assert (k, defect) == (8, None)
     assert 2 * k >= 3 * s
-    assert choose(problems.VectorField(lambda y: [-y[0]], dim=1), 1e-8) == (16, 7, None)
+    assert choose(problems.VectorField(lambda y: [-y[0]], dim=1), 1e-8)[2] is None
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-9])
+@pytest.mark.parametrize(
+    ("name", "options"),
+    # Largest errors of the energy, at 1e-3, 1e-9 and 3e-16:
+    [
+        ("outer_solar_system", {"t_end": 600.0}),  # 7.4e-16, 7.4e-16, 2.1e-15
+        ("kepler", {"e": 0.6, "t_end": 300.0}),  # 1.6e-15, 2.7e-15, 3.1e-15
+        ("sitnikov", {"e": 0.75, "t_end": 200.0}),  # 1.8e-15, 2.1e-15, 1.4e-15
+        ("fput", {"t_end": 100.0}),  # 4.1e-17, 6.1e-17, 6.2e-17
+        ("double_pendulum", {"q1": 0.5, "q2": 0.7, "t_end": 60.0}),  # 6.7e-17, 6.7e-17, 4.4e-17
+        ("cr3bp", {}),  # 6.2e-15, 1.0e-14, 7.3e-15
+    ],
+)
+def test_the_energy_is_at_rounding_at_any_tolerance(name, options, tol):
+    problem = problems.load(name, **options)
+    solution = integrators.integrate(problem, HBVM(tol=tol), sample="steps")
+    assert solution.errors()["energy"].max() < 2e-14
 
 
 def test_a_polynomial_energy_is_kept_at_any_tolerance():
