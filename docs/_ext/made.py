@@ -1,5 +1,6 @@
-"""Pages that are made from the package itself at every build: commands, metrics, campaigns, citations."""
+"""Pages that are generated from the package at every build: commands, metrics, campaigns, gallery and more."""
 
+import re
 from pathlib import Path
 
 import typer.cli
@@ -9,6 +10,8 @@ from sphinx.application import Sphinx
 from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.commands import app, listing
 from hbvm_bench.measure.metrics import METRICS
+
+PROBLEM = re.compile(r"^## (\w+)\n\n!\[([^]]*)\]\(problems/\w+\.svg\)\n\n([^\n]+)$", re.MULTILINE)
 
 
 def commands() -> str:
@@ -40,10 +43,21 @@ def citations() -> str:
     return "\n\n".join(["```bibtex", *listing.citations(()), "```", ""])
 
 
+def gallery() -> str:
+    """Return a card for each problem, with its picture and its first sentence, as `problems.md` has them."""
+    page = (Path(__file__).parents[1] / "problems.md").read_text(encoding="utf-8")
+    cards = [
+        f":::{{grid-item-card}} {name}\n:link: ../problems.html#{name.replace('_', '-')}\n:link-type: url\n"
+        f":img-top: ../problems/{name}.svg\n:img-alt: {alternative}\n\n{summary}\n:::"
+        for name, alternative, summary in PROBLEM.findall(page)
+    ]
+    return "\n\n".join(["::::{grid} 1 2 3 3\n:gutter: 3", *cards, "::::", ""])
+
+
 def _write(app: Sphinx) -> None:
     made = Path(app.srcdir) / "reference" / "made"
     made.mkdir(parents=True, exist_ok=True)
-    for make in (commands, metrics, campaigns, citations):
+    for make in (commands, metrics, campaigns, citations, gallery):
         path, text = made / f"{make.__name__}.md", make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
             path.write_text(text, encoding="utf-8")
