@@ -1,4 +1,4 @@
-"""Pages that are generated from the package at every build: commands, metrics, campaigns, gallery and more."""
+"""Pages that are generated from the package at every build: commands, metrics, gallery and others."""
 
 import re
 from pathlib import Path
