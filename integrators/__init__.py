@@ -19,6 +19,7 @@ from problems import deprecated
 if TYPE_CHECKING:
     from integrators.coefficients.order import order_of as order_of
     from integrators.coefficients.order import stability as stability
+    from integrators.dynamics import lyapunov as lyapunov
     from integrators.events import Event as Event
     from integrators.methods.advice import advise as advise
     from integrators.methods.gauss import Gauss as Gauss
@@ -41,6 +42,7 @@ __all__ = [
     "integrate",
     "integrate_many",
     "load",
+    "lyapunov",
     "order_of",
     "registry",
     "section",
@@ -51,6 +53,7 @@ __all__ = [
 _LATER = {  # imported when first used
     "Event": "integrators.events",
     "advise": "integrators.methods.advice",
+    "lyapunov": "integrators.dynamics",
     "order_of": "integrators.coefficients.order",
     "section": "integrators.running.poincare",
     "stability": "integrators.coefficients.order",

@@ -169,7 +169,10 @@ class HBVMStepper(ABC):
             raise InputError(f"variations of {system.name} need {need}.")
         started = binary.clock()
         directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))
-        self._vectors = Vectors(system, (self._context, self._side), directions)
+        if self._vectors and self._vectors.fits(directions):
+            self._vectors.put(directions.state)
+        else:
+            self._vectors = Vectors(system, (self._context, self._side), directions)
         program.compile_seconds += binary.clock() - started
 
     def look_to(self, end: float) -> Status:

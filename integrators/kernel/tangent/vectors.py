@@ -51,7 +51,7 @@ class Vectors:
 
     def __init__(self, system: System, contexts: tuple[Context, Context], directions: Directions):
         self._context = contexts[0]
-        self.shape = directions.state.shape
+        self.shape, self._parameters = directions.state.shape, directions.parameters
         dim, count = self.shape
         moves = bool(directions.parameters.any())
         operations = len(reachable(system.function(self._what).roots))
@@ -102,7 +102,7 @@ class Vectors:
         made.par[:] = np.concatenate(parameters)
         if shape.second:
             made.velocity[:rows] = np.tile(base.velocity[: shape.rows], n)
-        made.write(chosen.state.T.reshape(n, -1, shape.rows).swapaxes(0, 1).reshape(-1))
+        made.write(_laid_out(chosen.state, shape.rows))
         return made
 
     def _pulls(self, system: System, chosen: Directions) -> Array | None:
@@ -133,6 +133,22 @@ class Vectors:
         self._out = np.empty((max(count, FEWEST), *self.shape))
         self._memory.point({"out": self._out})
 
+    def fits(self, directions: Directions) -> bool:
+        """Whether other vectors differ in their parts in the state only."""
+        same = directions.parameters.shape == self._parameters.shape
+        return same and np.array_equal(directions.parameters, self._parameters)
+
+    def put(self, state: Array) -> None:
+        """Set the vectors at the last own step; their parts in the parameters stay as they are."""
+        first, rows = 0, self._context.shape.rows
+        for own, _ in self._pairs:
+            n = own.shape.rows // rows
+            own.write(_laid_out(state[:, first : first + n], rows))
+            own.error[:] = 0.0
+            own.length = own.older_length = 0.0
+            own.age = 0
+            first += n
+
     def note(self, times: Array) -> None:
         """Keep the vectors of the samples that have been made, by their times."""
         for i, t in enumerate(times.tolist()):
@@ -151,3 +167,8 @@ class Vectors:
         """Return the vectors at samples, shape (m, dim, n); forget them, and those between."""
         known, self._known = self._known, {}
         return np.array([known[t] for t in times.tolist()]).reshape(-1, *self.shape)
+
+
+def _laid_out(vectors: Array, rows: int) -> Array:
+    """Return vectors, (dim, n), as the state of their context."""
+    return vectors.T.reshape(vectors.shape[1], -1, rows).swapaxes(0, 1).reshape(-1)

@@ -1,0 +1,5 @@
+"""What a trajectory depends on: Lyapunov exponents."""
+
+from integrators.dynamics.lyapunov import Exponents, lyapunov
+
+__all__ = ["Exponents", "lyapunov"]

@@ -1,0 +1,41 @@
+"""Exponents of systems where they are known, and what must hold of all."""
+
+import pytest
+
+import problems
+from integrators import HBVM, Gauss
+from integrators.dynamics import lyapunov
+from problems import InputError, Problem, VectorField
+
+
+def lorenz(y, par):
+    return [par.s * (y[1] - y[0]), y[0] * (par.r - y[2]) - y[1], y[0] * y[1] - par.b * y[2]]
+
+
+def test_lorenz():
+    system = VectorField(lorenz, dim=3, parameters={"s": 10.0, "r": 28.0, "b": 8.0 / 3.0})
+    problem = Problem(system, y0=[1.0, 1.0, 20.0], t_end=1000.0)
+    found = lyapunov(problem, Gauss(s=6, h=0.02), skip=20.0)
+    # 0.90563: the known value for these parameters
+    assert found.intervals[0, 0] < 0.90563 < found.intervals[0, 1]
+    assert found.intervals[0, 1] - found.intervals[0, 0] < 0.05
+    assert found.intervals[1, 0] < 0.0 < found.intervals[1, 1]
+    assert abs(found.sum + 41.0 / 3.0) < 1e-10
+
+
+def test_exponents_of_gauss_come_in_pairs_on_a_hamiltonian():
+    found = lyapunov(problems.load("henon_heiles"), Gauss(s=8, h=0.5), t_end=1000.0)
+    assert found.pairs is not None
+    assert found.pairs < 1e-10
+    assert abs(found.sum) < 1e-10
+
+
+def test_a_linear_field_has_its_eigenvalues():
+    system = VectorField(lambda y: [0.3 * y[0], -0.2 * y[1] + y[0]], dim=2)
+    found = lyapunov(Problem(system, y0=[1e-3, 1.0], t_end=50.0), HBVM(k=6, s=6, h=0.1), count=1, skip=25.0)
+    assert abs(found.exponents[0] - 0.3) < 1e-5  # the second has died out by exp(-0.5 * 25)
+
+
+def test_too_many_exponents_are_refused():
+    with pytest.raises(InputError, match="count=5"):
+        lyapunov(problems.load("pendulum"), Gauss(s=4, h=0.1), count=5)
