@@ -195,6 +195,9 @@ class Context(Memory):
     group = Array(of=int)  # of each block
     size = Array("block_count")
     largest = Array("block_count")  # size in each group
+    # How far the stages of a group are from the state, where a block is one component and all steps have one
+    # length. The field of a component is a sum over others, and its rounding of the size of the largest's.
+    farthest = Array("block_count")
 
     # --- where it is, and the nonlinear solver ---
     h = Real()

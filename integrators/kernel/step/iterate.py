@@ -4,7 +4,7 @@ from integrators.kernel.context import BY_VALUES, DIVERGED, DONE, NOT_FINITE, RU
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.step.begin import INFINITY, rewind, start_plain
 from integrators.kernel.step.rule import ROUNDING
-from integrators.kernel.step.size import change, take_sizes
+from integrators.kernel.step.size import SIZES_LAST, change, take_sizes
 from integrators.kernel.step.stopping import further, judge, left_over, stagnates
 from integrators.kernel.step.sweep import sweep_measured, sweep_to_the_end
 
@@ -26,6 +26,8 @@ def test(ctx, strict):
         restart(ctx, DIVERGED if 1.0 < last < INFINITY else NOT_FINITE)
         return
     ctx.best, ctx.stalled = best, int(stalled)
+    if stalled > 0.0 and ctx.age < SIZES_LAST and ctx.varying == 0:
+        take_sizes(ctx)  # of now: what has grown since is moved by more rounding
     if converged or (stalled > 0.0 and stagnates(change(ctx, ctx.floored), stalled)):
         left = left_over(converged, rest, best)
         if left > 0.0:
@@ -82,10 +84,11 @@ def close(ctx):
     if ctx.outcome == DONE:
         ctx.solved = BY_VALUES
         if ctx.predicted:
-            # Two tests tell how the changes fall, or that they do not any more; more mean that the
-            # first came early. It came late where nothing was left to fall.
-            late = ctx.stalled > 0 or ctx.last <= ROUNDING
-            ctx.free = max(ctx.free + ctx.tests - (3 if late and ctx.tests <= 2 else 2), 0)
+            # Two tests tell how the changes fall; more mean that the first came early. It came late where
+            # nothing was left to fall: then further changes are rounding, however many were looked at.
+            falling = ctx.tests - ctx.stalled
+            late = ctx.stalled == 0 and ctx.tests <= 2 and ctx.last <= ROUNDING
+            ctx.free = max(ctx.free + falling - (3 if late else 2), 0)
     else:
         ctx.length = 0.0
     return ctx.outcome

@@ -38,12 +38,21 @@ def stage_size(ctx, d, least):
 
 
 @compiled
+def stage_movement(ctx, d):
+    """Return how far row d of the stages is from the state, at most."""
+    top, lanes, start = splat8(0.0), ctx.lanes, spread(ctx.row_state, d)
+    for chunk in range(ctx.chunks):
+        top = max(top, abs(get(ctx.stages, offset(ctx, chunk) + lanes * d) - start))
+    return largest(top)
+
+
+@compiled
 def forget_sizes(ctx):
     """Begin to measure blocks."""
     for b in range(ctx.block_count):
         ctx.size[b] = 0.0
     for g in range(ctx.group_count):
-        ctx.largest[g] = 0.0
+        ctx.largest[g] = ctx.farthest[g] = 0.0
 
 
 @compiled
@@ -88,9 +97,9 @@ def invert_sizes(ctx, strict, floored):
     for d in range(ctx.rows):
         b = ctx.block[d]
         expected = ctx.expected[b] if ctx.rescaled else 0.0
-        strict[d], floored[d] = inverse_sizes(
-            ctx.size[b], ctx.largest[ctx.group[b]], least, expected, ctx.absolute[b]
-        )
+        g = ctx.group[b]
+        unimportant = max(ctx.absolute[b], ctx.farthest[g])
+        strict[d], floored[d] = inverse_sizes(ctx.size[b], ctx.largest[g], least, expected, unimportant)
         known = known and ctx.size[b] > SMALLEST
     return known
 
@@ -101,5 +110,9 @@ def take_sizes(ctx):
     forget_sizes(ctx)
     for d in range(ctx.rows):
         enter_size(ctx, d, stage_size(ctx, d, splat8(0.0)))
+    if ctx.varying == 0 and ctx.block_count == ctx.rows:
+        for d in range(ctx.rows):
+            g = ctx.group[ctx.block[d]]
+            ctx.farthest[g] = max(ctx.farthest[g], stage_movement(ctx, d))
     known = invert_sizes(ctx, ctx.strict, ctx.floored)
     ctx.age = SIZES_LAST if known else 0
