@@ -50,7 +50,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     the number of trajectories that it is best given first.
 16. `TimeLimit`: after ``time_limit`` seconds ``advance`` returns the samples that it has, so that `integrate`
     can ask for all of them at once and Ctrl-C loses few.
-17. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
+17. `Variations`: tangent vectors ``follow`` a stepper; ``variations`` are the vectors at the samples of the
+    last ``advance``.
+18. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
     plugins then know its coefficients.
 """
 
@@ -550,7 +552,7 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, AsHBVM,
+    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

@@ -25,6 +25,7 @@ from integrators.testing.capabilities import (
     keeps_the_error_of_a_user_s_function,
     prepared_batches_are_batches,
     samplings_are_as_stated,
+    tangents_follow_and_change_nothing,
     the_size_of_a_piece_is_a_count,
     threads_change_no_bits,
 )
@@ -95,6 +96,7 @@ CHECKS: tuple[Check, ...] = (
     threads_change_no_bits,
     the_size_of_a_piece_is_a_count,
     comes_back_after_its_time,
+    tangents_follow_and_change_nothing,
     is_the_hbvm_that_it_names,
 )
 

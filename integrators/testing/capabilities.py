@@ -26,6 +26,7 @@ from integrators.protocol import (
     Status,
     Threads,
     TimeLimit,
+    Variations,
     offers,
 )
 from integrators.running.integrate import integrate
@@ -39,6 +40,9 @@ BATCH_BOUND = 1e-6
 
 ROUNDING = 1e-13
 """Largest change of a sample by events: heyoka compiles other code then (measured: 2.4e-15; ours: 0)."""
+
+DIFFERENCE, DIFFERENCE_BOUND = 1e-5, 1e-4
+"""Relative distance of two starts, and largest error of their difference quotient as a derivative."""
 
 EVENT_BOUND = 1e-9
 """Largest value of an event's function where it is said to vanish."""
@@ -166,6 +170,31 @@ def comes_back_after_its_time(method: MethodBase, problem: Problem) -> str | Non
     return None
 
 
+def tangents_follow_and_change_nothing(method: MethodBase, problem: Problem) -> str | None:
+    """Check that tangent vectors leave the trajectory's bits alone, and are derivatives of its end."""
+    stepper = start(method, problem)
+    if not offers(stepper, Variations):
+        return "no tangent vectors follow it"
+    dim, grid = problem.system.dim, regular(problem, 4)[1:2] * 0.25 + 0.75 * problem.t0
+    try:
+        stepper.follow(np.eye(dim), np.zeros((problem.par.size, dim)))
+    except InputError as refusal:
+        return str(refusal)
+    followed, plain = stepper.advance(grid), start(method, problem).advance(grid)
+    require(np.array_equal(followed.y, plain.y), "the trajectory has the same bits with tangent vectors")
+    require(stepper.variations is not None, "they are there after a sample")
+    shift, size = np.zeros(dim), DIFFERENCE * float(np.max(np.abs(problem.y0)))
+    shift[0] = size
+    ends = [
+        method.compile(problem.system).start(problem.y0 + sign * shift, problem.par, problem.t0).advance(grid)
+        for sign in (1.0, -1.0)
+    ]
+    slope = (ends[0].y[-1] - ends[1].y[-1]) / (2 * size)
+    miss = float(np.max(np.abs(np.asarray(stepper.variations)[-1, :, 0] - slope)))
+    require(miss < DIFFERENCE_BOUND * max(1.0, float(np.max(np.abs(slope)))), f"off by {miss:.1e}")
+    return None
+
+
 def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
     """Check that a batch gives what its trajectories give alone, in any order, prepared, and with threads."""
     program: Any = method.compile(problem.system)
@@ -240,6 +269,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     Threads: threads_change_no_bits,
     PieceSize: the_size_of_a_piece_is_a_count,
     TimeLimit: comes_back_after_its_time,
+    Variations: tangents_follow_and_change_nothing,
     AsHBVM: is_the_hbvm_that_it_names,
 }
 """Which check a capability has."""

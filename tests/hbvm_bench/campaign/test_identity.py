@@ -37,6 +37,8 @@ NOT_ASKED = {
         "integrators.registry",
         "problems.deprecated",
         "integrators.running.watch",
+        "integrators.running.run",
+        "integrators.running.variations",
     ),
     # what takes times, and no case is integrated by
     *("hbvm_bench.measure.ensemble", "hbvm_bench.measure.timing"),

@@ -1,4 +1,4 @@
-"""The position error: one definition for campaigns, race, automatic and plugins."""
+"""The position error: one definition for campaigns, race and automatic."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,6 @@ from hbvm_bench.measure.measured import POSITION, position_error
 from hbvm_bench.measure.metrics import METRICS
 from hbvm_bench.reference.solutions import Reference
 from hbvm_bench.report import words
-from hbvm_bench.studies.plugins import costs
 from hbvm_bench.studies.race import report
 
 
@@ -52,11 +51,3 @@ def test_every_page_says_what_it_is_relative_to():
     assert METRICS["position_end"].unit == METRICS["position_max"].unit == "relative"
     assert sum(POSITION in rule for rule in words.RULES) == 1
     assert report.RULES_TEXT.count("{position}") == 1
-
-
-def test_the_plugins_measure_it_with_the_same_function(monkeypatch):
-    problem = problems.load("kepler")
-    end = problem.y0 + np.array([1e-6, 0.0, 0.0, 0.0])
-    monkeypatch.setitem(costs.HOSTS, "made up", lambda: (problem, problem.y0, [("one", lambda: end[None])]))
-    (cost,) = costs.measure("made up", 1)
-    assert cost.position == pytest.approx(1e-6 / abs(problem.y0[0]), rel=1e-9)

@@ -93,7 +93,9 @@ def test_heyoka_s_own_batch_comes_to_the_same_ends():
 def test_a_method_of_no_study_is_refused():
     with pytest.raises(InputError, match="there is no study 'nobody'"):
         make_method("nobody:Taylor()")
-    with pytest.raises(InputError, match=r"unknown method of peers\.alone 'Tailor'"):
+    with pytest.raises(
+        InputError, match=r"unknown name in the methods of peers\.alone 'Tailor'; did you mean 'Taylor'"
+    ):
         make_method(f"{ALONE}Tailor()")
 
 
