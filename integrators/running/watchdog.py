@@ -11,6 +11,8 @@ CRAWL_STEPS = 200_000
 CRAWL_SHARE = 1e-7
 """A method that covers less than this share of the way in `CRAWL_STEPS` steps has stalled."""
 
+SMALL_SHARE, SLOWER = 2e-5, 1e-4
+"""So has one that covers less than this share, 1e10 steps for the way, and this part of its mean until then."""
 
 LONGEST_WITHOUT_A_LOOK = 1 << 12
 """Steps between two looks at Ctrl-C."""
@@ -23,6 +25,25 @@ NEARER, LARGER = 0.9, 1.05
 
 STEADY = 0.7
 """Part of the last share that the next is at least where a solution blows up."""
+
+
+def collapsed(way: float, left: float, before: float, steps: float) -> bool:
+    """Whether a method no longer gets anywhere.
+
+    Parameters
+    ----------
+    way : float
+        What its last `CRAWL_STEPS` steps covered, >= 0.
+    left : float
+        The way to the end from where they began.
+    before : float
+        What it covered until then.
+    steps : float
+        How many steps that took.
+    """
+    if way < CRAWL_SHARE * left:
+        return True
+    return way < SMALL_SHARE * left and way * steps < SLOWER * before * CRAWL_STEPS
 
 
 class Crawl:
@@ -41,7 +62,7 @@ class Crawl:
     """
 
     def __init__(self, t: float, end: float):
-        self._mark, self._end, self._count = t, end, 0
+        self._start, self._mark, self._end, self._count = t, t, end, 0
         self._total, self._looked, self._way, self._size, self._seen = 0, t, 0.0, 0.0, 0
         self._look, self._share = FIRST_LOOK, 0.0
 
@@ -64,10 +85,10 @@ class Crawl:
             return reason
         if self._count < CRAWL_STEPS:
             return ""
-        mark, self._mark, self._count = self._mark, t, 0
-        if abs(t - mark) >= CRAWL_SHARE * abs(self._end - mark):
+        mark, self._mark, count, self._count = self._mark, t, self._count, 0
+        if not collapsed(abs(t - mark), abs(self._end - mark), abs(mark - self._start), self._total - count):
             return ""
-        return f"{CRAWL_STEPS} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
+        return f"{count} steps from t = {mark!r} only came to t = {t!r}: the steps have collapsed."
 
     def _blows_up(self, t: float, size: float) -> str:
         way, share = t - self._looked, abs(t - self._looked) / abs(self._way) if self._way else math.inf

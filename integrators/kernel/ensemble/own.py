@@ -30,10 +30,12 @@ from integrators.kernel.step.vary import (
     take,
     within,
 )
-from integrators.running.watchdog import CRAWL_SHARE, CRAWL_STEPS
+from integrators.running import watchdog
+from integrators.running.watchdog import CRAWL_STEPS
 
 group_at = view(Group)
 context_at = view(Context)
+collapsed = compiled(watchdog.collapsed)
 
 
 @compiled
@@ -232,7 +234,8 @@ def crawls(group, lane, ctx):
         return False
     mark = group.mark[lane]
     group.mark[lane] = ctx.t0
-    return abs(ctx.t0 - mark) < CRAWL_SHARE * abs(group.times[group.count - 1] - mark)
+    way, left = abs(ctx.t0 - mark), abs(group.times[group.count - 1] - mark)
+    return collapsed(way, left, abs(mark - group.start_time), ctx.steps - CRAWL_STEPS)
 
 
 @compiled

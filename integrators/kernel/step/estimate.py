@@ -186,7 +186,7 @@ def size_in_step(scale, largest):
 @for_both_widths
 def local_error(h, gamma, slope, scale):
     """Return ``h gamma^2 / (slope scale)``, the error of a coefficient that is left out; see `estimate`."""
-    error = (gamma * (gamma / slope)) * (h / scale)  # in this order: h / slope has no double in a field near 0
+    error = (gamma * (gamma / slope)) * (h / scale)  # not h / slope, which has no double in a field near 0
     return where(error >= 0.0, error, INFINITY)  # of infinite coefficients, a NaN
 
 

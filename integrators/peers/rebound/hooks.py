@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from integrators.peers import load
 from integrators.protocol import Array
-from integrators.running.watchdog import CRAWL_SHARE, CRAWL_STEPS
+from integrators.running import watchdog as rules
 
 FROZEN = 128
 """Steps in a row that leave the time where it is, after which a simulation has stalled."""
@@ -28,7 +28,7 @@ RING = 2048
 """Steps of which the times and lengths are kept."""
 
 # Places in a simulation's block of doubles, which REBOUND's `extras` points to.
-REASON, EVALUATIONS, LAST, STILL, MARK, MARKED, END, SEEN, NUMBERS, RECORD = range(10)
+REASON, EVALUATIONS, LAST, STILL, MARK, MARKED, START, STARTED, END, SEEN, NUMBERS, RECORD = range(12)
 BLOCK = RECORD + 2 * RING
 
 # Why the watchdog stopped a simulation.
@@ -54,9 +54,9 @@ class Block:
     def aim(self, t: float, end: float, steps: int) -> None:
         """Tell the watchdog where the simulation is and where it shall go."""
         self.values[[REASON, STILL]] = 0.0
-        self.values[[LAST, MARK]] = t
+        self.values[[LAST, MARK, START]] = t
         self.values[END] = end
-        self.values[[SEEN, MARKED]] = steps
+        self.values[[SEEN, MARKED, STARTED]] = steps
 
     def history(self, steps: int) -> Array:
         """Return the times and lengths (n, 2) of the last steps, oldest first, after ``steps`` steps."""
@@ -75,6 +75,7 @@ def _pointer_of(typingctx: Any, address: Any) -> Any:
 
 
 _pointer: Any = intrinsic(_pointer_of)
+_collapsed: Any = numba.njit(rules.collapsed)
 
 
 def _offset(field: str, size: int) -> int:
@@ -90,7 +91,7 @@ def watchdog() -> Any:
     T, DT, DONE = _offset("t", 8), _offset("dt", 8), _offset("dt_last_done", 8)
     STEPS, EXTRAS, STATUS = _offset("steps_done", 8), _offset("extras", 8), _offset("_status", 4)
     # numba's cache of compiled code sees a change of these, but not of another module's constants.
-    patience, share = CRAWL_STEPS, CRAWL_SHARE
+    constants = rules.CRAWL_STEPS, rules.CRAWL_SHARE, rules.SMALL_SHARE, rules.SLOWER
 
     @numba.cfunc(types.void(types.voidptr), cache=True)
     def watch(simulation: Any) -> None:
@@ -115,8 +116,10 @@ def watchdog() -> Any:
         else:
             block[STILL] = 0.0
             block[LAST] = t
-        if steps - block[MARKED] >= patience:
-            if abs(t - block[MARK]) < share * abs(block[END] - block[MARK]):
+        if steps - block[MARKED] >= constants[0]:
+            way, left = abs(t - block[MARK]), abs(block[END] - block[MARK])
+            before = abs(block[MARK] - block[START])
+            if _collapsed(way, left, before, block[MARKED] - block[STARTED]):
                 reason = CRAWLS
             block[MARK] = t
             block[MARKED] = steps
