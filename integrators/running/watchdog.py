@@ -12,7 +12,7 @@ CRAWL_SHARE = 1e-7
 """A method that covers less than this share of the way in `CRAWL_STEPS` steps has stalled."""
 
 SMALL_SHARE, SLOWER = 2e-5, 1e-4
-"""So has one that covers less than this share, 1e10 steps for the way, and this part of its mean until then."""
+"""So has one that covers less than this share, 1e10 steps for all, and this part of its mean until then."""
 
 LONGEST_WITHOUT_A_LOOK = 1 << 12
 """Steps between two looks at Ctrl-C."""

@@ -13,7 +13,8 @@ METHODS = [
     LineIntegral(k=6, s=3, h=0.01, tol=1e-6, invariants=["energy"]),
 ]
 
-# Fields in code are refused; there are no pieces with adaptive steps, no HBVM with these equations, no variations.
+# Fields in code are refused; there are no pieces with adaptive steps, no HBVM with these equations and no
+# variations.
 NEED_NOT_APPLY = (
     testing.keeps_the_error_of_a_user_s_function,
     testing.failure_is_a_status,
