@@ -36,6 +36,7 @@ SIDE, LAND, DENSE = range(3)
 
 # Which nonlinear solver is used. AUTO: fixed point, and the implicit solver where that does not contract.
 FIXED_POINT, AUTO, ALWAYS_IMPLICIT = range(3)
+NOT_WANTED, FOR_STEPS, FOR_VECTORS = range(3)
 
 # What solves the step ahead, if anything does: the values, or increments that the implicit solver has found.
 UNSOLVED, BY_VALUES, BY_INCREMENT = range(3)
@@ -225,7 +226,7 @@ class Context(Memory):
     solver = Integer()  # address of the implicit solver, int64(context, memory, started); 0: not there yet
     solver_memory = Integer()
     implicit = Integer()  # 1: the implicit solver is at work
-    wanted = Integer()  # 1: it should be, and is not there
+    wanted = Integer()  # it should be, and is not there: FOR_STEPS, or only FOR_VECTORS that follow
     slow = Integer()  # steps in a row at which the fixed-point iteration was slow
     held = Integer()  # steps for which the implicit solver stays at work when it takes over
     left = Integer()  # steps of these that are left

@@ -18,9 +18,11 @@ from integrators.kernel.context import (
     AUTO,
     BUDGET,
     DONE,
+    FOR_VECTORS,
     HALTED,
     NOT_FINITE,
     NOT_KEPT,
+    NOT_WANTED,
     SCATTERED,
     Context,
 )
@@ -173,6 +175,8 @@ class HBVMStepper(ABC):
             self._vectors.put(directions.state)
         else:
             self._vectors = Vectors(system, (self._context, self._side), directions)
+            if self._implicit is not None:
+                self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started
 
     def look_to(self, end: float) -> Status:
@@ -296,13 +300,15 @@ class HBVMStepper(ABC):
                 context.solver_memory = workspace.address
                 context.busy_implicit = workspace.busy
                 context.point({"increment": workspace.increment})
+            if self._vectors:
+                self._vectors.solve_by(self._implicit)
         return self._implicit
 
     def _take_implicit(self) -> None:
         """Put the implicit solver to work."""
         self._make_implicit()
         ctx = self._context
-        ctx.implicit, ctx.wanted, ctx.slow = 1, 0, 0
+        ctx.implicit, ctx.wanted, ctx.slow = 1, NOT_WANTED, 0
         ctx.held = ctx.left = FIRST_HELD
         ctx.switches += int(self._program.solver.strategy == AUTO)
 
@@ -453,7 +459,10 @@ class HBVMStepper(ABC):
         targets: int = 0, parts: int = 0, /,
     ) -> int:  # fmt: skip
         """Call the kernel once; put the implicit solver to work where it is wanted."""
-        if self._wants_solver:
+        if self._context.wanted == FOR_VECTORS:
+            self._make_implicit()
+            self._context.wanted = NOT_WANTED
+        elif self._wants_solver:
             self._take_implicit()
         with self._pace:
             outcome = self._enter(
@@ -474,7 +483,7 @@ class HBVMStepper(ABC):
         """Do what the kernel came back for; return whether it may go on, or what it ended with."""
         if self.stop is not None and self.stop.is_set():
             raise KeyboardInterrupt
-        for workspace in self._implicit or ():
+        for workspace in (*(self._implicit or ()), *(self._vectors.solvers if self._vectors else ())):
             workspace.raise_what_is_no_failure()
         if outcome == HALTED and self.search is not None and self.search.attend():
             return BUDGET
@@ -483,7 +492,7 @@ class HBVMStepper(ABC):
     @property
     def _wants_solver(self) -> bool:
         """Whether the kernel has come back for the implicit solver."""
-        return self._context.wanted != 0
+        return self._context.wanted != NOT_WANTED
 
     def _samples(self, t: Array, y: Array, outcome: int, why: "Ended | None" = None) -> Samples:
         if why is None and outcome not in (DONE, BUDGET):

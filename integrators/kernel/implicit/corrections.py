@@ -80,7 +80,7 @@ def blended(ctx, m):
 def take_stage(ctx, m, stage):
     """Set `Workspace.state` to one of the stages."""
     lanes = ctx.lanes
-    start = ctx.stages + (stage // lanes) * ctx.padded * lanes
+    start = ctx.stages + ((stage // lanes) * ctx.padded + m.first) * lanes
     for d in range(m.state.size):
         m.state[d] = start[lanes * d + stage % lanes]
 
@@ -92,19 +92,19 @@ def take_mean(ctx, m):
     for d in range(m.state.size):
         m.state[d] = 0.0
     for chunk in range(ctx.chunks):
-        start = ctx.stages + offset(ctx, chunk)
+        start = ctx.stages + offset(ctx, chunk) + lanes * m.first
         for d in range(m.state.size):
             for l in range(8):
                 m.state[d] += m.weights[8 * chunk + l] * start[lanes * d + l]
 
 
 @compiled
-def full(ctx, m):
-    """Set the correction with the Jacobian of every stage; return whether that is possible.
+def full(ctx, m, above):
+    """Set the correction of a copy with the Jacobian of every stage; return whether that is possible.
 
-    One real matrix of s R rows; in the second-order form q' is eliminated.
+    One real matrix of s R rows; in the second-order form q' is eliminated. Its rows begin at ``above``.
     """
-    s, rows = m.s, ctx.rows
+    s, rows = m.s, m.state.size
     second = ctx.second
     n = s * rows
     width = 8 * ((n + 7) // 8)
@@ -116,7 +116,7 @@ def full(ctx, m):
         for d in range(rows):
             r = j * rows + d
             whole[(width + 1) * r] = 1.0
-            x[r] = m.residual[last + at(m, j, d)]
+            x[r] = m.residual[last + at(m, j, above + d)]
     for stage in range(ctx.k):
         take_stage(ctx, m, stage)
         linearize(ctx, m, ctx.times[stage])
@@ -126,7 +126,7 @@ def full(ctx, m):
             known = 0.0
             if second:
                 for i in range(s):
-                    known += m.integrals[stage, i] * m.residual[at(m, i, c)]
+                    known += m.integrals[stage, i] * m.residual[at(m, i, above + c)]
             for j in range(s):
                 part, row = m.moments[j, stage] * slope, width * (j * rows + r) + c
                 for i in range(s):
@@ -137,14 +137,15 @@ def full(ctx, m):
         return False
     for j in range(s):
         for d in range(rows):
-            m.correction[last + at(m, j, d)] = x[j * rows + d]
+            m.correction[last + at(m, j, above + d)] = x[j * rows + d]
     if second:
         for i in range(s):
             for d in range(rows):
                 found = 0.0
                 for j in range(s):
                     found += m.x[i, j] * x[j * rows + d]
-                m.correction[at(m, i, d)] = m.residual[at(m, i, d)] + ctx.row_factor[d] * found
+                place = at(m, i, above + d)
+                m.correction[place] = m.residual[place] + ctx.row_factor[above + d] * found
     return True
 
 
@@ -177,7 +178,8 @@ def correct(ctx, m, which):
         return NOT_FINITE
     possible = True
     if which == EACH and m.whole > 0:
-        possible = full(ctx, m)
+        for above in range(0, ctx.rows, m.state.size):
+            possible = possible and full(ctx, m, above)
     else:
         if which != KEPT:
             take_mean(ctx, m)

@@ -23,6 +23,8 @@ class Matrices(Protocol):
     entry_columns: Any
     entries: Any
     factor: Any
+    state: Any
+    copies: Any
     b: Any
 
 
@@ -48,7 +50,7 @@ class Factors:
     def __init__(self, arrays: Matrices, values: Complex):
         self._arrays, self._values = arrays, values
         rows, columns = arrays.entry_rows, arrays.entry_columns
-        n = arrays.factor.size
+        n = arrays.state.size
         self._size = n
         self._solvers: list[Any] = []
         self.error: BaseException | None = None
@@ -95,7 +97,11 @@ class Factors:
 
     def _solve(self, group: int) -> None:
         """Replace eight vectors, real parts and then imaginary parts, by what their matrices make of them."""
-        x, y = self._arrays.b.reshape(2, -1, 8)[:, : self._size]
+        both, n = self._arrays.b.reshape(2, -1, 8), self._size
+        for first in range(0, n * self._arrays.copies, n):
+            self._solve_copy(group, *both[:, first : first + n])
+
+    def _solve_copy(self, group: int, x: Any, y: Any) -> None:
         if len(self._solvers) == 1 and self._values[0].imag == 0.0:  # all belong to the one matrix
             found = self._solvers[0](np.concatenate([x, y], axis=1))
             x[:], y[:] = found[:, :8], found[:, 8:]

@@ -2,11 +2,13 @@
 
 from integrators.kernel.implicit.factors import FACTORIZE, SOLVE
 from integrators.kernel.implicit.linear import factor, solve
-from integrators.kernel.native.attributes import address
+from integrators.kernel.implicit.workspace import Workspace
+from integrators.kernel.native.attributes import address, view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import call_factors, call_field, get, put, splat8, spread
 
+workspace = view(Workspace)
 STEP = 1.4901161193847656e-08  # sqrt(eps): where the errors of a difference balance
 SMALL = 1e-5  # of the largest component: no difference is taken over less
 POWERS = 6  # multiplications by the Jacobian that find its spectral radius to 20 % or so
@@ -52,8 +54,15 @@ def differences(ctx, m, t):
 
 @compiled
 def linearize(ctx, m, t):
-    """Take the Jacobian at `Workspace.state` and time t, by its function or by differences."""
-    if m.source == 0:
+    """Take the Jacobian at `Workspace.state` and time t, by its function or by differences.
+
+    Tangent vectors take the trajectory's last one where that is by differences.
+    """
+    if m.source == 0 and m.trajectory != 0:
+        entries = workspace(m.trajectory).entries
+        for i in range(m.entries.size):
+            m.entries[i] = entries[i]
+    elif m.source == 0:
         differences(ctx, m, t)
     else:
         m.trial[0] = t
@@ -67,7 +76,7 @@ def linearize(ctx, m, t):
 @compiled
 def contraction(m):
     """Estimate the factor of one fixed-point iteration, but for X_s, from powers of the Jacobian."""
-    rows = m.factor.size
+    rows = m.state.size
     for d in range(rows):
         m.slopes[d] = 1.0 + 0.0625 * ((7 * d) % 13)
     growth = 1.0
@@ -96,7 +105,7 @@ def factorize(ctx, m):
     In the second-order form, I - z_i^2 h^2 J diag(q'/p). Where a function keeps
     the factors, it is done there.
     """
-    rows = ctx.rows
+    rows = m.state.size
     m.factored = 0
     m.factorizations += 1
     if m.factors:
@@ -131,12 +140,12 @@ def factorize(ctx, m):
 
 @compiled
 def resolve(ctx, m, group):
-    """Replace eight vectors v by (I - h z_i J)^{-1} v, J the Jacobian of the first-order form.
+    """Replace eight vectors v by (I - h z_i J)^{-1} v, J the Jacobian of the first-order form; all copies.
 
     z_i are the eigenvalues of a group. In the second-order form, where J couples q' to p and p' to
     q only, elimination of the first leaves systems of R rows.
     """
-    rows, h = ctx.rows, ctx.h
+    rows, h, unknowns = ctx.rows, ctx.h, m.state.size
     step = 8 * m.padded
     v = m.v + 2 * step * group
     last = v + (m.parts - 1) * m.wide
@@ -145,16 +154,21 @@ def resolve(ctx, m, group):
         put(x, i, get(last, i))
     if ctx.second:
         z, w = get(m.eigen, 16 * group), get(m.eigen, 16 * group + 8)
-        for j in range(m.entries.size):
-            r, c, slope = 8 * m.entry_rows[j], 8 * m.entry_columns[j], splat8(h * m.entries[j])
-            a, b = get(v, c), get(v, step + c)
-            put(x, r, fma(slope, fma(z, a, -w * b), get(x, r)))
-            put(y, r, fma(slope, fma(z, b, w * a), get(y, r)))
+        for above in range(0, 8 * rows, 8 * unknowns):
+            for j in range(m.entries.size):
+                r, c = above + 8 * m.entry_rows[j], above + 8 * m.entry_columns[j]
+                slope, a, b = splat8(h * m.entries[j]), get(v, c), get(v, step + c)
+                put(x, r, fma(slope, fma(z, a, -w * b), get(x, r)))
+                put(y, r, fma(slope, fma(z, b, w * a), get(y, r)))
     if m.factors:
         call_factors(m.factors, SOLVE, group)
     else:
-        first = rows * group
-        solve(m.lu + 16 * rows * first, m.pivots + first, m.begins + first, m.ends + first, rows, x, y)
+        first = unknowns * group
+        lu, pivots, begins, ends = (
+            m.lu + 16 * unknowns * first, m.pivots + first, m.begins + first, m.ends + first,
+        )  # fmt: skip
+        for above in range(0, 8 * rows, 8 * unknowns):
+            solve(lu, pivots, begins, ends, unknowns, x + above, y + above)
     for i in range(0, 2 * step, 8):
         put(last, i, get(x, i))
     if ctx.second:

@@ -2,7 +2,7 @@
 
 from integrators.kernel.context import AUTO, BY_INCREMENT, DIVERGED, DONE, RUNNING, SCATTERED
 from integrators.kernel.implicit.constants import BLENDED, NEWTON
-from integrators.kernel.implicit.corrections import EACH, KEPT, correct
+from integrators.kernel.implicit.corrections import EACH, KEPT, correct, take_stage
 from integrators.kernel.implicit.jacobian import contraction, linearize
 from integrators.kernel.implicit.stages import (
     FLOORED,
@@ -102,10 +102,17 @@ def nearer(ctx, m):
 
 @compiled
 def renew(ctx, m):
-    """Take the Jacobian at the state, and the contraction of the fixed-point iteration with it."""
-    for d in range(m.state.size):
-        m.state[d] = ctx.row_state[d]
-    linearize(ctx, m, ctx.t0 + ctx.n * ctx.h)
+    """Take the Jacobian at the state, and the contraction of the fixed-point iteration with it.
+
+    Of tangent vectors it is taken at the trajectory's first stage.
+    """
+    if m.trajectory != 0:
+        take_stage(ctx, m, 0)
+        linearize(ctx, m, ctx.times[0])
+    else:
+        for d in range(m.state.size):
+            m.state[d] = ctx.row_state[d]
+        linearize(ctx, m, ctx.t0 + ctx.n * ctx.h)
     m.contraction = m.radius * contraction(m)
     m.contraction_h = ctx.h
     m.stale = 0
@@ -181,13 +188,13 @@ def solve_step(ctx, m, started):
                 ctx.restarts += 1
             if use or m.since:
                 trying, use, fresh = 1, 0, True
-            elif outcome == DIVERGED and which == KEPT:
+            elif outcome == DIVERGED and which == KEPT and (m.trajectory == 0 or m.source != 0):
                 m.rescues += 1
                 trying, which, fresh = 1, EACH, False
     m.since += 1
     if which != KEPT:
         m.stale = 1
-        if outcome == DONE and is_scattered(m):
+        if outcome == DONE and m.trajectory == 0 and is_scattered(m):
             outcome = SCATTERED
     if outcome == DONE:
         if not started:

@@ -8,14 +8,17 @@ Coefficients lie as stages do: in groups of eight, a row for each component (`Wo
 p'; what is said of the field's coefficients is about the last block, what moves stages is the first.
 """
 
-from integrators.kernel.native.attributes import address
+from integrators.kernel.implicit.workspace import Workspace
+from integrators.kernel.native.attributes import address, view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import fma
 from integrators.kernel.simd.memory import get, larger, largest, put, splat8, spread
+from integrators.kernel.simd.views import doubles
 from integrators.kernel.step.size import change, enter_size, forget_sizes, invert_sizes, stage_size
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import multiply
 
+workspace = view(Workspace)
 STRICT, FLOORED = range(2)  # relative to a block, and relative to a block that is raised if it is small
 
 
@@ -69,6 +72,19 @@ def set_velocities(ctx, m, source, target):
             i = 8 * (padded * group + d)
             put(target, i, spread(slope, d) * get(target, i))
         target[8 * d] += (drift[d] + low[d]) / h
+    if m.pulls != 0:
+        pull_velocities(ctx, m, target)
+
+
+@compiled
+def pull_velocities(ctx, m, target):
+    """Add to the coefficients of q' what follows from the derivative of the velocities."""
+    trajectory, pulls = workspace(m.trajectory), doubles(m.pulls)
+    for d in range(ctx.rows):
+        for group in range(m.groups):
+            i = 8 * (m.padded * group + d)
+            velocity = get(trajectory.gamma, 8 * (trajectory.padded * group + d % trajectory.rows))
+            put(target, i, get(target, i) + pulls[d] * velocity)
 
 
 @compiled

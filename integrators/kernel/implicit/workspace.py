@@ -99,7 +99,8 @@ class Workspace(Memory):
 
     There are R unknowns of each degree, and in the second-order form 2 R, in two blocks: the
     coefficients of q' and then those of p'; see `integrators.kernel.implicit.stages`. Tables are packed as
-    in `integrators.kernel.tables`.
+    in `integrators.kernel.tables`. The rows of tangent vectors along a trajectory are ``copies`` of its rows,
+    for which its Jacobian holds; the trajectory's stages follow theirs.
 
     Parameters
     ----------
@@ -108,13 +109,22 @@ class Workspace(Memory):
     kind : {NEWTON, BLENDED}
         How corrections are computed; beyond some degree they are blended.
     linearization : Linearization
-        The Jacobian.
+        The Jacobian, of R / copies rows.
+    copies : int
+        How many times it stands on the diagonal.
+    padded : int, optional
+        `Context.padded`; by default it follows from the rows.
     """
 
     method = Integer()  # how corrections are computed: NEWTON, BLENDED
     source = Integer()  # address of the Jacobian, void(t, y, par, entries); 0 for differences
     factors = Integer()  # address of what keeps the factors, int64(what, pair); 0: they are here
     rows = Integer()
+    copies = Integer()
+    unknowns = Integer()  # rows of a copy
+    first = Integer()  # row of the stages at which the Jacobian's state begins
+    trajectory = Integer()  # address of the solver's memory that the Jacobian is taken from; 0: of none
+    pulls = Integer()  # address of relative derivatives of velocities, by row; 0: none
     padded = Integer()
     k = Integer()
     s = Integer()
@@ -169,7 +179,7 @@ class Workspace(Memory):
     entry_rows = Table("entry_count", of=int)
     entry_columns = Table("entry_count", of=int)
     entries = Table("entry_count")
-    state = Table("rows")  # where the Jacobian is taken
+    state = Table("unknowns")  # where the Jacobian is taken
     lu = Array("lu_size")  # factors of eight matrices at a time; see `integrators.kernel.implicit.linear`
     pivots = Array("lu_rows", of=int)
     begins = Array("lu_rows", of=int)
@@ -182,8 +192,8 @@ class Workspace(Memory):
     factored_h = Real()  # length of the step that the factors are for
 
     # --- room ---
-    slopes = Table("rows")
-    next_slopes = Table("rows")
+    slopes = Table("unknowns")
+    next_slopes = Table("unknowns")
     v = Array("parts", "wide")  # vectors of the first-order form, one for each pair
     b = Array(16, "padded")  # right-hand sides and solutions of eight systems
     trial = Array("trial_size")  # one block of stages, its times, and the field there
@@ -195,13 +205,22 @@ class Workspace(Memory):
     factorizations = Integer()
     rescues = Integer()
 
-    def __init__(self, shape: Shape, kind: int, linearization: Linearization):
+    def __init__(
+        self,
+        shape: Shape,
+        kind: int,
+        linearization: Linearization,
+        copies: int = 1,
+        padded: int | None = None,
+    ):
         c = shape.constants
         m = method(c.k, c.s, shape.second, c.lanes, solver_of(c.s, kind))
-        rows, columns = linearization.places(shape.rows)
-        pairs, whole, padded = m.eigenvalues.size, c.s * shape.rows, -(-shape.rows // 8) * 8
+        unknowns = shape.rows // copies
+        rows, columns = linearization.places(unknowns)
+        pairs, whole = m.eigenvalues.size, c.s * unknowns
+        padded = -(-shape.rows // 8) * 8 if padded is None else padded
         parts, groups, pair_groups = 2 if shape.second else 1, -(-c.s // 8), -(-pairs // 8)
-        kept = 0 if shape.rows > LARGEST_DENSE else pair_groups * shape.rows
+        kept = 0 if unknowns > LARGEST_DENSE else pair_groups * unknowns
         whole = whole if whole <= LARGEST_WHOLE else 0
         weights = np.zeros(-(-c.k // c.lanes) * c.lanes)
         weights[: c.k] = c.arrays["weights"].reshape(-1)
@@ -212,10 +231,11 @@ class Workspace(Memory):
         powers = values**2 if shape.second else values
         numbers = {
             "method": solver_of(c.s, kind), "source": linearization.address, "rows": shape.rows,
-            "padded": padded, "k": c.k, "s": c.s, "dim": shape.dim, "entry_count": rows.size,
+            "copies": copies, "unknowns": unknowns, "padded": padded,
+            "k": c.k, "s": c.s, "dim": shape.dim, "entry_count": rows.size,
             "parts": parts, "groups": groups, "block": 8 * groups * padded,
             "pair_groups": pair_groups, "wide": 16 * pair_groups * padded,
-            "lu_rows": kept, "lu_size": 16 * kept * shape.rows,
+            "lu_rows": kept, "lu_size": 16 * kept * unknowns,
             "whole": whole, "whole_size": whole * -(-whole // 8) * 8,
             "trial_size": c.lanes * (1 + 2 * padded), "radius": m.radius,
         }  # fmt: skip
@@ -232,6 +252,7 @@ class Workspace(Memory):
             "entry_rows": rows, "entry_columns": columns,
         }  # fmt: skip
         super().__init__(numbers, {name: np.ascontiguousarray(array) for name, array in tables.items()})
+        self.kind, self.linearization = kind, linearization
         self.traced = linearization.jacobian is not None
         """Whether the Jacobian is traced, or taken by differences."""
         self._values = m.eigenvalues ** (2 if shape.second else 1)
@@ -241,6 +262,22 @@ class Workspace(Memory):
         self.elsewhere = None if self.lu_rows else Factors(self, self._values)
         """What keeps the factors, where they are not dense and small."""
         self.factors = 0 if self.elsewhere is None else self.elsewhere.address
+
+    def along(self, shape: Shape, padded: int, pulls: int) -> "Workspace":
+        """Return memory for tangent vectors along the trajectory that this is the memory of.
+
+        Parameters
+        ----------
+        shape : Shape
+            Of the vectors' context.
+        padded : int
+            Of the same.
+        pulls : int
+            Address of relative derivatives of velocities, or 0.
+        """
+        made = Workspace(shape, self.kind, self.linearization, shape.rows // self.rows, padded)
+        made.first, made.trajectory, made.pulls = shape.rows, self.address, pulls
+        return made
 
     def copy(self) -> Self:
         """Return memory of its own, with factors of its own."""

@@ -1,6 +1,6 @@
 """When the implicit solver takes over from the fixed-point iteration, and how it is called."""
 
-from integrators.kernel.context import BUDGET, DONE, FIXED_POINT
+from integrators.kernel.context import BUDGET, DONE, FIXED_POINT, FOR_STEPS
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_solver
 from integrators.kernel.step.iterate import settle
@@ -21,7 +21,7 @@ def solve_implicitly(ctx, side, started):
 @compiled
 def want_solver(ctx):
     """Come back for the implicit solver, which has to be loaded first; the step is continued then."""
-    ctx.wanted = 1
+    ctx.wanted = FOR_STEPS
     return BUDGET
 
 

@@ -7,19 +7,33 @@ of what it makes of ``y``:
 
 and where the vector has a part in the parameters, ``f'(Y_j) D_j`` has that of ``f`` too. The stages
 ``Y_j`` are known, so these equations are linear. They are solved by the same iteration, with the same
-matrices, first stages and stopping rule as those of the step: the vectors of a group are the rows of a
+matrices, first stages and stopping rule as those of the step, or by the implicit solver, where that solved
+the step or the iteration does not converge: the vectors of a group are the rows of a
 `Context`, whose field is the derivative of the trajectory's along them. It finds ``Y_j`` in the rows that
 follow those of the vectors. In second-order form, ``q' = v(par) p`` with a derivative ``v' dpar`` adds
 ``(v' dpar / v) (Q_i - q)`` to the stages of positions, and the same with ``q_1`` to the end.
 """
 
-from integrators.kernel.context import DONE, LANDING, PART_END, STATE, UNSOLVED, Context
+from integrators.kernel.context import (
+    BUDGET,
+    BY_INCREMENT,
+    DONE,
+    FIXED_POINT,
+    FOR_VECTORS,
+    LANDING,
+    PART_END,
+    STATE,
+    STEP,
+    UNSOLVED,
+    Context,
+)
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import get, put, spread
 from integrators.kernel.simd.views import doubles
 from integrators.kernel.step.begin import choose, predict, prepare, rewind, set_factors, set_step
 from integrators.kernel.step.finish import commit, finish
+from integrators.kernel.step.handover import solve_implicitly
 from integrators.kernel.step.iterate import settle, test
 from integrators.kernel.step.sample import copy, vectors_of_state, write
 from integrators.kernel.step.size import take_sizes
@@ -69,13 +83,22 @@ def pull_end(ctx, vectors, pulls):
 
 
 @compiled
-def differentiate(ctx, vectors, earlier, part, pulls):
+def finish_implicitly(vectors, part):
+    """Solve the equations by the implicit solver and set the end of the step; return the outcome."""
+    outcome = solve_implicitly(vectors, vectors, int(part))
+    return finish(vectors) if outcome == DONE else outcome
+
+
+@compiled
+def differentiate(ctx, trajectory, vectors, earlier, part, pulls):
     """Find the derivative of a step that is solved in ``ctx``; return the outcome.
 
     Parameters
     ----------
     ctx : Context
         Of the trajectory, or of a partial step.
+    trajectory : Context
+        Of the trajectory.
     vectors : Context
         Of the vectors at the start of the step; `Context.next_state` becomes those at its end.
     earlier : Context
@@ -92,6 +115,12 @@ def differentiate(ctx, vectors, earlier, part, pulls):
         set_step(ctx, ctx.h)
     vectors.matrix = ctx.matrix
     show_stages(ctx, vectors)
+    if ctx.solved == BY_INCREMENT:
+        if part:
+            rewind(vectors)
+            prepare(vectors)
+            predict(vectors, earlier, earlier.length, 1.0)
+        return finish_implicitly(vectors, part)
     rewind(vectors)
     prepare(vectors)
     if pulls != 0:
@@ -105,9 +134,16 @@ def differentiate(ctx, vectors, earlier, part, pulls):
     outcome = settle(vectors)
     if outcome == DONE:
         outcome = finish(vectors)
-    if outcome == DONE and pulls != 0:
-        pull_end(ctx, vectors, doubles(pulls))
-    return outcome
+        if outcome == DONE and pulls != 0:
+            pull_end(ctx, vectors, doubles(pulls))
+        return outcome
+    if trajectory.strategy == FIXED_POINT or pulls != 0:
+        return outcome
+    if vectors.solver == 0:
+        trajectory.wanted = FOR_VECTORS
+        return BUDGET
+    vectors.predicted = 0
+    return finish_implicitly(vectors, part)
 
 
 @compiled
@@ -123,8 +159,12 @@ def write_vectors(memory, g, first, vectors, state, made):
 
 @compiled
 def entry(what, address, place):
-    """Do what `Context.follow` promises; return DONE, or how the equations of the vectors were not solved."""
+    """Do what `Context.follow` promises; return the outcome.
+
+    BUDGET: come again with the implicit solver.
+    """
     ctx, memory = context(address), tangents(place)
+    trajectory = context(memory.trajectory)
     first = 0
     for g in range(memory.groups):
         own, side = context(memory.own[g]), context(memory.side[g])
@@ -139,16 +179,19 @@ def entry(what, address, place):
         elif what == PART_END:
             copy(own.state, side.state, vectors_of_state(own))
             copy(own.error, side.error, vectors_of_state(own))
-            outcome = differentiate(ctx, side, own, True, memory.pulls[g])
+            outcome = differentiate(ctx, trajectory, side, own, True, memory.pulls[g])
             if outcome == DONE:
                 write_vectors(memory, g, first, side, side.next_state, ctx.made)
         else:
-            outcome = differentiate(ctx, own, own, False, memory.pulls[g])
-            if outcome == DONE:
-                commit(own)
+            outcome = differentiate(ctx, trajectory, own, own, False, memory.pulls[g])
+        if outcome == BUDGET:
+            return outcome
         if outcome != DONE:
             own.solved = side.solved = UNSOLVED
             memory.failed = 1
             return outcome
         first += memory.vectors[g]
+    if what == STEP:
+        for g in range(memory.groups):
+            commit(context(memory.own[g]))
     return DONE

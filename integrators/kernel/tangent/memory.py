@@ -10,6 +10,7 @@ class Tangents(Memory):
     after another, are the rows of their context.
     """
 
+    trajectory = Integer()  # address of its context
     dim = Integer()  # of the trajectory's state
     rows = Integer()  # components of one of its stages
     count = Integer()  # vectors

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from integrators.kernel.context import Context, Shape
+from integrators.kernel.implicit import engine as implicit_engine
+from integrators.kernel.implicit.workspace import Workspace
 from integrators.kernel.native.field import compile_field
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step.rule import FIRST_RATE
@@ -58,14 +60,16 @@ class Vectors:
         most = max(1, min(MOST, OPERATIONS // operations))
         parts = np.array_split(np.arange(count), -(-count // most))
         self._pairs, pulls = [], []
+        self.solvers: list[Workspace] = []
+        """The implicit solvers of the vectors, where there are any."""
         for part in parts:
             chosen = Directions(directions.state[:, part], directions.parameters[:, part])
             self._pairs.append(tuple(self._follower(system, base, chosen, moves) for base in contexts))
             pulls.append(self._pulls(system, chosen))
         self._memory = memory = Tangents(
             {
-                "dim": dim, "rows": self._context.shape.rows, "count": count, "groups": len(parts),
-                "room_size": dim * len(parts[0]),
+                "trajectory": self._context.address, "dim": dim, "rows": self._context.shape.rows,
+                "count": count, "groups": len(parts), "room_size": dim * len(parts[0]),
             },
             {},
         )  # fmt: skip
@@ -117,6 +121,18 @@ class Vectors:
         pulls = aligned(slopes.size)
         pulls[:] = slopes / np.tile(self._context.velocity[: shape.rows], n)
         return pulls if pulls.any() else None
+
+    def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
+        """Give the vectors the implicit solver of the trajectory and that of its partial steps."""
+        for pair, pulls in zip(self._pairs, self._memory.pulls.tolist(), strict=True):
+            for context, solver in zip(pair, solvers, strict=True):
+                workspace = solver.along(context.shape, context.padded, pulls)
+                context.solver, context.solver_memory = (
+                    implicit_engine.solver.code().address,
+                    workspace.address,
+                )
+                context.point({"increment": workspace.increment})
+                self.solvers.append(workspace)
 
     @property
     def iterations(self) -> int:
