@@ -59,7 +59,7 @@ def advise(
     ] = 1e-10,
     as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
 ) -> None:
-    """Say which of our methods and which step reach an accuracy, at what cost: a few short runs."""
+    """Say which of our methods and which step reach an accuracy, at what cost: some thirty runs."""
     from integrators.methods.advice import advise as advise_
 
     advice = advise_(typed_problem(problem), accuracy)
@@ -70,6 +70,7 @@ def advise(
                 "accuracy": accuracy,
                 "reached": advice.reached,
                 "until": advice.until,
+                "horizon": advice.horizon,
                 "why": advice.why,
                 "proposals": [{**vars(one), "method": repr(one.method)} for one in advice.proposals],
             }

@@ -1,17 +1,19 @@
-"""Which of our methods, and with which step: found by trying them on the beginning of the problem.
+"""Which of our methods, and with which step: found by trying them on the whole trajectory.
 
-Every candidate runs a piece of the trajectory, about 200 steps of `HBVM()` long, and its
-positions are compared with those of `HBVM()`, its energies with the first. For fixed steps
-the length is then sought at which the error expected at the end meets the accuracy. The
-piece's error is carried on to the end by the power of time by which it grew over the second
-half of the piece, at least linearly: that is how errors grow where motion is regular. Where
-neighbouring trajectories part exponentially, no method keeps the positions; then
-the piece itself is what is judged, and the advice says so.
+Three settings that are accurate to rounding integrate the whole span. Where they differ, no
+method in double precision knows the positions: that tells how far neighbouring trajectories
+diverge, without a model of it. Every candidate runs the span too, and its positions are
+compared with theirs, its energies with the first. Steps of fixed length are sought on a piece
+at the start, about 200 steps of `HBVM()` long, and then tried on the whole. Only where the
+span takes longer than `LOOK` seconds is an error carried on to its end: by the power of time
+by which it grew over the second half of what was looked at, at least linearly. That is how
+errors grow where motion is regular; such an accuracy does not count as reached.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -19,26 +21,27 @@ import numpy as np
 
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM, TOLERANCE
-from integrators.protocol import Array, MethodBase, Status, check_is_problem
+from integrators.protocol import Array, Destination, MethodBase, Status, check_is_problem, offers
+from integrators.running.integrate import prepared
 from problems.checks import checked_arguments
 from problems.errors import InputError, shown
 from problems.problem import Problem
 
+LOOK = 2.0  # seconds that one run of the span may take; what comes later is not looked at
+FIRST = 1e-6  # of the span: what is looked at first, without knowing what it costs
 PIECE = 200  # steps of HBVM() that a piece is long
-SAMPLES = 64  # states of a piece that are compared
-SEARCH = 8  # lengths of steps tried for each method
+SAMPLES = 64  # states that are compared
+SHORTEST = 0.02  # of an own step of HBVM(): shorter fixed steps are not tried
+SEARCH = 8  # lengths of steps tried for each method on the piece, ...
+REPEATS = 3  # ... and on the span
 ROUNDS = 5  # timings of a candidate, of which the fastest counts
-SAFETY = 0.3  # the share of the accuracy that an expected error may take: a piece is not the whole
-NEIGHBOUR = 1e-9  # relative distance at which a neighbouring trajectory starts
-# Growth of its distance beyond which motion counts as irregular, and pieces are halved: if it also is so many
-# times as far in the second half as in the first (twice where it grows with time), or as far as this.
-APART, STEEP, FAR = 1e4, 10.0, 1e-2
-SHORTEST = 12  # steps of a piece
+SAFETY = 0.3  # the share of the accuracy that an expected error may take: the samples are not the whole
 WIDTH = 16.0  # ratio of long to short own steps above which fixed steps are not tried
 KEPT = 1e-13  # error of an energy that is kept
 FLOOR = 1e-15  # of what positions are known to
 NEAR = 30.0  # times that: errors there are rounding errors, or theirs too
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12, 1e-14, TOLERANCE)
+ACCURATE = (HBVM(), HBVM(k=16, s=10, tol=TOLERANCE), HBVM(k=16, s=12, tol=TOLERANCE))
 FIXED = ((2, 2), (4, 4), (6, 6), (8, 8), (8, 4), (16, 8))  # k, s
 LONGEST_S = 14  # the degree at which HBVM() works: lengths of steps are first guessed in proportion
 
@@ -53,9 +56,9 @@ class Proposal:
         The setting.
     position : float
         Expected largest error of q (of y, for systems that are not Hamiltonian), relative to the
-        largest component there is; at the end of the span, or of the piece for chaotic motion.
+        largest component there is, over the whole span.
     energy : float or None
-        Largest relative error of the energy on the piece; ``None`` where there is none.
+        Largest relative error of the energy up to where was looked; ``None`` where there is none.
     seconds : float
         Expected time of computing, without compilation.
     steps : int
@@ -80,13 +83,16 @@ class Advice:
     accuracy : float
         What was asked for.
     proposals : tuple of Proposal
-        The settings that are expected to be as accurate as asked, the fastest first; without one,
-        the most accurate that was found.
+        The settings that are expected to be as accurate as asked, the fastest first: at the end of the span,
+        or at `horizon` where no method gets further. Without one, the most accurate that was found.
     reached : bool
-        Whether the accuracy is expected to be reached at `until`, the time up to which settings were tried.
-        What comes after it was not looked at: the errors of the proposals there are extrapolations.
-    piece : float
-        Time from the start to which everything was tried.
+        Whether the first proposal was as accurate as asked at the problem's end. False where the end was not
+        looked at.
+    until : float
+        The time up to which was looked: the problem's end, unless the way to there takes more than two
+        seconds or `HBVM` does not come so far.
+    horizon : float
+        The time up to which double precision can be as accurate as asked; not later than `until`.
     why : str
         The reasons, in one to four sentences.
     """
@@ -95,13 +101,14 @@ class Advice:
     accuracy: float
     proposals: tuple[Proposal, ...]
     reached: bool
-    piece: float
+    until: float
+    horizon: float
     why: str
 
     @property
-    def until(self) -> float:
-        """The time up to which settings were tried; ``reached`` says nothing of later ones."""
-        return self.problem.t0 + self.piece
+    def piece(self) -> float:
+        """Time from the start to `until`."""
+        return self.until - self.problem.t0
 
     @property
     def method(self) -> MethodBase:
@@ -114,11 +121,12 @@ class Advice:
 
 @dataclass(frozen=True)
 class _Trial:
-    """What a method did on the piece."""
+    """What a method did on a part of the trajectory."""
 
     method: MethodBase
-    position: float
-    grown: float  # position error of the piece over that of its first half
+    position: float  # error up to the horizon
+    last: float  # error up to the end of the part
+    grown: float  # that over the error of its first half
     energy: float | None
     steps: int
 
@@ -155,9 +163,9 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
 
     Notes
     -----
-    Tried are `HBVM` with own steps, and Gauss and HBVM with fixed ones. Expected errors are
-    extrapolations: where a close encounter comes after the piece, only methods with own steps
-    hold; where the piece shows that step lengths vary much, fixed steps are not tried.
+    Tried are `HBVM` with own steps, and Gauss and HBVM with fixed ones, each on the whole span: some thirty
+    trajectories. Where step lengths vary much, fixed steps are not tried. The errors are differences from
+    trajectories in double precision, and at least as large as those differ among themselves.
 
     Examples
     --------
@@ -168,56 +176,44 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     True
     """
     check_is_problem(problem)
-    piece = _Piece(problem)
     goal = SAFETY * accuracy
-    found = list(_candidates(piece, goal))
-    meeting = [one for one in found if piece.expected(one) <= goal]
-    kept = meeting or [min(found, key=piece.expected)]
-    proposals = tuple(sorted(map(piece.proposal, kept), key=lambda made: made.seconds))
-    why = _why(piece, proposals, bool(meeting), accuracy)
-    return Advice(problem, accuracy, proposals, bool(meeting), piece.end - problem.t0, why)
+    scout = _Scout(problem)
+    span = _Part(problem, scout.end, goal)
+    piece = _Part(problem, scout.piece_end, goal)
+    found = list(_candidates(scout, span, piece, goal))
+    meeting = [one for one in found if span.expected(one) <= goal]
+    kept = meeting or [min(found, key=span.expected)]
+    proposals = tuple(sorted((span.proposal(one, piece) for one in kept), key=lambda made: made.seconds))
+    reached = bool(meeting) and span.horizon == problem.t_end
+    why = _why(scout, span, proposals, bool(meeting), accuracy)
+    return Advice(problem, accuracy, proposals, reached, span.end, span.horizon, why)
 
 
-class _Piece:
-    """The beginning of a trajectory: as `HBVM()` computes it, and as others do."""
+class _Scout:
+    """How far `HBVM()` gets, and the lengths of its steps on the way."""
 
     def __init__(self, problem: Problem):
-        self.problem = problem
-        stepper = HBVM().compile(problem.system).start(problem.y0, problem.par, problem.t0)
-        forward = np.sign(problem.t_end - problem.t0)
-        lengths: list[float] = []
-        while len(lengths) < PIECE and (problem.t_end - stepper.t) * forward > 0.0:
-            before = stepper.t
-            if stepper.step().failed:
+        stepper = _started(problem, HBVM())
+        parts, began, t = [np.array([problem.t0])], perf_counter(), problem.t0
+        length, count, self.reason = FIRST * (problem.t_end - problem.t0), 0, ""
+        while t != problem.t_end and (count < PIECE or perf_counter() < began + LOOK):
+            before = perf_counter()
+            t = problem.t_end if abs(problem.t_end - t) <= abs(length) else t + length
+            made = stepper.advance(np.array([t]), sample="steps")
+            parts.append(made.t)
+            count += made.t.size
+            if made.status is not Status.FINISHED:
+                self.reason = made.reason
                 break
-            lengths.append(abs(stepper.t - before))
-        if not lengths:
-            raise InputError(f"HBVM() takes no step from t0={problem.t0!r}: {stepper.status}.")
-        self.end = stepper.t if (problem.t_end - stepper.t) * forward > 0.0 else problem.t_end
-        self.timed = self.end
-        self.chaotic = False
-        while self._parting() and len(lengths) > SHORTEST:
-            self.chaotic = True
-            lengths = lengths[: len(lengths) // 2]
-            self.end = problem.t0 + forward * math.fsum(lengths)
-        other = self._states(HBVM(k=16, s=10, tol=TOLERANCE), problem.y0)
-        self.floor = max(self._distance(other[0])[0], FLOOR) if other else FLOOR
-        self.lengths = np.array(lengths)
-        self.whole = abs((problem.t_end - problem.t0) / (self.end - problem.t0))
-
-    def _parting(self) -> bool:
-        """Run the piece, and beside it a neighbour; return whether they part exponentially."""
-        problem = self.problem
-        self.times = np.linspace(problem.t0, self.end, SAMPLES + 1)[1:]
-        truth = self._states(HBVM(), problem.y0)
-        if truth is None:
-            raise InputError(f"HBVM() does not reach t={self.end!r}; integrate to there and see its status.")
-        self._truth, self._size = self._positions(truth[0]), float(np.abs(self._positions(truth[0])).max())
-        beside = self._states(HBVM(), problem.y0 * (1.0 + NEIGHBOUR * (-1.0) ** np.arange(problem.y0.size)))
-        if beside is None:
-            return False
-        far, early = self._distance(beside[0])
-        return far > APART * NEIGHBOUR and (far > STEEP * early or far > FAR)
+            if perf_counter() - before < LOOK / 16:
+                length *= 2.0
+        self.end = problem.t_end if t == problem.t_end and not self.reason else stepper.t
+        times = np.concatenate(parts)
+        times = times[np.append(True, np.diff(times) != 0.0)]
+        if times.size < 2:
+            raise InputError(f"HBVM() takes no step from t0={problem.t0!r}: {self.reason or stepper.status}")
+        self.lengths = np.abs(np.diff(times))
+        self.piece_end = float(times[PIECE]) if times.size > PIECE + 1 else self.end
 
     @property
     def varying(self) -> bool:
@@ -225,49 +221,84 @@ class _Piece:
         low, high = np.quantile(self.lengths, [0.02, 0.9])
         return bool(high > WIDTH * low)
 
+
+class _Part:
+    """A trajectory up to a time: as the accurate settings compute it, and as others do.
+
+    Attributes
+    ----------
+    end : float
+        The time.
+    floor : ndarray, shape (m,)
+        At each of the samples, how far the accurate settings have differed up to there.
+    known : int
+        The samples on which settings are judged: those where the floor is below the goal, or all.
+    horizon : float
+        The time of the last sample whose floor is below the goal.
+    """
+
+    def __init__(self, problem: Problem, end: float, goal: float):
+        self.problem, self.end = problem, end
+        self.times = np.linspace(problem.t0, end, SAMPLES + 1)[1:]
+        made = [self._states(method) for method in ACCURATE]
+        there = [self._positions(one[0]) for one in made if one is not None]
+        if not there:
+            raise InputError(f"HBVM() does not reach t={end!r}; integrate to there and see its status.")
+        self._truth, self._size = there[0], float(np.abs(there[0]).max()) or 1.0
+        apart = [self._distance(one, other) for one, other in combinations(there, 2)]
+        self.floor = np.maximum(np.max(apart, axis=0), FLOOR) if apart else np.full(SAMPLES, np.inf)
+        within = int(np.count_nonzero(self.floor <= goal))
+        self.known = within or SAMPLES
+        self.horizon = float(self.times[within - 1]) if within else problem.t0
+        self.whole = abs((problem.t_end - problem.t0) / (end - problem.t0))
+
     def run(self, method: MethodBase) -> _Trial | None:
-        """Return what a method does on the piece; ``None`` where it does not get through."""
-        reached = self._states(method, self.problem.y0)
+        """Return what a method does; ``None`` where it does not get through."""
+        reached = self._states(method)
         if reached is None:
             return None
         y, steps = reached
-        position, half = self._distance(y)
-        grown = position / half if half > 0.0 else 2.0
+        error = np.maximum(self._distance(self._positions(y), self._truth), self.floor)
         errors = self.problem.errors(y, self.times).get("energy")
-        energy = None if errors is None else float(np.abs(errors).max())
-        return _Trial(method, max(position, self.floor), grown, energy, steps)
+        return _Trial(
+            method,
+            position=float(error[self.known - 1]),
+            last=float(error[-1]),
+            grown=float(error[-1] / error[SAMPLES // 2 - 1]),
+            energy=None if errors is None else float(np.abs(errors).max()),
+            steps=steps,
+        )
 
     def carried(self, trial: _Trial) -> float:
-        """Return by what the piece's error is multiplied on the way to the end."""
-        if self.chaotic:
+        """Return by what an error is multiplied on the way from here to the problem's end."""
+        if self.whole == 1.0:
             return 1.0
-        least = 1.5 if trial.position < NEAR * self.floor else 1.0  # a walk of the energy is integrated
+        least = 1.5 if trial.last < NEAR * FLOOR else 1.0  # a walk of the energy is integrated
         return float(self.whole ** np.clip(np.log2(max(trial.grown, 1.0)), least, 2.0))
 
     def expected(self, trial: _Trial) -> float:
-        """Return the error of the position expected at the end; of the piece, for chaotic motion."""
-        return trial.position * self.carried(trial)
+        """Return the error of the position by which a setting is judged: at the end, or at the horizon."""
+        return trial.position * (self.carried(trial) if self.known == SAMPLES else 1.0)
 
-    def proposal(self, trial: _Trial) -> Proposal:
-        """Take the time of a trial and carry all to the end."""
-        program = trial.method.compile(self.problem.system)
-        times = []
+    def proposal(self, trial: _Trial, piece: "_Part") -> Proposal:
+        """Take the time of a trial, on a piece."""
+        times, steps = [], 1
         for _ in range(ROUNDS):
-            stepper = program.start(self.problem.y0, self.problem.par, self.problem.t0)
+            stepper = _started(self.problem, trial.method)
             before = perf_counter()
-            stepper.advance(np.array([self.timed]))
+            stepper.advance(np.array([piece.end]))
             times.append(perf_counter() - before)
-        start = self.problem.t0
+            steps = max(1, stepper.stats.steps)
         return Proposal(
             method=trial.method,
-            position=self.expected(trial),
+            position=trial.last * self.carried(trial),
             energy=trial.energy,
-            seconds=min(times) * abs((self.problem.t_end - start) / (self.timed - start)),
+            seconds=min(times) * trial.steps * self.whole / steps,
             steps=math.ceil(trial.steps * self.whole),
         )
 
-    def _states(self, method: MethodBase, y0: Array) -> tuple[Array, int] | None:
-        stepper = method.compile(self.problem.system).start(y0, self.problem.par, self.problem.t0)
+    def _states(self, method: MethodBase) -> tuple[Array, int] | None:
+        stepper = _started(self.problem, method)
         samples = stepper.advance(self.times)
         if samples.status is not Status.FINISHED or not np.isfinite(samples.y).all():
             return None
@@ -276,44 +307,63 @@ class _Piece:
     def _positions(self, y: Array) -> Array:
         return y[:, : y.shape[1] // 2] if _has_energy(self.problem) else y
 
-    def _distance(self, y: Array) -> tuple[float, float]:
-        """Return the largest error of the positions over the piece, and over its first half."""
-        error = np.abs(self._positions(y) - self._truth).max(axis=1) / self._size
-        return float(error.max()), float(error[: len(error) // 2].max())
+    def _distance(self, one: Array, other: Array) -> Array:
+        """Return the largest distance up to each sample, relative to the largest component there is."""
+        return np.maximum.accumulate(np.abs(one - other).max(axis=1) / self._size)
+
+
+def _started(problem: Problem, method: MethodBase) -> Any:
+    """Return a stepper at the start that takes the steps that `integrate` takes to the problem's end."""
+    program, _ = prepared(method, problem.system)
+    stepper: Any = program.start(problem.y0, problem.par, problem.t0)
+    if offers(stepper, Destination):
+        stepper.destination = problem.t_end
+    return stepper
 
 
 def _has_energy(problem: Problem) -> bool:
     return problem.system.kind != "poisson" and problem.system.energy is not None
 
 
-def _candidates(piece: _Piece, goal: float) -> Iterator[_Trial]:
+def _candidates(scout: _Scout, span: _Part, piece: _Part, goal: float) -> Iterator[_Trial]:
     """Yield of each method its longest steps that meet the goal, or else its most accurate setting."""
+    carried = 1.0
     for tol in TOLERANCES:  # the loosest first
-        trial = piece.run(HBVM(tol=tol))
-        if trial is not None and (piece.expected(trial) <= goal or tol == TOLERANCES[-1]):
+        trial = span.run(HBVM(tol=tol))
+        if trial is not None and (span.expected(trial) <= goal or tol == TOLERANCES[-1]):
+            beginning = piece.run(trial.method)
+            carried = max(1.0, trial.position / beginning.position) if beginning else 1.0
             yield trial
             break
-    if piece.varying:
+    if scout.varying or goal < span.floor[span.known - 1]:
         return
+    typical = float(np.median(scout.lengths))
     for k, s in FIXED:
-        if k == s or _has_energy(piece.problem):
-            trial = _fixed(piece, goal, k, s)
-            if trial is not None:
-                yield trial
+        if k == s or _has_energy(span.problem):
+            h = typical * s / LONGEST_S
+            first = _longest(piece, goal / carried, k, s, h, typical * SHORTEST, SEARCH)
+            if first is not None and span.end != piece.end:
+                h = float(first.method.options()["h"])
+                first = _longest(span, goal, k, s, h, typical * SHORTEST, REPEATS)
+            if first is not None:
+                yield first
 
 
-def _fixed(piece: _Piece, goal: float, k: int, s: int) -> _Trial | None:
+def _longest(
+    part: _Part, goal: float, k: int, s: int, h: float, shortest: float, attempts: int
+) -> _Trial | None:
     """Seek the longest step of HBVM(k, s) that meets the goal, by its order."""
-    h = float(np.median(piece.lengths)) * s / LONGEST_S
     best: _Trial | None = None
-    for _ in range(SEARCH):
+    for _ in range(attempts):
         h = float(f"{h:.3g}")
-        trial = piece.run(Gauss(s=s, h=h) if k == s else HBVM(k=k, s=s, h=h))
+        if h < shortest:
+            break
+        trial = part.run(Gauss(s=s, h=h) if k == s else HBVM(k=k, s=s, h=h))
         if trial is None:
             h *= 0.5
             continue
-        ratio = goal / piece.expected(trial)
-        meets = best is not None and piece.expected(best) <= goal
+        ratio = goal / part.expected(trial)
+        meets = best is not None and part.expected(best) <= goal
         if best is None or (trial.steps < best.steps if meets and ratio >= 1.0 else not meets):
             best = trial
         if 1.0 <= ratio < 4.0:
@@ -322,21 +372,23 @@ def _fixed(piece: _Piece, goal: float, k: int, s: int) -> _Trial | None:
     return best
 
 
-def _why(piece: _Piece, proposals: tuple[Proposal, ...], reached: bool, accuracy: float) -> str:
+def _why(scout: _Scout, span: _Part, proposals: tuple[Proposal, ...], met: bool, accuracy: float) -> str:
     """Return the reasons, with how far they were looked for."""
-    first = proposals[0]
-    end = piece.end if piece.chaotic else piece.problem.t_end
+    first, end = proposals[0], span.problem.t_end
     words = [f"expected to be off by {first.position:.1g} at t={end:g}, and to take {first.seconds:.2g} s"]
-    if not reached:
+    if not met:
         far = "out of reach" if first.position > accuracy else "hardly to be relied on"
         words[0] += f", the best that was found: {accuracy:g} is {far} in double precision."
-    elif len(proposals) > 1:
-        words[0] += f", the fastest of {len(proposals)} settings that meet {accuracy:g}."
     else:
-        words[0] += f", the only setting that meets {accuracy:g}."
-    if end != piece.end:
+        where = "" if span.horizon == end else f" up to t={span.horizon:g}"
+        others = f"fastest of {len(proposals)} settings that meet"
+        words[0] += (
+            f", the {others if len(proposals) > 1 else 'only setting that meets'} {accuracy:g}{where}."
+        )
+    if span.end != end:
         words.append(
-            f"Settings were tried up to t={piece.end:g}, {100.0 / piece.whole:.2g} % of the span; what comes "
+            f"{scout.reason or 'That takes long.'} Settings were tried up to t={span.end:g}, "
+            f"{100.0 / span.whole:.2g} % of the span; what comes "
             "later is extrapolated, and wrong where the motion becomes chaotic or an encounter comes."
         )
     keeping = next((one for one in proposals if (one.energy or 0.0) <= KEPT), None)
@@ -345,13 +397,13 @@ def _why(piece: _Piece, proposals: tuple[Proposal, ...], reached: bool, accuracy
             f"Its energy is off by {first.energy:.1g}; {keeping.method!r} keeps it to {keeping.energy:.1g} "
             f"in {keeping.seconds / first.seconds:.2g} times the time."
         )
-    if piece.chaotic:
+    if met and span.horizon != span.end:
         words.append(
-            f"Neighbouring trajectories part exponentially: positions were compared up to t={piece.end:g}, "
-            "beyond which no method keeps them for long; what can be kept is the energy."
+            "Neighbouring trajectories diverge: settings that are accurate to rounding differ by more than "
+            f"{SAFETY * accuracy:.1g} after t={span.horizon:g}, by {span.floor[-1]:.1g} at t={span.end:g}."
         )
-    elif piece.varying:
+    elif scout.varying:
         words.append(
-            f"Own steps vary by {np.ptp(np.log10(piece.lengths)):.1f} decades, so fixed steps were not tried."
+            f"Own steps vary by {np.ptp(np.log10(scout.lengths)):.1f} decades, so fixed steps were not tried."
         )
     return " ".join(words)
