@@ -89,6 +89,8 @@ class Solution:
         Times, states and directions of the events that were asked for, by name.
     variations : ndarray, shape (n, dim, m), or None
         Tangent vectors at these times, where they were asked for: columns in the order of what was asked.
+    directions : tuple of ndarray, or None
+        Their parts in the state at the start, (dim, m), and in the parameters, (n_par, m).
     error : Exception or None
         What a function of the user raised, where ``status`` is ``USER_ERROR``.
 
@@ -114,6 +116,7 @@ class Solution:
     events: Mapping[str, Occurrences] = field(default_factory=dict)
     error: Exception | None = None
     variations: Array | None = None
+    directions: tuple[Array, Array] | None = None
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times that the trajectory covers.
@@ -138,10 +141,48 @@ class Solution:
         problems.errors.InputError
             For times outside, or at which the method does not arrive from the sample before.
         """
-        times = as_numbers("t", t)
+        return self._at(t)[..., : self.problem.system.dim]
+
+    def variations_at(self, t: ArrayLike) -> Array:
+        """Return the variations at any times that the trajectory covers, as a call returns the states.
+
+        Parameters
+        ----------
+        t : array_like
+            Times of any shape and order, between the problem's ``t0`` and the last one reached.
+
+        Returns
+        -------
+        ndarray, shape (..., dim, n)
+
+        Raises
+        ------
+        problems.errors.InputError
+            As for states; and for a solution without variations.
+
+        Examples
+        --------
+        >>> import problems
+        >>> from integrators import Gauss, integrate
+        >>> solution = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), 2.0, variations="y0")
+        >>> solution.variations_at(1.2345).shape
+        (2, 2)
+        """
+        if self.directions is None:
+            raise InputError("the solution has no variations; give integrate(..., variations=).")
+        rows = self._at(t)[..., self.problem.system.dim :]
+        return rows.reshape(*rows.shape[:-1], *self.directions[0].shape)
+
+    def _at(self, t: ArrayLike) -> Array:
+        """Return the states at times and, where there are any, the variations; shape (..., dim (1 + n))."""
+        times, dim = as_numbers("t", t), self.problem.system.dim
         before = self.t.size == 0 or self.t[0] != self.problem.t0
         at = np.concatenate([[self.problem.t0][: int(before)], self.t])
         states = np.concatenate([self.problem.y0[np.newaxis][: int(before)], self.y])
+        if self.directions is not None and self.variations is not None:
+            first = self.directions[0][np.newaxis][: int(before)]
+            vectors = np.concatenate([first, self.variations])
+            states = np.concatenate([states, vectors.reshape(len(vectors), -1)], axis=1)
         end = float(at[-1])
         if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
             end = self.t_stop  # a terminal event, after the last sample
@@ -153,11 +194,11 @@ class Solution:
             raise InputError(
                 f"t={wrong!r} is not between t = {float(at[0])!r} and {end!r}, which the solution covers."
             )
-        found = np.empty((wanted.size, self.problem.system.dim))
+        found = np.empty((wanted.size, states.shape[1]))
         sample = np.searchsorted(sign * at, wanted, side="right") - 1
-        close = max(ROUNDING, self.method.options(defaults=True).get("tol") or 0.0) * np.abs(states).max(
-            axis=0
-        )
+        close = max(ROUNDING, self.method.options(defaults=True).get("tol") or 0.0) * np.abs(
+            states[:, :dim]
+        ).max(axis=0)
         intervals, first, count = np.unique(sample), 0, 1
         while first < intervals.size:
             group = intervals[first : first + count]
@@ -170,18 +211,23 @@ class Solution:
             reached = states[:0]
             if goals.size:
                 start = float(at[group[0]])
-                advanced = self._program.start(states[group[0]], self.problem.par, start).advance(
-                    sign * goals
-                )
+                stepper: Any = self._program.start(states[group[0], :dim], self.problem.par, start)
+                if self.directions is not None:
+                    stepper.follow(states[group[0], dim:].reshape(dim, -1), self.directions[1])
+                advanced = stepper.advance(sign * goals)
                 if advanced.status.failed and group.size > 1:
                     count = 1
                     continue
                 if advanced.status.failed:
                     raise InputError(f"{self.method!r} does not go on from t = {start!r}: {advanced.reason}")
                 reached = advanced.y
+                if self.directions is not None:
+                    reached = np.concatenate([reached, stepper.variations.reshape(len(reached), -1)], axis=1)
             goals, reached = np.append(ends[0], goals), np.concatenate([states[group[:1]], reached])
             # As long as the samples are met the method goes on from where it is, else from them.
-            met = (np.abs(reached[np.searchsorted(goals, ends)] - states[group]) <= close).all(axis=1)
+            met = (np.abs((reached[np.searchsorted(goals, ends)] - states[group])[:, :dim]) <= close).all(
+                axis=1
+            )
             done = group.size if met.all() else int(np.argmin(met))
             mine = mine[sample[mine] <= group[done - 1]]
             found[mine] = reached[np.searchsorted(goals, wanted[mine])]
@@ -341,6 +387,8 @@ class Solution:
         arrays: dict[str, NDArray[Any]] = {"t": self.t, "y": self.y}
         if self.variations is not None:
             arrays["variations"] = self.variations
+        if self.directions is not None:
+            arrays["directions_state"], arrays["directions_parameters"] = self.directions
         for name, found in self.events.items():
             arrays |= {f"event_{key}:{name}": value for key, value in vars(found).items()}
         words = {
@@ -413,6 +461,7 @@ def load(path: File, problem: Problem | None = None) -> Solution:
             method=unpacked_method(words["method"], arrays),
             events={name: _occurrences(name, arrays, dim) for name in words["events"]},
             variations=_variations(arrays, n, dim),
+            directions=_directions(arrays, dim, found.par.size),
             error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
             reason=_of(str, words["reason"]),
             t_stop=_of(float, words["t_stop"]),
@@ -468,6 +517,14 @@ def _occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occ
 def _variations(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> Array | None:
     vectors = arrays.get("variations")
     return None if vectors is None else doubles(vectors, (n, dim, vectors.shape[-1]), "variations")
+
+
+def _directions(arrays: Mapping[str, NDArray[Any]], dim: int, n_par: int) -> tuple[Array, Array] | None:
+    state, parameters = arrays.get("directions_state"), arrays.get("directions_parameters")
+    if state is None or parameters is None:
+        return None
+    n = state.shape[-1]
+    return doubles(state, (dim, n), "directions"), doubles(parameters, (n_par, n), "directions")
 
 
 def write_whole(path: Path, write: Any) -> None:

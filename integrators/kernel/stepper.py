@@ -89,6 +89,7 @@ class Checkpoint:
     taken: int  # steps since the trajectory's start
     status: Status
     reason: str
+    vectors: tuple[Any, ...] | None = None  # what `Vectors.save` returned
 
 
 class HBVMStepper(ABC):
@@ -389,6 +390,7 @@ class HBVMStepper(ABC):
             self._taken,
             self._status,
             self._reason,
+            None if self._vectors is None else self._vectors.save(),
         )
 
     @one_thread
@@ -399,9 +401,14 @@ class HBVMStepper(ABC):
         ------
         problems.errors.InputError
             If the checkpoint is that of another method, of other options, another system or
-            other parameters; the stepper stays where it is.
+            other parameters, or of a trajectory that other tangent vectors followed or none; the stepper
+            stays where it is.
         """
         self._identity.check(checkpoint, Checkpoint)
+        if self._vectors is not None and not self._vectors.fit(checkpoint.vectors):
+            raise InputError(
+                "this checkpoint has no tangent vectors, or others; restore it before any follow."
+            )
         arrays = [getattr(self._context, name) for name in self._kept]
         sizes = len(self._places), [array.shape for array in arrays]
         if (checkpoint.words.size, [array.shape for array in checkpoint.arrays]) != sizes:
@@ -415,6 +422,8 @@ class HBVMStepper(ABC):
             array[:] = kept
         if checkpoint.implicit is not None:
             self._make_implicit()[0].restore(checkpoint.implicit)
+        if self._vectors is not None and checkpoint.vectors is not None:
+            self._vectors.restore(checkpoint.vectors)
         self._uncounted = self._context.steps - checkpoint.taken
         self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
 

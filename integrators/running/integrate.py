@@ -92,7 +92,7 @@ def integrate(
         vectors), ``"t0"`` (one), names of parameters (one for each number; the start stays where it is).
         ``solution.variations`` has them at the samples. They are the exact derivatives of the steps that
         are taken, with the steps' lengths held fixed; ``"t0"`` begins with minus the field at the start.
-        For HBVM and Gauss, problems with a formula, and without checkpoints.
+        `Solution.variations_at` has them at any time. For HBVM and Gauss, and problems with a formula.
     progress : bool or callable, optional
         True: a bar on the terminal, if there is one. A function: it is called about ten times a second
         with an `integrators.Progress`.
@@ -146,7 +146,7 @@ def integrate(
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
-        belongs = identity(problem, method, grid, sample, wanted)
+        belongs = identity(problem, method, grid, sample, wanted, variations)
         path = None if checkpoint is None else Path(checkpoint)
         earlier = None if resume is None else Path(resume)
         if earlier is not None and (earlier != path or earlier.exists()):
@@ -159,11 +159,10 @@ def integrate(
     if grid.size and offers(stepper, Destination):
         stepper.destination = end
     vectors: list[Array] | None = None
+    directions: tuple[Array, Array] | None = None
     if variations is not None:
-        if checkpoint is not None or resume is not None:
-            raise InputError("variations are in no checkpoint; leave out checkpoint= and resume=.")
-        count = follow(stepper, method, problem, variations, sample)
-        vectors = [np.empty((0, problem.system.dim, count))]
+        directions = follow(stepper, method, problem, variations, sample)
+        vectors = [np.empty((0, *directions[0].shape))]
     t, y, made = [grid[:0]], [np.empty((0, problem.system.dim))], 0
     lost: Losses = {}
     here, status, reason, before = problem.t0, Status.FINISHED, "", None
@@ -171,6 +170,7 @@ def integrate(
         stepper.restore(kept["stepper"])
         t, y, made = [kept["t"]], [kept["y"]], kept["made"]
         here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
+        vectors = None if vectors is None else [kept["variations"]]
         lost = kept.get("losses", lost)
         if wanted:
             stepper.search.load(kept["search"])
@@ -200,10 +200,12 @@ def integrate(
                     lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
                     t, y = [np.concatenate(t)], [np.concatenate(y)]
+                    vectors = None if vectors is None else [np.concatenate(vectors)]
                     watch.keep(
                         {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": made, "here": here}
                         | {"status": status, "reason": reason, "stats": stats, "losses": lost}
                         | ({"search": stepper.search.save()} if wanted else {})
+                        | ({} if vectors is None else {"variations": vectors[0]})
                     )
                 watch.look(here, stats.steps)
         if wanted and grid.size and status is Status.FINISHED:
@@ -230,6 +232,7 @@ def integrate(
         t=reached,
         y=np.concatenate(y),
         variations=None if vectors is None else np.concatenate(vectors),
+        directions=directions,
         status=status,
         reason=reason,
         t_stop=float(reached[-1]) if status is Status.FINISHED and reached.size else here,

@@ -70,8 +70,10 @@ def _places(problem: Problem) -> dict[str, slice]:
     return places
 
 
-def follow(stepper: Any, method: MethodBase, problem: Problem, wanted: Any, sample: str | None) -> int:
-    """Let the vectors that are wanted follow a trajectory at its start; return their number.
+def follow(
+    stepper: Any, method: MethodBase, problem: Problem, wanted: Any, sample: str | None
+) -> tuple[Array, Array]:
+    """Let the vectors that are wanted follow a trajectory at its start; return them, as `directions` does.
 
     Raises
     ------
@@ -86,4 +88,4 @@ def follow(stepper: Any, method: MethodBase, problem: Problem, wanted: Any, samp
         raise InputError("variations are those of solved steps, which sample='dense' is not; use 'side'.")
     state, parameters = directions(problem, wanted)
     stepper.follow(state, parameters)
-    return state.shape[1]
+    return state, parameters

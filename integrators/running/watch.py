@@ -135,7 +135,12 @@ class Watch:
 
 
 def identity(
-    problem: Problem, method: MethodBase, times: Array, sample: str | None, events: Mapping[str, Any]
+    problem: Problem,
+    method: MethodBase,
+    times: Array,
+    sample: str | None,
+    events: Mapping[str, Any],
+    variations: Any = None,
 ) -> dict[str, str]:
     """Return what a checkpoint belongs to, by name, as texts."""
     start = np.concatenate([[problem.t0], problem.y0])
@@ -151,7 +156,13 @@ def identity(
             f"{name} {code_digest(event.g, event.direction, str(event.last))}"
             for name, event in events.items()
         ),
-    }
+    } | ({} if variations is None else {"variations": _digest(variations)})
+
+
+def _digest(variations: Any) -> str:
+    """Return a text that tells tangent vectors, or names, from others."""
+    array = np.asarray(variations)
+    return f"{array.shape}, {hashlib.sha256(array.tobytes()).hexdigest()}"
 
 
 def read(path: str | os.PathLike[str], wanted: Mapping[str, str]) -> dict[str, Any]:

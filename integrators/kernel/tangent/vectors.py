@@ -1,6 +1,7 @@
 """Tangent vectors of one trajectory, as Python sees them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,7 @@ class Vectors:
         most = max(1, min(MOST, OPERATIONS // operations))
         parts = np.array_split(np.arange(count), -(-count // most))
         self._pairs, pulls = [], []
+        self._solver: Workspace | None = None  # of the trajectory
         self.solvers: list[Workspace] = []
         """The implicit solvers of the vectors, where there are any."""
         for part in parts:
@@ -124,6 +126,7 @@ class Vectors:
 
     def solve_by(self, solvers: tuple[Workspace, Workspace]) -> None:
         """Give the vectors the implicit solver of the trajectory and that of its partial steps."""
+        self._solver = solvers[0]
         for pair, pulls in zip(self._pairs, self._memory.pulls.tolist(), strict=True):
             for context, solver in zip(pair, solvers, strict=True):
                 workspace = solver.along(context.shape, context.padded, pulls)
@@ -165,6 +168,40 @@ class Vectors:
             own.age = 0
             first += n
 
+    @property
+    def _step_ahead(self) -> list[Array]:
+        """What the vectors need of the trajectory's step ahead, which may be solved."""
+        return [self._context.stages, *([self._solver.gamma] if self._solver else [])]
+
+    def save(self) -> tuple[Any, ...]:
+        """Return copies of all that the continuation depends on."""
+        groups = tuple(
+            (own.words[_LASTING], tuple(getattr(own, name).copy() for name in _ARRAYS))
+            for own, _ in self._pairs
+        )
+        solvers = tuple(solver.save() for solver in self.solvers)
+        ahead = [array.copy() for array in self._step_ahead]
+        return self.shape, self._parameters.copy(), ahead, groups, solvers
+
+    def fit(self, saved: tuple[Any, ...] | None) -> bool:
+        """Whether that was saved of vectors that differ from these in their parts in the state at most."""
+        if saved is None or saved[0] != self.shape or not np.array_equal(saved[1], self._parameters):
+            return False
+        return saved[2][0].shape == self._context.stages.shape
+
+    def restore(self, saved: tuple[Any, ...]) -> None:
+        """Go back to what `save` returned."""
+        _, _, ahead, groups, solvers = saved
+        for array, kept in zip(self._step_ahead, ahead, strict=False):
+            array[:] = kept
+        for (own, _), (words, arrays) in zip(self._pairs, groups, strict=True):
+            own.words[_LASTING] = words
+            own.set_factors(own.h)
+            for name, kept in zip(_ARRAYS, arrays, strict=True):
+                getattr(own, name)[:] = kept
+        for solver, kept in zip(self.solvers, solvers, strict=bool(solvers)):
+            solver.restore(kept)
+
     def note(self, times: Array) -> None:
         """Keep the vectors of the samples that have been made, by their times."""
         for i, t in enumerate(times.tolist()):
@@ -183,6 +220,14 @@ class Vectors:
         """Return the vectors at samples, shape (m, dim, n); forget them, and those between."""
         known, self._known = self._known, {}
         return np.array([known[t] for t in times.tolist()]).reshape(-1, *self.shape)
+
+
+# What goes from step to step.
+_LASTING = [
+    Context.slots[name].place
+    for name in ("h", "t0", "time_low", "n", "length", "older_length", "age", "free", "rate")
+]
+_ARRAYS = "state", "error", "values", "older_values", "strict", "floored"
 
 
 def _laid_out(vectors: Array, rows: int) -> Array:

@@ -241,7 +241,58 @@ def test_single_steps_take_them_along(method):
 def test_a_solution_keeps_them_in_its_file(tmp_path):
     made = integrate(problems.load("pendulum"), Gauss(s=4, h=0.1), [0.0, 1.0], variations="y0")
     made.save(tmp_path / "solution.npz")
-    assert np.array_equal(load(tmp_path / "solution.npz").variations, made.variations)
+    found = load(tmp_path / "solution.npz")
+    assert np.array_equal(found.variations, made.variations)
+    assert np.array_equal(found.variations_at([0.5, 1.0]), made.variations_at([0.5, 1.0]))
+
+
+@pytest.mark.parametrize("method", [Gauss(s=6, h=0.1), HBVM(tol=1e-13), Gauss(s=4, h=0.1, solver="newton")])
+def test_a_solution_has_them_at_any_time(method):
+    problem = SYSTEMS["masses"]()
+    wanted, times = ["y0", "k"], np.array([[0.05, 3.07], [10.0, 4.0]])
+    made = integrate(problem, method, [4.0, 8.0, 10.0], variations=wanted)
+    exact = integrate(problem, Gauss(s=8, h=0.025), np.unique(times), variations=wanted).variations
+    found = made.variations_at(times)
+    assert found.shape == (2, 2, 4, 5)
+    assert np.array_equal(found[1, 0], made.variations[2])
+    error = np.abs(found.reshape(4, 4, 5) - exact[[0, 1, 3, 2]]).max() / np.abs(exact).max()
+    assert error < 1e-10
+    with pytest.raises(InputError, match="no variations"):
+        integrate(problem, method, [1.0]).variations_at(0.5)
+
+
+@pytest.mark.parametrize(
+    "method", [Gauss(s=4, h=0.1), Gauss(s=4, h=0.1, solver="newton"), Gauss(s=4, tol=1e-8)], ids=repr
+)
+def test_a_run_that_was_broken_off_goes_on_with_them(method, tmp_path):
+    """The bits of an unbroken run; the break is after a step that is solved ahead."""
+    problem, times = SYSTEMS["masses"](), np.linspace(0.0, 10.0, 38)
+    wanted, file = ["y0", "k", "m"], tmp_path / "file"
+    whole = integrate(problem, method, times, variations=wanted)
+
+    def stop(progress):
+        if progress.t > 4.0:
+            raise KeyboardInterrupt
+
+    broken = integrate(
+        problem, method, times, variations=wanted, checkpoint=file, every_seconds=0, progress=stop
+    )
+    assert broken.status is Status.INTERRUPTED
+    assert 0 < broken.t.size < times.size
+    resumed = integrate(problem, method, times, variations=wanted, resume=file)
+    assert np.array_equal(resumed.y, whole.y)
+    assert np.array_equal(resumed.variations, whole.variations)
+    with pytest.raises(InputError, match="variations"):
+        integrate(problem, method, times, variations="y0", resume=file)
+
+
+def test_a_checkpoint_without_them_is_refused():
+    problem = problems.load("pendulum")
+    stepper = Gauss(s=4, h=0.1).compile(problem.system).start(problem.y0, problem.par)
+    before = stepper.checkpoint()
+    stepper.follow(np.eye(2), np.zeros((0, 2)))
+    with pytest.raises(InputError, match="no tangent vectors"):
+        stepper.restore(before)
 
 
 @pytest.mark.parametrize(
@@ -251,7 +302,6 @@ def test_a_solution_keeps_them_in_its_file(tmp_path):
         ({"variations": np.eye(3)}, "vectors of 2 components"),
         ({"variations": [[np.nan], [0.0]]}, "finite"),
         ({"variations": "y0", "sample": "dense"}, "sample='dense'"),
-        ({"variations": "y0", "checkpoint": "file"}, "no checkpoint"),
     ],
 )
 def test_what_cannot_be_is_said(keywords, words):
