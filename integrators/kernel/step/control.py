@@ -8,6 +8,9 @@ from integrators.kernel.simd.operations import binary_log, greatest, least, wher
 SAFETY, SHRINK = 0.9, 0.2  # of the length from one step to the next
 RECOIL = 0.7  # of what would have met the tolerance, after a step whose error was too large (logarithms)
 TRUST = 0.2  # of a trend to longer steps
+# For a trend, the step before might have been 20 times as long at most (logarithm): estimates below that, in
+# a field near the smallest doubles, vary by any factor.
+FORESEEN = 3.0
 # Part of the way to a longer step, and how much may be missing there: smooth steps are not rejected and start
 # well (logarithms).
 CAUTION, HELD = 0.5, 0.25
@@ -41,7 +44,7 @@ def log_factor(aim, estimate, behind, change):
         Logarithm of this step's length relative to that of the step before.
     """
     factor = aim - estimate
-    trend = change + behind - estimate
+    trend = change + greatest(aim - FORESEEN, behind) - estimate
     trend = where(behind < INFINITY, where(trend < 0.0, trend, TRUST * trend), 0.0)
     return where(factor < 0.0, RECOIL * factor, greatest(CAUTION * factor, factor - HELD) + trend)
 
