@@ -24,20 +24,44 @@ if TYPE_CHECKING:
     from integrators.methods.advice import advise as advise
     from integrators.methods.gauss import Gauss as Gauss
     from integrators.methods.hbvm import HBVM as HBVM
+    from integrators.methods.line_integral import LineIntegral as LineIntegral
+    from integrators.peers.diffrax.methods import Dopri8 as Dopri8
+    from integrators.peers.diffrax.methods import LeapfrogMidpoint as LeapfrogMidpoint
+    from integrators.peers.diffrax.methods import ReversibleHeun as ReversibleHeun
+    from integrators.peers.diffrax.methods import SemiImplicitEuler as SemiImplicitEuler
+    from integrators.peers.heyoka.taylor import Taylor as Taylor
+    from integrators.peers.rebound.fixed import Leapfrog as Leapfrog
+    from integrators.peers.rebound.fixed import WHFast as WHFast
+    from integrators.peers.rebound.ias15 import IAS15 as IAS15
+    from integrators.peers.rebound.whfast512 import WHFast512 as WHFast512
+    from integrators.peers.scipy import DOP853 as DOP853
+    from integrators.peers.scipy import Radau as Radau
     from integrators.running.poincare import section as section
 
 __all__ = [
+    "DOP853",
     "HBVM",
+    "IAS15",
+    "Dopri8",
     "Event",
     "Gauss",
+    "Leapfrog",
+    "LeapfrogMidpoint",
+    "LineIntegral",
     "MethodBase",
     "Progress",
+    "Radau",
+    "ReversibleHeun",
     "Run",
     "Samples",
+    "SemiImplicitEuler",
     "Solution",
     "Solutions",
     "Stats",
     "Status",
+    "Taylor",
+    "WHFast",
+    "WHFast512",
     "advise",
     "integrate",
     "integrate_many",

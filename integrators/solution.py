@@ -68,7 +68,8 @@ class Solution:
     Attributes
     ----------
     t : ndarray, shape (n,)
-        Times reached; all that were asked for if ``status`` is ``FINISHED``.
+        Times reached; all that were asked for if ``status`` is ``FINISHED``. Where a method fails on the way
+        to the first of them, the time that it came to.
     y : ndarray, shape (n, dim)
         States: q then p for Hamiltonian problems.
     status : Status
@@ -298,7 +299,7 @@ class Solution:
         )
 
     def __str__(self) -> str:
-        lines = [repr(self.problem), self._with(), self._cost(), *self._kept()]
+        lines = [str(self.problem), self._with(), self._cost(), *self._kept()]
         if self.events:
             counts = ", ".join(f"{name} {len(found)}" for name, found in self.events.items())
             lines.append(f"events found: {counts}")

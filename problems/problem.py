@@ -1,6 +1,7 @@
 """A problem: a system, a start, parameters and a span of time."""
 
 import copy
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,6 +17,9 @@ from problems.errors import InputError, printable, shown
 from problems.systems.base import System, Value
 
 Array = NDArray[np.float64]
+
+LONGEST = 400  # characters that ``print`` shows
+FEW = 8  # numbers of a list that it shows
 
 
 @dataclass(frozen=True, init=False, repr=False, eq=False)
@@ -153,6 +157,11 @@ class Problem:
         inside = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
         return printable(f"{self.name}({inside})")
 
+    def __str__(self) -> str:
+        """Return what it prints as, with long lists of numbers in short."""
+        text = re.sub(r"\[[^\[\]]*\]", _short, repr(self))
+        return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
+
     def _identity(self) -> tuple[Any, ...]:
         return (
             repr(self),
@@ -215,6 +224,12 @@ class Problem:
         ``t``, shape (n,), is needed where the kinetic energy of a Lagrangian depends on time.
         """
         return invariants.velocity(self.system, self.par, y, t)
+
+
+def _short(numbers: re.Match[str]) -> str:
+    """Return a printed list, of a long one the first three numbers and how many there are."""
+    parts = numbers[0][1:-1].split(", ")
+    return numbers[0] if len(parts) <= FEW else f"[{', '.join(parts[:3])}, ... {len(parts)} in all]"
 
 
 def _start(system: System, par: Array, t0: float, given: Mapping[str, ArrayLike | None]) -> Array:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
+from math import isfinite
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -39,7 +40,8 @@ class Progress:
     steps : int
         Own steps until now.
     seconds, left : float
-        Since it began, or was resumed; and until its end, if it goes on as fast.
+        Since it began, or was resumed; and until its end, if it goes on as fast: infinite as long as
+        nothing is known of that.
 
     Examples
     --------
@@ -56,6 +58,11 @@ class Progress:
     steps: int
     seconds: float
     left: float
+
+    def __str__(self) -> str:
+        """Return one line, such as ``t = 12.5, 25%, 1,024 steps, 3 s, 9 s left``."""
+        left = f"{self.left:.2g} s left" if isfinite(self.left) else "time left unknown"
+        return f"t = {self.t:.6g}, {self.fraction:.0%}, {self.steps:,} steps, {self.seconds:.2g} s, {left}"
 
 
 Report = Callable[[Progress], object]

@@ -2,6 +2,7 @@
 
 import copy
 import os
+import warnings
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -33,6 +34,12 @@ NEAR = 8
 
 STEPS_BEYOND = 256
 """Steps that may be taken in vain beyond a terminal event."""
+
+LINES, SECONDS = 166, 3.0
+"""Lines of the field of six bodies, and what heyoka needs to compile it without loops: as their square."""
+
+PATIENCE = 10.0
+"""Seconds of compiling of which a user is told."""
 
 CITATION = """\
 @article{BiscaniIzzo2021,
@@ -120,6 +127,7 @@ class TaylorProgram(ProgramBase):
         super().__init__(system, method)
         hy = load("heyoka")
         self._options = method.options(defaults=True)
+        _say_if_long(system, method)
         started = perf_counter()
         with _caches(hy) as use:
             before = hy.llvm_state.get_memcache_size(), hy.llvm_state.get_diskcache_size()
@@ -211,6 +219,20 @@ class TaylorProgram(ProgramBase):
         stepper = TaylorStepper(integrator, y, par, t)
         weakref.finalize(stepper, self._spare.append, integrator).atexit = False
         return stepper
+
+
+def _say_if_long(system: System, method: Taylor) -> None:
+    """Warn of a field that takes long to compile without loops."""
+    from problems import emit
+
+    lines = emit.source(system, "field", "heyoka").text.count("\n")
+    seconds = SECONDS * (lines / LINES) ** 2
+    if not method.compact_mode and seconds > PATIENCE:
+        warnings.warn(
+            f"heyoka writes the field of {system.name} out, {lines} lines, and compiles them for about "
+            f"{seconds:.0f} s if it has not done so before; Taylor(compact_mode=True) takes one.",
+            stacklevel=3,
+        )
 
 
 @contextmanager
