@@ -127,6 +127,14 @@ class Context(Memory):
     line = Integer()
     parameters = Integer()
     par = Array("parameters")
+    # address of what writes the gradient of the energy and then the energy itself, called like the field with
+    # eight stages; 0: no projection. See `step.projection`.
+    energy_code = Integer()
+    energy = Real()  # that of the start, which steps end with
+    energy_rows = Integer()  # rows of what it writes: one more than the state has; 0: no projection
+    energy_width = Integer()  # components of a block of the state
+    energy_state = Array("energy_rows", 8)
+    energy_found = Array("energy_rows", 8)
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
     padded = Integer()  # `rows` rounded up to a multiple of 8
     lanes = Integer()  # stages per call of the field: 8 or 16
@@ -217,7 +225,9 @@ class Context(Memory):
     best = Real()  # the smallest change
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
-    tolerance = Real()
+    tolerance = Real()  # the relative change at which the iteration has converged
+    trusted = Real()  # a change from which on steps of varying length iterate without a test,
+    log_trusted = Real()  # and the binary logarithm of one before which they do
     log_rest = Real()  # binary logarithm of what may be left of a change when the step is solved
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
     outcome = Integer()
@@ -330,7 +340,7 @@ class Context(Memory):
             "k": c.k, "s": c.s, "matrix_size": tables["raw_matrix"].size // 8, "groups": groups,
             "first": c.first, "two_steps": int(c.two_steps), "mode_groups": mode_groups, "modes": c.modes,
             "most_groups": max(groups, mode_groups),
-            "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1,
+            "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1, "energy_rows": 0,
         }  # fmt: skip
         super().__init__({**numbers, **(more or {})}, {**tables, "block": shape.block, "group": shape.group})
         self.shape = shape

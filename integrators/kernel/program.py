@@ -11,7 +11,7 @@ from integrators.caveats import sees_kinks
 from integrators.events.event import Event
 from integrators.kernel import tables
 from integrators.kernel.batch import Batch, prepare_batch
-from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks
+from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks, width_of_blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.events.engine import look
 from integrators.kernel.events.functions import EventFunction
@@ -25,7 +25,16 @@ from integrators.kernel.native.foreign import field_of
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.step import fused
 from integrators.kernel.step.engine import steps
-from integrators.kernel.step.rule import LOG_REST, LOG_REST_VARYING, LONGEST, TOLERANCE
+from integrators.kernel.step.rule import (
+    LOG_REST,
+    LOG_REST_VARYING,
+    LONGEST,
+    MOST_TRUSTED,
+    PART_OF_TOLERANCE,
+    TOLERANCE,
+    TRUSTED,
+    UNTESTED,
+)
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
 from integrators.protocol import Array, Compiled
@@ -51,6 +60,9 @@ OF_A_BODY, OF_A_COMPONENT = 1e-6, 1e-4
 A light body is an object of its own; single components next to nodes or turning points
 of a lattice are moved by the others' rounding.
 """
+
+ENERGY_LANES = 8
+"""States at which the energy is evaluated at a time, all of them the same."""
 
 UNSEEN = 1e-12
 """Part of a block's size that the error at a kink of the field may always be."""
@@ -92,6 +104,8 @@ class HBVMProgram(Compiled):
     """Whether `batch` takes threads."""
     for_many: "Callable[[], HBVMProgram] | None" = None
     """What makes the program that takes trajectories in lanes, where that is one of another k and s."""
+    projected = False
+    """Whether steps end on the surface of the start's energy; see `integrators.kernel.step.projection`."""
     _stepper: ClassVar[Callable[..., HBVMStepper]] = FixedStepper
 
     def __init__(
@@ -304,7 +318,8 @@ class HBVMProgram(Compiled):
 
     def _made(self, *, side: bool) -> Context:
         tables = {**self._fixed, **({} if side else self.scaled(self.h))}
-        made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables)
+        more = {"energy_rows": self.system.dim + 1} if self.projected else {}
+        made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
         made.tolerance = TOLERANCE
         made.log_rest = LOG_REST
         return made
@@ -358,6 +373,9 @@ class AdaptiveProgram(HBVMProgram):
         Local error per step that is always allowed, of all components or of each.
     keep : sequence of str, optional
         What to keep by line integrals; see `HBVMProgram`.
+    projected : bool, optional
+        Whether steps are solved to a part of the tolerance and then moved to the energy of the start; see
+        `integrators.kernel.step.projection`.
     """
 
     varying = True
@@ -378,6 +396,7 @@ class AdaptiveProgram(HBVMProgram):
         max_steps: int | None = None,
         keep: Sequence[str] | None = None,
         atol: float | Sequence[float] | None = None,
+        projected: bool = False,
     ):
         super().__init__(system, k=k, s=s, h=1.0 if h is None else h, solver=solver, keep=keep)
         started = binary.clock()
@@ -416,21 +435,32 @@ class AdaptiveProgram(HBVMProgram):
             self._sides = fields.compile_field(system, surfaces, tables.lanes_for(k))
             self._surfaces = len(surfaces.outputs) - 1
             self.from_cache = self.from_cache and self._sides.from_cache
+        self.projected = projected
+        self._energy = self._energy_code() if projected else None
         looks = sees_kinks(k, system) and not self.kept
         self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
 
     @property
     def free(self) -> bool:
-        """Whether nothing but the tolerance limits the steps, whatever the parameters."""
+        """Whether nothing but the tolerance says where steps end, whatever the parameters."""
         return (
-            self.max_step is None
+            not self.projected
+            and self.max_step is None
             and self.max_steps is None
             and self.atol is None
             and not self._given.size
             and not self._switches.any
             and self._sides is None
         )
+
+    def _energy_code(self) -> binary.Native:
+        """Return what writes the gradient of the energy and the energy itself."""
+        energy = self.system.invariants["energy"]
+        what = self.system.together(self.system.gradient(energy), energy)
+        made = fields.compile_field(self.system, what, ENERGY_LANES)
+        self.from_cache = self.from_cache and made.from_cache
+        return made
 
     def _sizes(self, atol: float | Sequence[float] | None) -> Array:
         """Return an absolute tolerance as sizes that ``tol`` is relative to, one for each block."""
@@ -463,10 +493,11 @@ class AdaptiveProgram(HBVMProgram):
     def description(self) -> str:
         """The method with all that steps depend on, as text."""
         c, kept = self.constants, f", {self.kept.description}" if self.kept else ""
+        projected = ", projection='energy'" if self.projected else ""
         return (
             f"HBVM(k={c.k}, s={c.s}, tol={self.tol!r}, defect={self.defect!r}, h={self.first!r}, "
             f"solver={self._named!r}, max_step={self.max_step!r}, breakpoints={self._given.tolist()!r}, "
-            f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept})"
+            f"max_steps={self.max_steps!r}, atol={self.atol!r}{kept}{projected})"
         )
 
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
@@ -477,9 +508,16 @@ class AdaptiveProgram(HBVMProgram):
 
     def _made(self, *, side: bool) -> Context:
         context = super()._made(side=True)  # with a matrix of its own
+        context.log_rest = LOG_REST_VARYING
+        if self._energy:
+            context.energy_code = self._energy.address
+            context.energy_width = width_of_blocks(self.system)
+            context.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
+            context.log_rest = max(math.log2(context.tolerance), LOG_REST_VARYING)
+        context.trusted = min(TRUSTED * context.tolerance, MOST_TRUSTED)
+        context.log_trusted = math.log2(UNTESTED * context.tolerance)
         context.point({"estimators": self._estimators, "extrapolation": self._onward})
         context.varying = 1
-        context.log_rest = LOG_REST_VARYING
         context.error_degree = self.degree
         context.allowed_error = self.tol
         bodies = getattr(self.system, "bodies", None) is not None

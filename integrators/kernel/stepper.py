@@ -71,6 +71,7 @@ class Program(Protocol):
     def lanes(self) -> bool: ...
 
     kept: Kept | None
+    projected: bool
 
     def contexts(self) -> tuple[Context, Context]: ...
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None: ...
@@ -120,7 +121,7 @@ class HBVMStepper(ABC):
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
         "length_limit", "kinks", "kink_end", "doubt_end",
         "border", "border_ahead", "behind_time", "behind_low",
-        "interval", "restful", "blind", "rescaled", "borrowed", "asks",
+        "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",
@@ -165,10 +166,12 @@ class HBVMStepper(ABC):
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
         """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
         system, program = self._program.system, self._program
-        if not system.traced or program.kept:
-            need = (
-                "a Runge-Kutta method: line integrals are none; use Gauss" if system.traced else "a formula"
-            )
+        if not system.traced or program.kept or program.projected:
+            need = "a Runge-Kutta method: line integrals are none; use Gauss"
+            if not system.traced:
+                need = "a formula"
+            elif program.projected:
+                need = "steps without a projection, which they do not follow; leave out projection='energy'"
             raise InputError(f"variations of {system.name} need {need}.")
         started = binary.clock()
         directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))

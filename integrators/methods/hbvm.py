@@ -8,6 +8,7 @@ from integrators.options import Absolute, Count, Landings, Stages, Step, Toleran
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
+from problems.trace.graph import T
 
 CITATION = """\
 @book{BrugnanoIavernaro2016,
@@ -22,6 +23,7 @@ TOLERANCE = 3e-16
 """The tolerance of a method that is given neither a step nor a tolerance."""
 
 Solver = Literal["auto", "fixed_point", "newton", "blended"]
+Projection = Literal["energy"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -130,6 +132,20 @@ class HBVM(MethodBase):
         not become good enough by cutting it, as from rest, errors may there be relative to the
         largest size that a block will reach in the interval, divided by how much errors grow on the way;
         coarse further trajectories tell it.
+    projection : {"energy"}, optional
+        With ``tol`` and k > s: the stage equations are solved to a hundredth of the tolerance only, and the end
+        of each step is then moved to the energy H_0 of the start. With the gradient g of the energy H and the
+        sizes s_i of the blocks,
+
+            y_i <- y_i - s_i^2 g_i (H(y) - H_0) / sum_j (s_j g_j)^2,
+
+        repeated until the rest is rounding. This is for loose tolerances: a run takes about half the time,
+        since without it the energy needs equations solved to rounding and a quadrature whose error is
+        at rounding. The method is then a projection: the energy is put right, not conserved by the equations,
+        and says nothing about the trajectory, whose error follows the tolerance; the step is not symmetric,
+        and other invariants are kept only as far as the tolerance. Systems whose energy is a formula without
+        the time; no Poisson systems, no ``variations``. Trajectories of an ensemble go one by one, not in lanes.
+        States by ``sample="dense"`` are not projected. Left out: no projection (`test_projection`).
 
     Raises
     ------
@@ -165,6 +181,7 @@ class HBVM(MethodBase):
     breakpoints: Landings = ()
     max_steps: Count | None = None
     atol: Absolute | None = None
+    projection: Projection | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -181,13 +198,19 @@ class HBVM(MethodBase):
             raise InputError(
                 f"HBVM needs k and s with a fixed step, h={self.h!r}; or give tol, and they are chosen."
             )
-        if self.tol is None and (given := self.control()):
+        given = [*self.control(), *(["projection"] if self.projection else [])]
+        if self.tol is None and given:
             raise InputError(
                 f"HBVM takes {', '.join(given)} with a tolerance only, not with h={self.h!r} alone; give tol "
                 "too, or leave that out."
             )
         if self.k is not None and self.s is not None and self.k < self.s:
             raise InputError(f"HBVM needs k >= s; k={self.k} is less than s={self.s}: raise k or lower s.")
+        if self.projection and self.k is not None and self.k == self.s:
+            raise InputError(
+                f"projection={self.projection!r} needs k > s; k = s = {self.k} is the Gauss method, whose "
+                "quadratic invariants need equations solved to rounding: raise k, or leave it out."
+            )
         if self.k == 1 and self.tol is not None:
             raise InputError(
                 "HBVM needs k > 1 with a tolerance: one stage tells nothing about its error; give h instead."
@@ -199,7 +222,7 @@ class HBVM(MethodBase):
         return None if self.s is None else 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system; Poisson systems with fixed-point iteration only."""
+        """Accept every system: Poisson ones with fixed-point iteration, with a projection those with an energy."""
         return self._refusal(problem.system)
 
     def caveat(self, problem: Problem) -> str | None:
@@ -211,10 +234,12 @@ class HBVM(MethodBase):
         return kinks or unknown_kinks(problem, self.k, self.tol, self.breakpoints)
 
     def conserved(self, system: System) -> dict[str, float]:
-        """Return the energy, with a tolerance; only where k is chosen is the quadrature error at rounding."""
-        if self.tol is None or "energy" not in system.invariants or system.energy is None:
+        """Return the energy, with a tolerance: at rounding where k is chosen, or with a projection."""
+        if self.tol is None or "energy" not in system.invariants:
             return {}
-        return {"energy": 0.0 if self.k is None else self.tol}
+        if system.energy is None and self.projection is None:
+            return {}
+        return {"energy": 0.0 if self.k is None or self.projection else self.tol}
 
     def as_hbvm(self) -> "HBVM":
         """Return this method itself."""
@@ -226,6 +251,8 @@ class HBVM(MethodBase):
         return {name: value for name, value in self.options().items() if name in names}
 
     def _refusal(self, system: System) -> str | None:
+        if self.projection and (why := _not_projected(system)):
+            return f"projection={self.projection!r} {why}; leave it out."
         if system.kind != "poisson" or self.solver in ("auto", "fixed_point"):
             return None
         return (
@@ -251,13 +278,15 @@ class HBVM(MethodBase):
                 k, s, defect = choice
                 return AdaptiveProgram(
                     system, k=k, s=s, tol=tol, defect=defect, h=self.h, solver=self.solver, keep=keep,
-                    **self.control(),
+                    projected=self.projection is not None, **self.control(),
                 )  # fmt: skip
 
             if self.k is not None and self.s is not None:
                 return program((self.k, self.s, None))
-            from integrators.methods.automatic import choose
+            from integrators.methods.automatic import choose, choose_projected
 
+            if self.projection:
+                return program(choose_projected(tol))
             alone, many = choose(system, tol), choose(system, tol, lanes=True)
             made = program(alone)
             if many != alone:
@@ -269,3 +298,17 @@ class HBVM(MethodBase):
         assert self.k is not None
         assert self.s is not None
         return HBVMProgram(system, k=self.k, s=self.s, h=self.h, solver=self.solver, keep=keep)
+
+
+def _not_projected(system: System) -> str | None:
+    """Return why steps cannot end on a surface of the system's energy; ``None`` if they can."""
+    energy = system.invariants.get("energy")
+    if system.kind == "poisson":
+        return "is not for Poisson systems, whose line integrals keep the energy"
+    if energy is None or not system.traced:
+        return (
+            f"needs an energy as a formula without the time, and a field as one, which {system.name} has not"
+        )
+    if len(energy.outputs) != 1 or any(node.flags & T for node in energy.roots):
+        return f"needs an energy that is one number and does not depend on the time, unlike {system.name}'s"
+    return None

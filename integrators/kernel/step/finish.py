@@ -10,6 +10,7 @@ from integrators.kernel.context import ARRIVE, BY_INCREMENT, DONE, END, NOT_FINI
 from integrators.kernel.native.jit import compiled, for_both_widths
 from integrators.kernel.simd.memory import call_line, get, put, splat8, sums_and_rests, swap, total
 from integrators.kernel.simd.operations import fma, two_sum
+from integrators.kernel.step.projection import project_onto_energy
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sums import drift
 
@@ -115,7 +116,7 @@ def finish_by_increment(ctx):
 
 
 @compiled
-def finish(ctx):
+def finish_unprojected(ctx):
     """Set the next state from the state and the solved step's values; return the outcome."""
     if ctx.line:
         return call_line(ctx.line, END, ctx)
@@ -142,6 +143,15 @@ def finish(ctx):
             put(next_error, 8 * i, lost)
             damage += new * 0.0
     return DONE if total(damage) == 0.0 else NOT_FINITE
+
+
+@compiled
+def finish(ctx):
+    """Set the next state of the solved step, projected where that is asked for; return the outcome."""
+    outcome = finish_unprojected(ctx)
+    if outcome == DONE and ctx.energy_code:
+        project_onto_energy(ctx)
+    return outcome
 
 
 @compiled

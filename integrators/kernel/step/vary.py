@@ -54,8 +54,6 @@ GROW = FARTHEST  # of the length from one step to the next, at most
 # terms of exp(h w) by the iterations after it: 24 take as long as 18 and end, far out in a rotating frame,
 # with three times the error; 36 err by 1e-14 in one step of a diffusion.
 BUSY = 18.0
-# Iterations are not tested until the change should be about 1e-13. Once it is TRUSTED, nor are the rest.
-LOG_TRUSTED, TRUSTED = log2(1e-13), 1e-11
 MOST_UNTESTED = 12
 MOST, TRIAL = 3.0, 4  # times as many iterations as that are too many, if it looks like it after a trial
 LEAST_RATE, MOST_RATE = log2(1e-4), log2(0.9)
@@ -110,8 +108,9 @@ def iterate(ctx):
     first, known = binary_log(ctx.last), ctx.rate
     rate = known
     change, most = first, MOST * BUSY
+    trusted, log_trusted = ctx.trusted, ctx.log_trusted
     while ctx.outcome == RUNNING:
-        untested = min(int((LOG_TRUSTED - change) / rate) - 1, MOST_UNTESTED)
+        untested = min(int((log_trusted - change) / rate) - 1, MOST_UNTESTED)
         strict = sweep_measured(ctx, max(untested, 0))
         tries = ctx.tried - tried
         if strict > ROUNDING:
@@ -124,7 +123,7 @@ def iterate(ctx):
         if ctx.tried <= tried:  # started anew
             return settle(ctx)
         if ctx.outcome == RUNNING:
-            if strict <= TRUSTED:
+            if strict <= trusted:
                 polish(ctx, strict)
             elif tries >= TRIAL and tries + (ctx.log_rest - change) / rate > most:
                 ctx.outcome = DIVERGED  # not yet, but a shorter step is cheaper
