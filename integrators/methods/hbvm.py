@@ -133,9 +133,9 @@ class HBVM(MethodBase):
         largest size that a block will reach in the interval, divided by how much errors grow on the way;
         coarse further trajectories tell it.
     projection : {"energy"}, optional
-        With ``tol`` and k > s: the stage equations are solved to a hundredth of the tolerance only, and the end
-        of each step is then moved to the energy H_0 of the start. With the gradient g of the energy H and the
-        sizes s_i of the blocks,
+        With ``tol`` and k > s: the stage equations are solved to a hundredth of the tolerance only, and the
+        end of each step is then moved to the energy H_0 of the start. With the gradient g of the energy H
+        and the sizes s_i of the blocks,
 
             y_i <- y_i - s_i^2 g_i (H(y) - H_0) / sum_j (s_j g_j)^2,
 
@@ -144,8 +144,8 @@ class HBVM(MethodBase):
         at rounding. The method is then a projection: the energy is put right, not conserved by the equations,
         and says nothing about the trajectory, whose error follows the tolerance; the step is not symmetric,
         and other invariants are kept only as far as the tolerance. Systems whose energy is a formula without
-        the time; no Poisson systems, no ``variations``. Trajectories of an ensemble go one by one, not in lanes.
-        States by ``sample="dense"`` are not projected. Left out: no projection (`test_projection`).
+        the time; no Poisson systems, no ``variations``. Trajectories of an ensemble go one by one, not in
+        lanes. States by ``sample="dense"`` are not projected. Left out: no projection (`test_projection`).
 
     Raises
     ------
@@ -222,7 +222,7 @@ class HBVM(MethodBase):
         return None if self.s is None else 2 * self.s
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system: Poisson ones with fixed-point iteration, with a projection those with an energy."""
+        """Accept every system; Poisson ones by fixed-point iteration, with a projection one with energy."""
         return self._refusal(problem.system)
 
     def caveat(self, problem: Problem) -> str | None:
@@ -306,9 +306,7 @@ def _not_projected(system: System) -> str | None:
     if system.kind == "poisson":
         return "is not for Poisson systems, whose line integrals keep the energy"
     if energy is None or not system.traced:
-        return (
-            f"needs an energy as a formula without the time, and a field as one, which {system.name} has not"
-        )
+        return f"needs a field and an energy that are formulas, the energy without time; not {system.name}"
     if len(energy.outputs) != 1 or any(node.flags & T for node in energy.roots):
         return f"needs an energy that is one number and does not depend on the time, unlike {system.name}'s"
     return None
