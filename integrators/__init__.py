@@ -19,6 +19,7 @@ from problems import deprecated
 if TYPE_CHECKING:
     from integrators.coefficients.order import order_of as order_of
     from integrators.coefficients.order import stability as stability
+    from integrators.dynamics import gradient as gradient
     from integrators.dynamics import lyapunov as lyapunov
     from integrators.events import Event as Event
     from integrators.methods.advice import advise as advise
@@ -63,6 +64,7 @@ __all__ = [
     "WHFast",
     "WHFast512",
     "advise",
+    "gradient",
     "integrate",
     "integrate_many",
     "load",
@@ -77,6 +79,7 @@ __all__ = [
 _LATER = {  # imported when first used
     "Event": "integrators.events",
     "advise": "integrators.methods.advice",
+    "gradient": "integrators.dynamics",
     "lyapunov": "integrators.dynamics",
     "order_of": "integrators.coefficients.order",
     "section": "integrators.running.poincare",

@@ -52,7 +52,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     can ask for all of them at once and Ctrl-C loses few.
 17. `Variations`: tangent vectors ``follow`` a stepper; ``variations`` are the vectors at the samples of the
     last ``advance``.
-18. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
+18. `Gradients`: a stepper can ``record`` its solved steps, and their ``adjoint`` follows these backwards.
+    With this and `Checkpoints`, `integrators.gradient` works.
+19. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
     plugins then know its coefficients.
 """
 
@@ -80,6 +82,7 @@ __all__ = [
     "Destination",
     "EventStepper",
     "Events",
+    "Gradients",
     "Interruptible",
     "KeptError",
     "MethodBase",
@@ -467,6 +470,37 @@ class Variations(Protocol):
         ...
 
 
+class Gradients(Protocol):
+    """A stepper whose steps can be recorded, for their adjoint."""
+
+    def march(self, end: float, most: int) -> Samples:
+        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        ...
+
+    def recorder(self, capacity: int) -> Any:
+        """Return room for the records of so many steps: it has a ``len``, and a size in ``bytes``.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a system without a formula, and steps that are not those of a Runge-Kutta method.
+        """
+        ...
+
+    def record(self, records: Any) -> None:
+        """Record the solved steps from here on, partial steps too."""
+        ...
+
+    def adjoint(self, *, parameters: bool) -> Any:
+        """Return what follows records backwards.
+
+        ``begin(gradient)`` sets the derivatives with respect to the last state, ``follow(records)`` goes
+        back to the state before the first of some steps; ``gradient`` are the derivatives with respect to
+        that state, and with ``parameters`` those with respect to these.
+        """
+        ...
+
+
 class Events(Protocol):
     """A program whose steps can be searched for events."""
 
@@ -552,7 +586,7 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, AsHBVM,
+    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

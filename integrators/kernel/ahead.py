@@ -3,6 +3,7 @@
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
+from integrators.kernel.adjoint.engine import pull, record
 from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.events.engine import look
 from integrators.kernel.implicit.engine import solver
@@ -19,6 +20,8 @@ ENGINES = {
     "ensembles with own steps": run_own,
     "events": look,
     "variations": follow,
+    "recorded steps": record,
+    "adjoints": pull,
 }
 
 

@@ -53,6 +53,15 @@ class FixedStepper(HBVMStepper):
         times = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
         return self._make(SIDE, times, targets, np.zeros(count))
 
+    @one_thread
+    def march(self, end: float, most: int) -> Samples:
+        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        ctx = self._context
+        if (end - self.t) * ctx.h < 0.0:
+            self._turn(self.t)
+        targets, _ = plan(np.array([end]), np.array([ctx.t0]), ctx.h)
+        return self.take(min(most, int(targets[0]) - ctx.n))
+
     def _advance(self, grid: Array, sample: str) -> Samples:
         ctx = self._context
         t0, n, h = ctx.t0, ctx.n, ctx.h

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from integrators.events.event import Event
+from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
     ALWAYS_IMPLICIT,
     AUTO,
@@ -165,14 +166,8 @@ class HBVMStepper(ABC):
 
     def follow(self, state: ArrayLike, parameters: ArrayLike) -> None:
         """Let tangent vectors follow the trajectory from here on; see `integrators.protocol.Variations`."""
+        self._check_derivatives("variations")
         system, program = self._program.system, self._program
-        if not system.traced or program.kept or program.projected:
-            need = "a Runge-Kutta method: line integrals are none; use Gauss"
-            if not system.traced:
-                need = "a formula"
-            elif program.projected:
-                need = "steps without a projection, which they do not follow; leave out projection='energy'"
-            raise InputError(f"variations of {system.name} need {need}.")
         started = binary.clock()
         directions = Directions(*(np.array(part, dtype=np.float64) for part in (state, parameters)))
         if self._vectors and self._vectors.fits(directions):
@@ -182,6 +177,36 @@ class HBVMStepper(ABC):
             if self._implicit is not None:
                 self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started
+
+    def _check_derivatives(self, what: str) -> None:
+        """Refuse what needs the derivatives of the steps where these have none."""
+        system, program = self._program.system, self._program
+        if not system.traced:
+            need = "a formula"
+        elif program.projected:
+            need = "steps without a projection, which they do not follow; leave out projection='energy'"
+        elif program.kept:
+            need = "a Runge-Kutta method: line integrals are none; use Gauss"
+        else:
+            return
+        raise InputError(f"{what} of {system.name} need {need}.")
+
+    def recorder(self, capacity: int) -> Records:
+        """Return room for the records of so many steps; see `integrators.protocol.Gradients`."""
+        self._check_derivatives("gradients")
+        return Records(self._context.shape, capacity)
+
+    def record(self, records: Records) -> None:
+        """Record the steps from here on, instead of what was recorded or followed them before."""
+        records.attach(self._context)
+
+    def adjoint(self, *, parameters: bool) -> Adjoint:
+        """Return the adjoint of recorded steps."""
+        return Adjoint(self._program.system, self._context.shape, self._context.par.copy(), parameters)
+
+    @abstractmethod
+    def march(self, end: float, most: int) -> Samples:
+        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
 
     def look_to(self, end: float) -> Status:
         """Look for events from the last own step to a time that lies in the step ahead."""

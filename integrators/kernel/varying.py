@@ -90,6 +90,10 @@ class AdaptiveStepper(HBVMStepper):
         ahead = self._context.next_length > 0.0
         return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
+    def march(self, end: float, most: int) -> Samples:
+        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        return self.walk(end, limit=most)
+
     def _advance(self, grid: Array, sample: str) -> Samples:
         if sample == "steps":
             return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))

@@ -43,31 +43,31 @@ def directions(problem: Problem, wanted: Any) -> tuple[Array, Array]:
         return vectors, np.zeros((system.n_par, vectors.shape[1]))
     if not system.traced:
         raise InputError(f"variations of {system.name} need a formula; its field is code.")
-    places = {name: np.arange(system.n_par)[part] for name, part in _places(problem).items()}
+    known = {name: np.arange(system.n_par)[part] for name, part in places(problem).items()}
     states, parameters = [], []
     for name in names:
-        if name not in (START, TIME, *places):
-            raise unknown("variation", name, (START, TIME, *places))
+        if name not in (START, TIME, *known):
+            raise unknown("variation", name, (START, TIME, *known))
         if name == START:
             state, parameter = np.eye(system.dim), np.zeros((system.n_par, system.dim))
         elif name == TIME:
             slope = emit.numpy(system, "field")(problem.t0, problem.y0, problem.par)
             state, parameter = -slope[:, np.newaxis], np.zeros((system.n_par, 1))
         else:
-            parameter = np.eye(system.n_par)[:, places[name]]
+            parameter = np.eye(system.n_par)[:, known[name]]
             state = np.zeros((system.dim, parameter.shape[1]))
         states.append(state)
         parameters.append(parameter)
     return np.concatenate(states, axis=1), np.concatenate(parameters, axis=1)
 
 
-def _places(problem: Problem) -> dict[str, slice]:
+def places(problem: Problem) -> dict[str, slice]:
     """Return where each parameter lies in the parameter vector."""
-    places, end = {}, 0
+    found, end = {}, 0
     for name, value in problem.system.parameters.items():
         start, end = end, end + np.size(value)
-        places[name] = slice(start, end)
-    return places
+        found[name] = slice(start, end)
+    return found
 
 
 def follow(

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from integrators.protocol import MethodBase
 from integrators.testing.capabilities import (
     a_destination_leaves_the_samples_alone,
+    adjoints_are_what_tangents_say,
     batches_are_single_trajectories,
     comes_back_after_its_time,
     comes_back_when_it_is_stopped,
@@ -97,6 +98,7 @@ CHECKS: tuple[Check, ...] = (
     the_size_of_a_piece_is_a_count,
     comes_back_after_its_time,
     tangents_follow_and_change_nothing,
+    adjoints_are_what_tangents_say,
     is_the_hbvm_that_it_names,
 )
 

@@ -17,6 +17,7 @@ from integrators.protocol import (
     Destination,
     Events,
     EventStepper,
+    Gradients,
     Interruptible,
     KeptError,
     MethodBase,
@@ -43,6 +44,11 @@ ROUNDING = 1e-13
 
 DIFFERENCE, DIFFERENCE_BOUND = 1e-5, 1e-4
 """Relative distance of two starts, and largest error of their difference quotient as a derivative."""
+
+FEW = 64  # steps of a record
+ADJOINT_BOUND = 1e-9
+"""Largest relative difference between a gradient by tangent vectors and by the adjoint of the same steps
+(measured: 1e-15)."""
 
 EVENT_BOUND = 1e-9
 """Largest value of an event's function where it is said to vanish."""
@@ -195,6 +201,34 @@ def tangents_follow_and_change_nothing(method: MethodBase, problem: Problem) -> 
     return None
 
 
+def adjoints_are_what_tangents_say(method: MethodBase, problem: Problem) -> str | None:
+    """Check that recording leaves the trajectory's bits alone, and that the adjoint agrees with tangents."""
+    stepper, followed = start(method, problem), start(method, problem)
+    if not (offers(stepper, Gradients) and offers(followed, Variations)):
+        return "its steps have no adjoint"
+    dim, end = problem.system.dim, float(regular(problem, 4)[1]) * 0.25 + 0.75 * problem.t0
+    try:
+        followed.follow(np.eye(dim), np.zeros((problem.par.size, dim)))
+    except InputError as refusal:
+        return str(refusal)
+    tapes: list[Any] = []
+    while not tapes or len(tapes[-1]):  # the last one is of the partial step that is left
+        tapes.append(stepper.recorder(FEW))
+        stepper.record(tapes[-1])
+        stepper.march(end, FEW)
+    made = stepper.advance([end])
+    plain = followed.advance([end])
+    require(np.array_equal(made.y, plain.y), "the trajectory has the same bits when it is recorded")
+    adjoint = stepper.adjoint(parameters=False)
+    adjoint.begin(np.eye(dim)[0])
+    for records in reversed(tapes):
+        adjoint.follow(records)
+    wanted = np.asarray(followed.variations)[-1, 0]
+    miss = float(np.max(np.abs(adjoint.gradient[0] - wanted)) / np.max(np.abs(wanted)))
+    require(miss < ADJOINT_BOUND, f"off by {miss:.1e}")
+    return None
+
+
 def batches_are_single_trajectories(method: MethodBase, problem: Problem) -> str | None:
     """Check that a batch gives what its trajectories give alone, in any order, prepared, and with threads."""
     program: Any = method.compile(problem.system)
@@ -270,6 +304,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     PieceSize: the_size_of_a_piece_is_a_count,
     TimeLimit: comes_back_after_its_time,
     Variations: tangents_follow_and_change_nothing,
+    Gradients: adjoints_are_what_tangents_say,
     AsHBVM: is_the_hbvm_that_it_names,
 }
 """Which check a capability has."""

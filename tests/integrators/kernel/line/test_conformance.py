@@ -13,14 +13,15 @@ METHODS = [
     LineIntegral(k=6, s=3, h=0.01, tol=1e-6, invariants=["energy"]),
 ]
 
-# Fields in code are refused; there are no pieces with adaptive steps, no HBVM with these equations and no
-# variations.
+# Fields in code are refused; there are no pieces with adaptive steps, no HBVM with these equations, and no
+# derivatives.
 NEED_NOT_APPLY = (
     testing.keeps_the_error_of_a_user_s_function,
     testing.failure_is_a_status,
     testing.the_size_of_a_piece_is_a_count,
     testing.is_the_hbvm_that_it_names,
     testing.tangents_follow_and_change_nothing,
+    testing.adjoints_are_what_tangents_say,
 )
 
 

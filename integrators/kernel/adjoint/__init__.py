@@ -1,0 +1,1 @@
+"""Gradients of what a trajectory ends with: its steps, recorded and followed backwards."""
