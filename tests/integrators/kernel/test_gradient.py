@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from integrators import HBVM, IAS15, Gauss, gradient, integrate
-from integrators.dynamics.gradient import Recorded
+from integrators.dynamics.adjoint import Recorded
 from problems import Hamiltonian, InputError, Problem, VectorField
 from problems.analysis.wide import evaluate
 from tests.integrators.kernel.test_variations import SYSTEMS, flow, wide
