@@ -120,7 +120,8 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
             first = FIRST if self.first is None else self.first / abs(span)
             if first >= 1.0:
                 raise InputError(
-                    f"a grid that begins at first={self.first!r} lies beyond a span of {span!r}."
+                    f"a grid that begins at first={self.first!r} lies beyond the integration interval of "
+                    f"length {span!r}."
                 )
             cells = first ** (1.0 - cells)
         times = np.concatenate([[problem.t0, problem.t_end], problem.t0 + span * cells])

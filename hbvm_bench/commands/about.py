@@ -1,4 +1,4 @@
-"""``hbvm-bench inspect | engines | advise``: what can be said of a problem."""
+"""``hbvm-bench inspect | engines | advise``: the analysis of a problem."""
 
 from dataclasses import asdict
 from typing import Annotated
@@ -20,9 +20,9 @@ def inspect(
         str, typer.Argument(help='A formula, as in "p^2/2 - cos(q)", or a problem, as in "kepler(e=0.9)".')
     ],
     parameters: Annotated[str, typer.Option("--par", help='Values in a formula, as in "k=2, m=0.5".')] = "",
-    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
-    """Say what can be read off a Hamiltonian: degree, exact k, separability, cyclic coordinates, engines."""
+    """Analyse a Hamiltonian: degree, exact k, separability, cyclic coordinates, engines."""
     found = findings.inspect(system, parameters)
     if as_json:
         terminal.print_json(asdict(found))
@@ -35,9 +35,9 @@ def inspect(
 
 def engines(
     names: Annotated[list[str] | None, typer.Argument(help="Problems by name; all by default.")] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="As a Markdown table.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print a Markdown table.")] = False,
 ) -> None:
-    """Say which engine and which method accepts which problem, and why not."""
+    """Print which engine and which method accepts which problem, and why others do not."""
     for name in names or []:
         if name not in problems.names():
             raise unknown("problem", name, problems.names())
@@ -54,12 +54,10 @@ def engines(
 
 def advise(
     problem: Annotated[str, typer.Argument(help='A problem, as in "kepler(e=0.6)".')],
-    accuracy: Annotated[
-        float, typer.Option(help="Largest error of the positions wanted at the end, relative.")
-    ] = 1e-10,
-    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+    accuracy: Annotated[float, typer.Option(help="Largest relative position error at the end.")] = 1e-10,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
-    """Say which of our methods and which step reach an accuracy, at what cost: some thirty runs."""
+    """Recommend HBVM or Gauss settings for an accuracy, with their cost, from some thirty runs."""
     from integrators.methods.advice import advise as advise_
 
     advice = advise_(typed_problem(problem), accuracy)

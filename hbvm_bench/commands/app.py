@@ -21,7 +21,7 @@ from problems.errors import InputError, printable
 
 app = typer.Typer(
     name="hbvm-bench",
-    help="Which integrator keeps what, at what cost.",
+    help="Compare how integrators conserve energy, how accurate they are, and what they cost.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -100,7 +100,7 @@ def list_(
         str, typer.Argument(help="problems, methods, metrics or campaigns; all by default.")
     ] = "",
 ) -> None:
-    """List what there is: problems, methods with their options, metrics, campaigns."""
+    """List the problems, the methods with their options, the metrics and the campaigns."""
     terminal_ = terminal.console()
     for table in listing.tables(what):
         terminal_.print(table)
@@ -109,11 +109,12 @@ def list_(
 @app.command()
 def show(
     directory: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
     metric: Annotated[
-        list[str] | None, typer.Option("--metric", help="Only these; see list metrics.")
+        list[str] | None,
+        typer.Option("--metric", help="Print only these metrics; see `hbvm-bench list metrics`."),
     ] = None,
-    sort: Annotated[str | None, typer.Option(help="Metric to sort by within the groups.")] = None,
+    sort: Annotated[str | None, typer.Option(help="Metric to sort by within each group.")] = None,
 ) -> None:
     """Print the results of a run."""
     for key in [*(metric or []), *([sort] if sort else [])]:
@@ -148,9 +149,9 @@ def cite(
 def reference(
     problem: Annotated[str, typer.Argument(help='A problem, as in "sitnikov()".')],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Write the computed reference there.")
+        Path | None, typer.Option("-o", "--out", help="File to write the computed reference to.")
     ] = None,
-    until: Annotated[float | None, typer.Option(help="How far, where no reference is stored yet.")] = None,
+    until: Annotated[float | None, typer.Option(help="End time, where no reference is stored yet.")] = None,
 ) -> None:
     """Recompute the reference solution of a problem in two ways and compare it with the stored one."""
     import numpy as np

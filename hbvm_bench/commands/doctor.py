@@ -27,13 +27,16 @@ MARKS = {"ok": ("ok", "green"), "note": ("note", "yellow"), "bad": ("bad", "bold
 def doctor(
     context: typer.Context,
     peers: Annotated[
-        bool, typer.Option("--peers", help="Time every peer through the bench and alone; some minutes.")
+        bool,
+        typer.Option("--peers", help="Time every library through the bench and alone; takes some minutes."),
     ] = False,
-    rounds: Annotated[int | None, typer.Option(min=2, help="Of --peers: times each, in turn.")] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Of --peers: where results go; default runs/peers.")
+    rounds: Annotated[
+        int | None, typer.Option(min=2, help="With --peers: number of interleaved timings of each.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="With --peers: directory of the results; default runs/peers.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
     """Say what is missing on this machine, and whether times measured here can be trusted.
 

@@ -14,9 +14,12 @@ PAPER = "paper"
 def paper(
     context: typer.Context,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the results and the report go; default runs/paper.")
+        Path | None,
+        typer.Option("--out", help="Directory of the results and the report; default runs/paper."),
     ] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of processes; default one per core.")
+    ] = None,
 ) -> None:
     """Run the seed paper's experiments again and write the report: claim, paper, here.
 

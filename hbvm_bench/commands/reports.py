@@ -18,7 +18,8 @@ def report(
         typer.Argument(metavar="RUN...", help="Runs, as in runs/sitnikov; several are merged."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Default: RUN/report of the first run.")
+        Path | None,
+        typer.Option("-o", "--out", help="Directory of the report; default: RUN/report of the first run."),
     ] = None,
     show: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
     index: Annotated[
@@ -58,7 +59,7 @@ def report(
 
 
 def gallery(
-    directory: Annotated[Path, typer.Argument(help="Where problems.md goes, as in docs.")],
+    directory: Annotated[Path, typer.Argument(help="Directory of problems.md, as in docs.")],
     pictures: Annotated[bool, typer.Option(help="Draw the pictures again.")] = True,
     times: Annotated[
         bool, typer.Option("--compile-times", help="Only measure how long compiling takes: compile_times.md.")

@@ -42,13 +42,20 @@ def run(
     method: Annotated[
         list[str] | None, typer.Option("-m", "--method", help='A method, as in "HBVM(k=16, s=8, h=0.25)".')
     ] = None,
-    step: Annotated[float | None, typer.Option(help="Distance of the samples, with -p and -m.")] = None,
+    step: Annotated[float | None, typer.Option(help="Output interval, with -p and -m.")] = None,
     reference: Annotated[
-        bool, typer.Option("--reference", help="With -p: compute references by two methods, for positions.")
+        bool,
+        typer.Option(
+            "--reference", help="With -p: compute a reference solution by two methods, for position errors."
+        ),
     ] = False,
-    out: Annotated[Path | None, typer.Option("--out", help="Where results go; default runs/NAME.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Directory of the results; default runs/NAME.")
+    ] = None,
     report_to: Annotated[Path | None, typer.Option("--report", help="Also write the report there.")] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Cases side by side; default one per core.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Number of cases that run in parallel; default one per core.")
+    ] = None,
     executor: Annotated[
         str,
         typer.Option(
@@ -56,14 +63,16 @@ def run(
         ),
     ] = executors.LOCAL,
     timing: Annotated[
-        bool, typer.Option("--timing/--no-timing", help="The serial timing pass, on this machine.")
+        bool, typer.Option("--timing/--no-timing", help="Run the serial timing pass, on this machine.")
     ] = True,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="A tenth of the spans and trajectories, few settings and rounds."),
+        typer.Option(
+            "--quick", help="A tenth of the integration intervals and trajectories, few settings and rounds."
+        ),
     ] = False,
 ) -> None:
-    """Run a campaign, or the given problems and methods; a rerun does only what is missing.
+    """Run a campaign, or the given problems and methods; a second run computes only what is missing.
 
     Exit code 0 when every case has a row, 1 when an executor lost some, 130 for Ctrl-C.
     """
@@ -186,7 +195,7 @@ def carry_out(
 def dated(campaign: Campaign, store: Store) -> Campaign:
     """Return a campaign whose goals say when this run first had them, and what it had measured before.
 
-    A goal that the run had before keeps its dates; they are of the goal as it is, and another one is new.
+    A goal that the run had before keeps its dates, whatever its words are now; another goal is new.
     """
     had = {_undated(one): one for one in store.goals()}
     new = {_undated(one): one for one in campaign.goals if _undated(one) not in had}
@@ -199,7 +208,7 @@ def dated(campaign: Campaign, store: Store) -> Campaign:
 
 
 def _undated(goal: Goal) -> bytes:
-    return msgspec.json.encode(replace(goal, declared="", measured=""))
+    return msgspec.json.encode(replace(goal, words="", declared="", measured=""))
 
 
 def _say(sentence: str) -> None:

@@ -24,7 +24,7 @@ CHANGED = 1
 def compare(
     first: Annotated[Path, typer.Argument(help="A run, as in runs/sitnikov.")],
     second: Annotated[Path, typer.Argument(help="Another run of the same campaign.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Everything, for programs.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON output.")] = False,
 ) -> None:
     """Say what changed from one run to another beyond noise.
 
@@ -44,7 +44,7 @@ def _print(found: comparing.Comparison, console: Console, first: str, second: st
         for name in names:
             console.print(Text(f"only in {where}: {name}"))
     if found.behind:
-        console.print(Text(f"behind it: {'; '.join(found.behind)}"))
+        console.print(Text(f"reason: {'; '.join(found.behind)}"))
     numbers = found.equal + found.rounded
     changed = sum(change.what != "outcome" for change in found.changed)
     endings = len(found.changed) - changed
@@ -64,7 +64,7 @@ def _print(found: comparing.Comparison, console: Console, first: str, second: st
     for sentence in found.untimed:
         console.print(Text(f"time not compared: {sentence}"))
     if found.unchanged:
-        console.print("nothing changed beyond noise.")
+        console.print("no change exceeds the noise.")
 
 
 def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None:
@@ -75,10 +75,10 @@ def _table(changes: Sequence[comparing.Change], first: str, second: str) -> None
 
 
 def merge(
-    runs: Annotated[list[Path], typer.Argument(help="Two runs or more.")],
+    runs: Annotated[list[Path], typer.Argument(help="Two or more runs.")],
     out: Annotated[Path, typer.Option("--out", help="A new directory.")],
 ) -> None:
-    """Put several runs together in a new one; of a case in several, the one that got further."""
+    """Merge several runs into a new one; of duplicates, keep the most complete."""
     cases, records, left_out = merging.merge(merging.stores(runs), Store(out))
     print(f"{records} of {cases} cases in {out}")
     if left_out:

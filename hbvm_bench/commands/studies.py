@@ -38,17 +38,19 @@ Avx2 = Annotated[bool, typer.Option("--avx2", help=machine.AVX2)]
 def race(
     context: typer.Context,
     problem: Annotated[
-        list[str] | None, typer.Option("-p", "--problem", help="Only this problem; may be repeated.")
+        list[str] | None, typer.Option("-p", "--problem", help="Run only this problem; may be repeated.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A tenth of the spans and few settings.")] = False,
-    rounds: Annotated[int | None, typer.Option(min=2, help="Interleaved rounds of timing.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A tenth of the integration intervals and few settings.")
+    ] = False,
+    rounds: Annotated[int | None, typer.Option(min=2, help="Number of interleaved timing rounds.")] = None,
     compile_times: Annotated[
         bool | None,
         typer.Option("--compile/--no-compile", help="Compile times in fresh processes; not with --quick."),
     ] = None,
     avx2: Avx2 = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the results and the report go; default runs/race.")
+        Path | None, typer.Option("--out", help="Directory of the results and the report; default runs/race.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print all results and ratios as JSON.")] = False,
     declare: Annotated[
@@ -138,23 +140,28 @@ def _declare(campaign: Campaign, *, error: bool) -> None:
 
 def endure(
     context: typer.Context,
-    years: Annotated[float | None, typer.Option(help="The span; default a million.")] = None,
+    years: Annotated[float | None, typer.Option(help="Years to integrate; default a million.")] = None,
     starts: Annotated[
         int | None,
-        typer.Option(min=1, help="Trajectories of each method, from perturbed starts; default 16."),
+        typer.Option(
+            min=1, help="Trajectories of each method, from perturbed initial conditions; default 16."
+        ),
     ] = None,
     method: Annotated[
         list[str] | None, typer.Option("-m", "--method", help="Other methods than the declared ones.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="10 000 years from 3 starts; under a minute.")
+        bool, typer.Option("--quick", help="10 000 years from 3 initial conditions; under a minute.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Where the results and the report go; default runs/endure.")
+        Path | None,
+        typer.Option("--out", help="Directory of the results and the report; default runs/endure."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result and its laws as JSON.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the result and the fitted error growth as JSON.")
+    ] = False,
 ) -> None:
-    """Follow the energy error of the outer Solar System over a million years, ours beside the peers'."""
+    """Measure the energy error of the outer Solar System over a million years, for all libraries."""
     from hbvm_bench.commands.publishing import report_on  # what draws costs seconds to import
     from hbvm_bench.studies import endure as endurance
 
@@ -184,11 +191,15 @@ def endure(
 def automatic(
     context: typer.Context,
     problems: Annotated[list[str] | None, typer.Argument(help="Problems; all by default.")] = None,
-    rounds: Annotated[int | None, typer.Option(help="Interleaved timing samples, against heyoka.")] = None,
+    rounds: Annotated[
+        int | None, typer.Option(help="Number of interleaved timing samples, against heyoka.")
+    ] = None,
     avx2: Avx2 = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="Where the report goes, beside other kinds of processor that are there."),
+        typer.Option(
+            "--out", help="Directory of the report; results of other kinds of processor in it are kept."
+        ),
     ] = None,
 ) -> None:
     """Race HBVM that chooses everything itself, HBVM(), against heyoka's Taylor(tol=1e-15).

@@ -30,7 +30,7 @@ LOOKS, PAUSE = 9, 0.03  # at the processes that run: something short always does
 
 # Of each optional extra its libraries, and what happens without them.
 EXTRAS = {
-    "peers": (("heyoka", "rebound", "diffrax"), "their methods are refused and the comparison is ours alone"),
+    "peers": (("heyoka", "rebound", "diffrax"), "their methods are refused, and only HBVM and Gauss run"),
     "dask": (("distributed",), "--executor dask:// does not work"),
     "export": (("pyarrow",), "export writes CSV only"),
 }
@@ -158,14 +158,14 @@ def vectors() -> Finding:
     name = str(machine.describe()["vector_instructions"])
     if name == "AVX-512":
         return Finding("vectors", "ok", name)
-    words = f"{name}, no AVX-512: HBVM's lanes of stages take more instructions here"
+    words = f"{name}, no AVX-512: HBVM takes more instructions a stage here"
     return Finding("vectors", "note", words)
 
 
 def virtual() -> Finding:
     """Return whether this is a virtual machine, whose host may take its cores away."""
     if "hypervisor" in machine.flags():
-        return Finding("machine", "note", "virtual: what the host does besides is seen as stolen time only")
+        return Finding("machine", "note", "virtual: other work of the host shows as steal time only")
     return Finding("machine", "ok", "not virtual, as far as it tells")
 
 
@@ -199,8 +199,8 @@ def share(part: float) -> Finding:
 
 def steal(part: float) -> Finding:
     """Judge how much time the host took away from a virtual machine."""
-    words = f"{part:.1%} of a core taken away by the host"
-    return _judged("stolen time", words, part > LARGEST_STEAL, "use a machine of its own")
+    words = f"{part:.1%} of a core taken by the host"
+    return _judged("steal time", words, part > LARGEST_STEAL, "use a machine of its own")
 
 
 def _judged(what: str, words: str, bad: bool, advice: str) -> Finding:

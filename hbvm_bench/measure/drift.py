@@ -100,8 +100,8 @@ def false_alarms(starts: int) -> float:
 def told(starts: int) -> str:
     """Return when a mean over so many starts, at least two, is called a drift, and how often wrongly."""
     return (
-        f"Called a drift where the mean over the {starts} starts is more than {limit(starts):.3g} of its "
-        "standard errors from 0; of errors that do not drift, chance puts "
+        f"A drift is reported where the mean over the {starts} starts is more than {limit(starts):.3g} of "
+        "its standard errors from 0; of errors that do not drift, chance puts "
         f"{100.0 * false_alarms(starts):.0f} % there"
     )
 
@@ -176,7 +176,10 @@ def fit(t: ArrayLike, errors: ArrayLike, *, signed: bool = True) -> Law:
     kept = values > 0.0
     decades = math.log10(times[-1] / times[0])
     if kept.sum() < FEWEST_WINDOWS or decades < SHORTEST:
-        why = f"the law needs samples in {FEWEST_WINDOWS} windows over {SHORTEST} decades of time"
+        why = (
+            f"a fit of the error growth needs samples in {FEWEST_WINDOWS} windows over {SHORTEST} decades "
+            "of time"
+        )
         return replace(found, why=why, floor=float(values[kept].min()))
     fits = {law: _fitted(law, middle[kept], values[kept]) for law in CURVES}
     slope, low, high = _slope(times, rows, fits["power"])

@@ -84,7 +84,7 @@ def sentence(described: Mapping[str, str | int]) -> str:
     width = f"arithmetic {bits} bits wide" if bits else "width of the arithmetic not recorded"
     restricted = (
         "; all that numba compiles, our code and the forces and fields handed to REBOUND and SciPy, "
-        f"was restricted to {described.get('ours_built_for')}, the peers' own code was not"
+        f"was restricted to {described.get('ours_built_for')}, the code of the other libraries was not"
     )
     return (
         f"Times and their ratios belong to this kind of processor: {described.get('processor', 'unknown')}"

@@ -161,7 +161,7 @@ def energy_bias(m: Measured) -> float | str:
     return abs(law.mean) / (drift.limit(law.starts) * law.mean_error)
 
 
-@metric("least energy drift within the interval", "least drift", "1/time", same_trajectory=True)
+@metric("smallest energy drift within the interval", "smallest drift", "1/time", same_trajectory=True)
 def energy_rate_least(m: Measured) -> float | str:
     """The drift nearest to 0 in the 95 % interval over several starts; 0 where that has it."""
     law = m.laws.get("energy")
@@ -314,9 +314,9 @@ def _of_law(m: Measured, name: str) -> float | str:
     """Return a number of the law of the energy's error."""
     law = m.laws.get("energy")
     if law is None:
-        return "no law was sought"
+        return "no error growth was fitted"
     number = getattr(law, name)
-    return law.why or "the samples do not say" if number is None else number
+    return law.why or "the samples do not determine it" if number is None else number
 
 
 def _compiled(m: Measured, *, cached: bool, otherwise: str) -> float | str:

@@ -121,7 +121,7 @@ def _overall(results: Results, *, several: bool) -> list[Block]:
     made = attempt(
         ("which integrator for which need", partial(needs.table, records)),
         ("which integrator on which problem", partial(_outcomes, records)),
-        ("the law of the energy's drift", partial(laws.table, records)),
+        ("the growth of the energy error", partial(laws.table, records)),
         ("performance profiles", partial(profiles, records, numbers)),
     )
     return [Section(title, made, "overview", nav="Over all problems" * several)] if made else []
@@ -185,10 +185,10 @@ def fairness(results: Results) -> Section:
         kinds = Counter(record.case.settings for record in members)
         rows.append((*of, str(len(members)), *(str(kinds[kind]) for kind in KINDS)))
     head = ("method", "library", "settings", *KINDS)
-    settings = Table("How many settings each method has", head, rows, words=(0, 1))
+    settings = Table("The number of settings of each method", head, rows, words=(0, 1))
     blocks = [Items(rules, "numbered"), settings]
     if excluded := words.excluded(records):
-        title = f"{len(excluded)} cases that take part in no ranking, and why"
+        title = f"{len(excluded)} cases excluded from every ranking, with reasons"
         blocks.append(Details(title, [Items(excluded)], open=len(excluded) <= LISTED))
     title = "Fairness: the rules, the settings, what was excluded"
     return Section(title, blocks, "fairness", nav="Fairness")

@@ -97,8 +97,8 @@ def _results(block: blocks.Results, level: int) -> str:
                 "\n".join(f"- {code(r.record.case.method)}: {words(r.remark)}." for r in remarks),
             ]
     parts.append(
-        "Times are medians with their quartiles. In round brackets: void, because the row is another "
-        "trajectory, or only a part of the one that was asked for."
+        "Times are medians with their quartiles. In round brackets: excluded, because the run left its "
+        "trajectory or did not reach the end."
     )
     return joined(parts)
 

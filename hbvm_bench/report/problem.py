@@ -76,7 +76,9 @@ def part(
     summary = attempt(
         (f"the summary of {text}", lambda: Items([*words.summary(records), *witnesses], "cards"))
     )
-    wrong = attempt((f"our shortcomings on {text}", lambda: Items(words.shortcomings(records))))
+    wrong = attempt(
+        (f"the shortcomings of HBVM and Gauss on {text}", lambda: Items(words.shortcomings(records)))
+    )
     title = f"{problem.title}{at_once(ensemble)}{sampled}"
     unrun = Items([f"`{case.method}`" for case in missing])
     blocks: list[Block] = [
@@ -84,7 +86,7 @@ def part(
         *attempt((f"the reference of {text}", lambda: _truth(problem, known))),
         *([Details(f"{len(missing)} cases on this problem have no result yet", [unrun])] if missing else []),
         *(drawings or _figures(problem, drawn, known, number, brief=brief)),
-        Section("What our own methods do wrong", wrong, f"wrong-{number}"),
+        Section("Shortcomings of HBVM and Gauss", wrong, f"wrong-{number}"),
     ]
     section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
     return ProblemPart(problem, Ranked(title, repr(problem), grouped(rows(records))), summary, section)
@@ -119,7 +121,7 @@ def _makers(
 
     made: list[Maker] = [
         ("Work and precision", lambda: work_precision(cases)),
-        ("Drift of the energy", lambda: drift_figure(main)),
+        ("Energy drift", lambda: drift_figure(main)),
     ]
     if problem.name == "sitnikov" and not brief:
         made.append(("The system in space", lambda: motion.still(cases, "The system in space")))
@@ -158,7 +160,7 @@ OVER_TIME = (
     OverTime(
         "energy", "Energy error over time", "|H − H₀| / |H₀|", "error.energy", -17, 2,
         "Relative error of the energy. A line is the largest value in each of "
-        f"{over_time.BINS} spans of time. † lost the symmetry, ‡ did not reach the end.",
+        f"{over_time.BINS} equal time intervals. † lost the symmetry, ‡ did not reach the end.",
     ),
     OverTime(
         "position", "Position error over time", "position error", "position", -17, 4,
@@ -170,12 +172,12 @@ OVER_TIME = (
     ),
     OverTime(
         "symmetry", "Off-axis distance over time", "distance from the axis", "guard.", -24, 4,
-        "What the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
-        "what is smaller than the lowest power is drawn just above it.", zero=True,
+        "The quantity that the problem's symmetry keeps at exactly 0. Lines at the lower edge are exactly 0; "
+        "smaller values than the lowest power are drawn just above them.", zero=True,
     ),
     OverTime(
         "distance", "Largest distance from the origin over time", "largest distance", "distance", 0, 5,
-        "Shows what escaped, and when.",
+        "Shows which bodies escaped, and when.",
     ),
 )
 # fmt: on
@@ -210,7 +212,8 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
     shown = [name for name in ("energy", "angular_momentum") if name in floor]
     if least := ", ".join(f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}" for name in shown):
         said.append(
-            f"Errors of the reference itself once rounded to doubles, the least a run can show: {least}"
+            "Errors of the reference solution rounded to doubles, the smallest errors a run can show: "
+            f"{least}"
         )
     if problem.name == "sitnikov" and known.t[-1] == problem.t_end:
         z = known.high[-1, PLANETOID_Z]

@@ -112,7 +112,7 @@ def _results(
             made.add_row(number, name, *(_cell(row, metric.key) for metric in shown))
             if row.remark:
                 remarks.add_row(Text(number, justify="right"), Text(f"{method}: {row.remark}."))
-    note = "In brackets: void, for the row is another trajectory or only a part of it."
+    note = "In brackets: excluded, because the run left its trajectory or did not reach the end."
     if hidden:
         note += f" {hidden} columns do not fit; a wider terminal or --metric shows them."
     return Group(made, Text(note, style="dim"), remarks, "")

@@ -22,12 +22,13 @@ WITNESSES = (
 """Of an ensemble, where the size differs from `POSITION`'s."""
 
 RULES_TEXT = f"""
-Every integrator starts from the same doubles and receives the same vector field, written down
+Every integrator has the same initial conditions, to the last bit, and receives the same vector field, written
+down
 once as a Hamiltonian; REBOUND, which computes gravity itself, receives the same bodies.
 
 The settings were declared in the campaign file before the run. How many each method has, and
-whether they are chosen by whoever wrote the file, the method's defaults, its authors' advice, those
-of a publication or a use outside its domain, is in the table below.
+where they come from (chosen by the campaign's author, defaults, the authors' advice, a publication, a use
+outside the method's intended regime), is in the table below.
 
 Energy is never ranked without position: the table is sorted by the position error at the end, and
 the picture of energy against time stands beside that of position against time.
@@ -35,38 +36,39 @@ the picture of energy against time stands beside that of position against time.
 {POSITION}
 
 Where the problem's symmetry is lost by more than {GUARD_TOLERANCE:g} of the size of the trajectory,
-the run follows another trajectory: its position error and its time are void, are printed in
-brackets, and take part in no ranking. Where it is lost by less, the row says so.
+the run follows another trajectory: its position error and its time are excluded: they are printed in brackets
+and are not ranked. Where it is lost by less, the row says so.
 
 Invariants are evaluated in double-double arithmetic from the double states, on one grid of times
-common to all. Each method reaches the grid in the way that costs its quality nothing: by its own
-steps, by a partial step aside, by its own step's polynomial at full order, or by landing on it.
+common to all. Each method reaches the output times in the way that does not change its accuracy: at the ends
+of its steps, by a partial step, by dense output of full order, or by stopping at them.
 
 heyoka, JAX and numba compile for the processor at hand; REBOUND and SciPy are used as their wheels
 come, built for any processor of the kind. SciPy's solvers are Python and call a vector field
-compiled by numba: on a small system most of their time is Python's, and a ratio of times to them is
-one of implementations. The evaluations compare the methods.
+compiled by numba: on a small system most of their time is spent in Python, and a ratio of times compares
+implementations. The number of evaluations compares the methods.
 
-A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; the
-numbers of the part that it did run are void.
+A case that stalls, runs out of time or memory, crashes or is refused is a row with its reason; the numbers of
+the part that was integrated are excluded.
 """
 TIMES = (
-    "Times are those of whole integrations without output, compiled before, with one thread on one core, in "
-    "a pass of their own with no other case running. {visits} {sample} The table gives the median and the "
-    "quartiles; all samples are in the store. Compilation is stated apart. Each library goes to the end in "
-    "the way of its own documentation; what the bench adds to its time is measured by `hbvm-bench run peers`."
+    "Times are those of whole integrations without output, compiled beforehand, with one thread on one "
+    "core, in a pass of their own with no other case running. {visits} {sample} The table gives the median "
+    "and the quartiles; all samples are in the store. Compilation is stated apart. Each library integrates "
+    "to the end as its own documentation describes; `hbvm-bench run peers` measures what the bench adds to "
+    "its time."
 )
-ENDS = "Where the campaign gives the end state itself, that stands in the place of the 128-bit solution."
+ENDS = "Where the campaign gives the end state, it replaces the 128-bit solution."
 WEAKNESSES_TEXT = """
-HBVM(k, s) with k > s is not symplectic: it keeps the energy, not the volume in phase space.
-Gauss (k = s) is symplectic and does not keep the energy.
+HBVM(k, s) with k > s conserves the energy and is not symplectic. Gauss (k = s) is symplectic and does not
+conserve the energy.
 
 Both are implicit: every step solves a nonlinear system, so they need many evaluations of the vector
 field.
 
-Conserving the energy is not accuracy: it does not say where on the energy surface the state is.
+A small energy error does not imply a small position error: a wrong state may lie on the right energy surface.
 """
-ANGULAR_MOMENTUM = "HBVM keeps the angular momentum only as far as its order does."
+ANGULAR_MOMENTUM = "HBVM does not conserve the angular momentum: its error is of the order of the method."
 
 
 def _paragraphs(text: str) -> tuple[str, ...]:
@@ -79,7 +81,7 @@ WEAKNESSES = _paragraphs(WEAKNESSES_TEXT)
 
 def timing(plan: TimingPlan) -> str:
     """Return how a campaign takes times."""
-    alike = ", so that a machine that changes its speed touches all alike."
+    alike = ", so that a change of the machine's speed affects all cases alike."
     if plan.interleaved:
         rounds = f"in {plan.rounds} rounds (slow cases in fewer)"
         visits = f"One process takes all cases of a problem in turn, {rounds}{alike}"
@@ -88,9 +90,7 @@ def timing(plan: TimingPlan) -> str:
     else:
         visits = "Every case is visited once, in a fresh process."
     if plan.interleaved and plan.clock != "wall":
-        visits += (
-            f" The seconds are the processor's for this {plan.clock}: waiting for others does not count."
-        )
+        visits += f" The seconds are CPU time of this {plan.clock}: waiting does not count."
     sample = f"A sample lasts at least {seconds(plan.shortest)}."
     if plan.shortest < SHORTEST_RUN:
         sample = "A sample is one integration."
@@ -98,14 +98,14 @@ def timing(plan: TimingPlan) -> str:
 
 
 def summary(records: Sequence[Record]) -> list[str]:
-    """Return what came out of a problem's cases, in sentences, whoever wins."""
+    """Return the summary of a problem's cases, in sentences."""
     groups = {key: [r for r in records if group_of(r) == key] for key in GROUPS}
     cases = "1 case" if len(records) == 1 else f"{len(records)} cases"
     counted = {
         "on": "follow the trajectory to the end",
-        "apart": "reach the end in another place",
-        "uncompared": "reach the end and are compared with no reference",
-        "off": "lost its symmetry or its energy",
+        "apart": "reach the end with a large position error",
+        "uncompared": "reach the end and have no reference solution",
+        "off": "lost the symmetry or the energy",
         "ended": "did not reach the end",
     }
     some = [f"{len(groups[key])} {words}" for key, words in counted.items() if groups[key] or key == "on"]
@@ -115,9 +115,9 @@ def summary(records: Sequence[Record]) -> list[str]:
         fast = _ranked([r for r in ranked if accurate(r, RIGHT)], "warm_seconds")
         level = " and ".join(f"{key.partition('_')[0]} to {bound:g}" for key, bound in RIGHT.items())
         if fast:
-            sentences.append(_best(f"Fastest of the {len(fast)} that keep {level}", fast, "warm_seconds"))
+            sentences.append(_best(f"Fastest of the {len(fast)} with {level}", fast, "warm_seconds"))
         elif any(r.timing for r in ranked):
-            sentences.append(f"No case that was timed keeps {level}.")
+            sentences.append(f"No timed case reaches {level}.")
     elif groups["uncompared"]:
         sentences.append(
             "This problem has no stored reference: positions are not measured, and nothing is ranked. "
@@ -125,12 +125,12 @@ def summary(records: Sequence[Record]) -> list[str]:
         )
     sentences += disturbed(records)
     stalled = [record for record in groups["ended"] if record.result.outcome == "stalled"]
-    said = (f"{record.case.method} {status_of(record)}, seen by the watchdog." for record in stalled)
+    said = (f"{record.case.method} {status_of(record)}, as the watchdog detected." for record in stalled)
     return [*sentences, *said]
 
 
 def shortcomings(records: Sequence[Record]) -> list[str]:
-    """Return what our own methods do wrong, general facts first, then what this run shows."""
+    """Return the shortcomings of HBVM and Gauss: general facts first, then those of this run."""
     turning = any(number(record, "angular_momentum_max") is not None for record in records)
     shown = [*WEAKNESSES, *([ANGULAR_MOMENTUM] if turning else [])]
     for record in records:
@@ -140,11 +140,11 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
             continue
         z, angular = number(record, "z_error"), number(record, "angular_momentum_max")
         shown.append(
-            f"Here {record.case.method} has the energy right to {energy:.1e} "
+            f"Here {record.case.method} has an energy error of {energy:.1e} "
             f"and a position error of {position:.2g} at the end"
-            + ("" if z is None else f", z wrong by {z:.2g}")
-            + ("" if angular is None else f", the angular momentum off by {angular:.1e}")
-            + "; the paths below show what that does to the orbits."
+            + ("" if z is None else f", an error of z of {z:.2g}")
+            + ("" if angular is None else f", an error of the angular momentum of {angular:.1e}")
+            + "; the paths below show the orbits."
         )
     return shown
 

@@ -157,8 +157,8 @@ def _grid(grid: Grid, name: str, cases: Iterable[Resolved]) -> None:
         for length in given:
             if length is not None and length > longest:
                 raise InputError(
-                    f"{key}={length!r} of the grid of {name} lies beyond its span of {longest!r}; "
-                    "make it smaller, or leave it out."
+                    f"{key}={length!r} of the grid of {name} lies beyond its integration interval of length "
+                    f"{longest!r}; make it smaller, or leave it out."
                 )
 
 

@@ -22,7 +22,7 @@ from hbvm_bench.store.store import Store
 
 Tell = Callable[[int, Resolved], None]
 Machine = dict[str, str | int]
-OFF = "on another trajectory, so that its time has no meaning"
+OFF = "on another trajectory, so that its time is not meaningful"
 ENDINGS = {"timeout": "the time limit", "compiling": "still compiling", "memory": "the memory limit"}
 
 

@@ -54,18 +54,18 @@ class Duel:
 
     @property
     def ratio(self) -> Spread | None:
-        """Their time over ours within each round."""
+        """The Taylor method's time relative to HBVM() within each round."""
         return standings.compare(self.ours, self.theirs).ratio
 
     @property
     def words(self) -> str:
-        """``reached``, ``missed``, ``not as accurate``, or why there is no ratio; ``""`` without a goal."""
+        """``reached``, ``missed``, ``less accurate``, or why there is no ratio; ``""`` without a goal."""
         if self.ratio is None:
             return next(
                 (status_of(one) for one in (self.ours, self.theirs) if not one.timing), "not compared"
             )
         if not accurate(self.ours, standings.no_worse(self.theirs, NO_WORSE)):
-            return "not as accurate"
+            return "less accurate"
         return "" if self.verdict is None else self.verdict.verdict
 
 
@@ -102,8 +102,8 @@ def errors_are(results: Results) -> Note:
     del results
     return Note(
         f"{POSITION} Here: the geometric mean over ten such times. One setting of each library is compared, "
-        "the same on all problems, and neither is its fastest: the Taylor method is faster with "
-        "fast_math=True, and at a larger tolerance. The race compares as many settings of both."
+        "the same on all problems. Neither is the fastest of its library: the Taylor method is faster with "
+        "fast_math=True or a larger tolerance. The race compares many settings of both."
     )
 
 
@@ -152,10 +152,10 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
         settings = dict.fromkeys(duel.theirs.case.method for duel in known)
         rows.append((key, " or ".join(settings), " or ".join(goals), *map(_cell, of_kind)))
     return Table(
-        "How many times as long as HBVM() the Taylor method takes",
+        "Time of the Taylor method relative to HBVM()",
         ("problem", "against", "goal", *results),
         rows,
-        "The median of the ratio within each round, and whether it reaches the goal declared before; not as "
+        "The median of the ratio within each round, and whether it reaches the goal declared before; less "
         "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
         words=(0, 1),
     )

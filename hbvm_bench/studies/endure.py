@@ -167,10 +167,10 @@ def goals(result: Endurance) -> list[Verdict]:
 LAW_POINTS = 40
 FALLS_ON = 30  # a law is drawn over the last part of the span, from this fraction of it
 METHOD = """
-The methods run one after the other from each start, in one process on one core. The energy is
-evaluated in double-double arithmetic at whole years, log-spaced, at the methods' own steps or by means
-that cost them nothing. The time of a trajectory contains these few samples and no compilation. Laws: a
-floor and a growth are fitted together to the logarithm of the rms over windows of time
+The methods run one after the other from each initial condition, in one process on one core. The energy is
+evaluated in double-double arithmetic at whole years, spaced evenly in log time, at ends of steps or in a way
+that does not change the steps. The time of a trajectory contains these few samples and no compilation. Error
+growth: a floor and a power of t are fitted together to the logarithm of the rms over time windows
 (`hbvm_bench.measure.drift`).
 """
 
@@ -180,8 +180,9 @@ def about(results: Results) -> str:
     """Return what was run."""
     result = of(results)
     return (
-        f"`{result.problem}` from {result.starts} starts: the problem's own, and others in which every "
-        f"position and momentum is changed by up to {PERTURBATION} of itself (`hbvm_bench.measure.starts`)."
+        f"`{result.problem}` from {result.starts} initial conditions: the problem's, and others in which "
+        f"every position and momentum is changed by up to {PERTURBATION} of itself "
+        "(`hbvm_bench.measure.starts`)."
     )
 
 
@@ -247,17 +248,20 @@ def tables(result: Endurance) -> list[Table]:
             )
         )
     heads = tuple(f"{year:g}" for year in years)
-    after = ("law", "power of t", "mean", "a year", "time", "× ours")
+    after = ("growth", "power of t", "mean", "a year", "time", "× HBVM and Gauss")
     made = [
         Table(
             f"Relative energy error over {result.years:g} years",
             ("method", "starts", *heads, *after),
             rows,
-            "rms over the starts, at so many years. Mean: over the starts at the end, with its standard "
-            "error, after the offset of each has been taken off. "
+            "rms over the initial conditions, after so many years. Mean: over the initial conditions at "
+            "the end, with its standard error, after the offset of each was subtracted. "
             + (f"{drift.told(result.starts)}, whatever the power of t. " if result.starts > 1 else "")
-            + "Power of t and the drift a year with 95 % "
-            "intervals over the starts. Time: median of one trajectory." + drift.uncertainty(result.starts),
+            + (
+                "Power of t and drift per year with 95 % intervals over the initial conditions. Time: "
+                "median of one trajectory."
+            )
+            + drift.uncertainty(result.starts),
             words=(0, 2 + len(heads)),
             groups=(("", 2), ("rms", len(heads)), ("", 2), ("drift", 2), ("", 2)),
         )
@@ -325,7 +329,7 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
     guide = t[t >= t[-1] / 1e3]
     axes.plot(guide, 10.0 ** (low + 0.4) * np.sqrt(guide / guide[0]), color=MUTED, linewidth=0.8)
     axes.annotate(" √t", (guide[-1], 10.0 ** (low + 0.4) * math.sqrt(guide[-1] / guide[0])), color=MUTED)
-    title = "relative energy error, root mean square over the starts"
+    title = "relative energy error, root mean square over the initial conditions"
     axes.set(xlabel="years", title=title)
     axes.legend(loc="upper left", handlelength=4.5)
     said = "; ".join(
@@ -337,8 +341,8 @@ def over_time(result: Endurance, look: Mapping[str, Look]) -> Picture | None:
         figure,
         "endure",
         "Energy error of the outer Solar System over time",
-        "Thick: root mean square over the starts; thin: every start. The grey line grows like the square "
-        "root of time, as unbiased round-off does.",
+        "Thick: root mean square over the initial conditions; thin: each of them. The grey line grows like "
+        "the square root of time, as unbiased rounding errors do.",
         said,
         Plot([Panel(title, Axis("years", log=True), vertical, traces)]),
     )

@@ -139,7 +139,7 @@ def lines(found: Findings) -> list[tuple[str, str]]:
         ("separable", separable if canonical else ""),
         ("polynomial", _polynomial(found) if found.kind != "vector_field" else ""),
         ("cyclic coordinates", cyclic if canonical else ""),
-        ("time", "occurs: the energy is not kept" if found.depends_on_time else "does not occur"),
+        ("time", "occurs: the energy is not conserved" if found.depends_on_time else "does not occur"),
         ("invariants", ", ".join(found.invariants) or "none known"),
         ("stays 0 by symmetry", ", ".join(found.guards)),
         ("engines", accepted),
@@ -150,9 +150,9 @@ def lines(found: Findings) -> list[tuple[str, str]]:
 
 def _polynomial(found: Findings) -> str:
     if found.degree is None:
-        return "not polynomial: the energy is kept to rounding once k is large enough, never exactly"
+        return "not polynomial: the energy is conserved to round-off once k is large enough, never exactly"
     pairs = ", ".join(f"k = {k} for s = {s}" for s, k in found.exact)
-    return f"degree {found.degree}: HBVM(k, s) keeps the energy exactly from {pairs}"
+    return f"degree {found.degree}: HBVM(k, s) conserves the energy exactly from {pairs}"
 
 
 def reasons(problem: Problem) -> dict[str, str | None]:
@@ -180,7 +180,7 @@ def _instance(cls: type[MethodBase]) -> MethodBase:
     required = [field.name for field in dataclasses.fields(cls) if field.default is dataclasses.MISSING]
     for option in required:
         if option not in _REQUIRED:
-            raise InputError(f"it has to be told its option {option!r} first.")
+            raise InputError(f"its option {option!r} has to be given.")
     given = {option: _REQUIRED[option] for option in required}
     try:
         return cls(**given)

@@ -101,7 +101,7 @@ def disturbed(goal: Goal, records: Sequence[Record | None]) -> str:
     loads = [one.load for one in timings if one.load is not None]
     shares = [1.0 - median(round_.share for round_ in one.rounds) for one in timings if one.rounds]
     most = max([0.0, *shares, *(max(load.others, load.stolen) for load in loads)])
-    return f"other work took {most:.0%} of a core meanwhile" if most > OTHER_WORK else ""
+    return f"other work took {most:.0%} of a core during the timing" if most > OTHER_WORK else ""
 
 
 def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdict:
@@ -118,7 +118,7 @@ def _judged(goal: Goal, entry: ProblemEntry, records: Sequence[Record]) -> Verdi
     return Verdict(
         goal=goal,
         entry=entry,
-        words=goal.words or f"{metric.label} of {goal.method or 'ours'}",
+        words=goal.words or f"{metric.label} of {goal.method or 'HBVM and Gauss'}",
         asked=f"≤ {goal.at:g}",
         measured=NONE if ours is None else format_metric(ours, goal.metric),
         verdict="not judged" if busy else "reached" if reached else "missed",
@@ -144,16 +144,20 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
     if blind:
         verdict, why = "void", "energy is not ranked without position"
     elif found.ratio is None:
-        why = "the peer has no setting as accurate" if theirs is None else "none of ours is as accurate"
+        why = (
+            "no setting of the other library is as accurate"
+            if theirs is None
+            else "no setting of HBVM and Gauss is as accurate"
+        )
     elif busy := disturbed(goal, [found.ours, found.theirs]):
         verdict, why = "not judged", busy
     elif found.chosen_by_them:
-        why = "of the rounds that chose the settings, for there are no others"
+        why = "from the rounds that chose the settings: there are no others"
     label = METRICS[goal.metric].label
     return Verdict(
         goal=goal,
         entry=entry,
-        words=goal.words or f"{label} of {goal.against} over ours, {_bounds(goal, within)}",
+        words=goal.words or f"{label} of {goal.against} relative to HBVM and Gauss, {_bounds(goal, within)}",
         asked=f"≥ {ratio:g}",
         measured=ratio_text(found.ratio),
         verdict=verdict,
@@ -166,7 +170,10 @@ def _against(goal: Goal, entry: ProblemEntry, records: Sequence[Record], ratio: 
 def _bounds(goal: Goal, within: dict[str, float]) -> str:
     said = [f"{METRICS[key].short} ≤ {bound:.0e}" for key, bound in within.items()]
     for key, factor in goal.no_worse.items():
-        said.append(f"{METRICS[key].short} " + ("no worse" if factor == 1.0 else f"≤ {factor:g}× theirs"))
+        said.append(
+            f"{METRICS[key].short} "
+            + ("no worse" if factor == 1.0 else (f"≤ {factor:g}× that of the other library"))
+        )
     return ", ".join(said) or "at any accuracy"
 
 

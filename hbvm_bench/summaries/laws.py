@@ -44,11 +44,12 @@ def table(records: Sequence[Record]) -> Table | None:
         rows.append((family, *(str(counted.get(kind, NONE)) for kind in kinds), middle))
     starts = max(law.starts for laws in found.values() for law in laws)
     return Table(
-        "How the energy error grows",
+        "Growth of the energy error",
         ("method", *kinds, "a"),
         rows,
-        "How many cases of each method follow which law; a: median of the exponents, in brackets the least "
-        "and the largest. The interval of each exponent is beside its case." + drift.uncertainty(starts),
+        "The number of cases of each method with each kind of growth; a: median of the exponents, in "
+        "brackets the smallest and the largest. The interval of each exponent is given with its case."
+        + drift.uncertainty(starts),
     )
 
 

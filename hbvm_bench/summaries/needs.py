@@ -22,6 +22,8 @@ from hbvm_bench.summaries.points import accurate, by_family, by_problem, family_
 from hbvm_bench.summaries.table import Table
 
 SHOWN = 3  # families
+NEAR, NEAR_ERROR, NEAR_MEMORY = 2.0, 10.0, 1.25  # factors to the best cost that count as near it
+_WORSE = {"warm_seconds": "slower", "compile_seconds": "slower", "evaluations": "more", "peak_memory": "more"}
 ROUND_OFF = 1e-15  # an error below this is as good as any other
 ACCURACIES = (
     {"position_end": 1e-4},
@@ -32,12 +34,12 @@ ACCURACIES = (
 
 
 class Need(NamedTuple):
-    """What somebody wants of an integrator."""
+    """A requirement: an accuracy and a cost to be small."""
 
     title: str
     serves: Callable[[Record], bool]
     cost: str  # key of the metric that is then to be small
-    near: float = 2.0  # up to this factor a cost is near the best
+    near: float = NEAR  # up to this factor a cost counts as near the best
     floor: float = 0.0  # costs below it are equal
 
 
@@ -52,7 +54,11 @@ def table(records: Sequence[Record]) -> Table | None:
         first = sorted(behind, key=lambda family: (-near[family], typical[family]))[:SHOWN]
         said = [
             f"{family} ({near[family]} of {_ran(behind[family])}"
-            + (f", {typical[family]:.3g} times the best)" if typical[family] > 1.005 else ")")
+            + (
+                f", {typical[family]:.3g}× {_WORSE.get(need.cost, 'larger')})"
+                if typical[family] > 1.005
+                else ")"
+            )
             for family in first
         ]
         rows += [(need.title, "; ".join(said), str(problems))] if said else []
@@ -60,8 +66,9 @@ def table(records: Sequence[Record]) -> Table | None:
         return None
     head = ("need", "first choices", "problems")
     note = (
-        "In brackets: on how many of the problems that it ran on it is near the best, and its median factor "
-        "behind it."
+        f"In brackets: on how many of the problems that it ran on its result is within a factor of {NEAR:g} "
+        f"of the best one ({NEAR_ERROR:g} for errors, {NEAR_MEMORY:g} for memory), and its median factor to "
+        "it."
     )
     return Table("Which integrator for which need", head, rows, note, words=(0, 1))
 
@@ -70,23 +77,35 @@ def needs(records: Sequence[Record]) -> list[Need]:
     """Return the needs, with the measure of work that the run has."""
     work = work_of(records)
     timed = work == "warm_seconds"
-    cheaply = "in little time" if timed else "with few evaluations (a method that counts none takes no part)"
+    cheaply = "least time" if timed else "fewest evaluations (methods that do not count them are left out)"
     right, right_8 = _within(position_end=1e-4), _within(position_end=1e-8)
     exact, there = _within(position_end=1e-8, energy_max=1e-13), _within(position_end=1.0)
     wanted = [
-        Need(f"a position right to 1e-4, {cheaply}", right, work),
-        Need(f"a position right to 1e-8, {cheaply}", right_8, work),
-        Need(f"position to 1e-8 and energy to 1e-13, {cheaply}", exact, work),
-        Need("the most accurate position at the end", there, "position_end", 10.0, ROUND_OFF),
-        Need("the most accurate phase at the end", there, "phase_end", 10.0, ROUND_OFF),
-        Need("the least energy error, position right to 1e-4", right, "energy_max", 10.0, ROUND_OFF),
-        Need("other invariants, position right to 1e-4", right, "invariants_max", 10.0, ROUND_OFF),
-        Need("an energy error bounded or as t^1/2", _without_drift, "energy_max", 10.0, ROUND_OFF),
-        Need("the way back to the start", _within(), "reversal", 10.0, ROUND_OFF),
-        Need("little memory", _within(), "peak_memory", 1.25),
+        Need(f"position error ≤ 1e-4, {cheaply}", right, work),
+        Need(f"position error ≤ 1e-8, {cheaply}", right_8, work),
+        Need(f"position error ≤ 1e-8 and energy error ≤ 1e-13, {cheaply}", exact, work),
+        Need("smallest position error at the end", there, "position_end", NEAR_ERROR, ROUND_OFF),
+        Need("smallest phase error at the end", there, "phase_end", NEAR_ERROR, ROUND_OFF),
+        Need("smallest energy error, with position error ≤ 1e-4", right, "energy_max", NEAR_ERROR, ROUND_OFF),
+        Need(
+            "smallest error of other invariants, with position error ≤ 1e-4",
+            right,
+            "invariants_max",
+            NEAR_ERROR,
+            ROUND_OFF,
+        ),
+        Need(
+            "smallest energy error among those bounded or growing as t^1/2",
+            _without_drift,
+            "energy_max",
+            NEAR_ERROR,
+            ROUND_OFF,
+        ),
+        Need("smallest time-reversal error", _within(), "reversal", NEAR_ERROR, ROUND_OFF),
+        Need("least memory", _within(), "peak_memory", NEAR_MEMORY),
     ]
     # seconds taken while other cases ran say nothing
-    soon = [Need("a first result soon: little to compile", right, "compile_seconds")] if timed else []
+    soon = [Need("shortest compilation", right, "compile_seconds")] if timed else []
     return [*wanted, *soon]
 
 

@@ -58,9 +58,9 @@ def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
         "Which integrator on which problem",
         ("problem", *families),
         [(problem, *map(_sign, row.values())) for problem, row in found.items()],
-        "● reached the end on its trajectory; ◑ in another place; ◎ compared with no reference; ◐ lost the "
-        "symmetry or the energy; ○ did not reach the end; – refused. "
-        "Numbers: how many of its settings reached the end, where not all did.",
+        "● reached the end on its trajectory; ◑ with a large position error; ◎ without a reference "
+        "solution; ◐ lost the symmetry or the energy; ○ did not reach the end; – refused. Numbers: how "
+        "many of its settings reached the end, where not all did.",
     )
     return made, reasons
 
@@ -110,13 +110,13 @@ def doubts(records: Sequence[Record]) -> list[str]:
         low, high = calibrations[len(calibrations) // 10], calibrations[-1 - len(calibrations) // 10]
         if high > STEADY * low:
             said.append(
-                f"The speed of the machine was not steady: a fixed computation took {high / low:.1f} times "
-                "as long at the slow end as at the fast end, the outermost tenths left out."
+                f"The speed of the machine was not steady: the calibration loop took {high / low:.1f} "
+                "times as long in its slowest tenth as in its fastest."
             )
     if not rounds and any(map(reached, records)):
         said.append(
-            "No times were taken: work is counted in steps and evaluations, and seconds of compilation are "
-            "those of cases that ran side by side."
+            "Nothing was timed: work is counted in steps and evaluations, and compile times are those of "
+            "cases that ran in parallel."
         )
     machines = {tuple(sorted((k, str(v)) for k, v in record.machine.items())) for record in records}
     if len(machines) > 1:
@@ -137,7 +137,7 @@ def disturbed(records: Sequence[Record]) -> list[str]:
         return []
     return [
         f"The times are disturbed: the machine had other work and left half of the visits less "
-        f"than {share:.0%} of a core. Ratios below 2 say nothing."
+        f"than {share:.0%} of a core. Ratios below 2 are not significant."
     ]
 
 

@@ -23,10 +23,10 @@ K = TypeVar("K")
 R = TypeVar("R")
 
 GROUPS = {
-    "on": "On the trajectory that was asked for",
-    "apart": "At the end in another place: a position error of 10 % or more, as chaos brings in time",
-    "uncompared": "At the end; no reference tells how far from the trajectory that was asked for",
-    "off": "On another trajectory: the symmetry or the energy was lost; position and time are void",
+    "on": "On the requested trajectory",
+    "apart": "At the end with a position error of 10 % or more, as chaotic motion causes eventually",
+    "uncompared": "At the end; without a reference solution, so that the position error is unknown",
+    "off": "On another trajectory: the symmetry or the energy was lost; position and time are excluded",
     "ended": "Did not reach the end",
 }
 
@@ -223,7 +223,7 @@ def _remark(record: Record) -> str:
     if reason := reason_of(record):
         parts.append(reason)
     elif (guard := result.metrics.get("guard_max")) is not None and guard.value:
-        parts.append(f"the symmetry is not exact but off by {guard.value:.1e}, too little to matter yet")
+        parts.append(f"the symmetry is violated by {guard.value:.1e}, too little to change the trajectory")
     parts += result.warnings
     if record.case.note:
         parts.append(record.case.note)

@@ -51,7 +51,7 @@ def title_of(entry: ProblemEntry) -> str:
 
 
 def among(records: Sequence[Record], who: str) -> list[Record]:
-    """Return the records of a family or of one setting; of ours for ``""``."""
+    """Return the records of a family or of one setting; of HBVM and Gauss for ``""``."""
     if not who:
         return [one for one in records if one.role == "ours"]
     return [one for one in records if who in (family_of(one), one.case.method)]
@@ -100,7 +100,7 @@ def by_round(record: Record) -> dict[int, float]:
 
 
 def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Comparison:
-    """Compare a peer at its defaults with the fastest of ours that is as accurate, in these errors.
+    """Compare a peer at its defaults with the fastest of HBVM and Gauss that is as accurate, in these errors.
 
     Its defaults are what is called so, or has no arguments.
     """
@@ -115,6 +115,6 @@ def untuned(records: Sequence[Record], family: str, errors: Sequence[str]) -> Co
 
 
 def no_worse(theirs: Record, factors: Mapping[str, float]) -> dict[str, float]:
-    """Return the errors that ours may have at most where they are to be so many times a peer's."""
+    """Return the errors that HBVM and Gauss may have at most where they are to be so many times a peer's."""
     found = {key: (factor, number(theirs, key)) for key, factor in factors.items()}
     return {key: -1.0 if error is None else factor * error for key, (factor, error) in found.items()}

@@ -54,20 +54,24 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
         panel_legend(axes, members, markers=True, notes=notes)
     starts = max(law.starts for law in laws.values())
     over = (
-        f"{starts} starts (the problem's own, the others changed in their last digits)"
+        f"{starts} initial conditions (the problem's, and others changed in their last digits)"
         if starts > 1
-        else f"windows of time, from one start; the law is fitted from a {EARLIEST}th of the span on, when "
-        "an oscillation has shown its size"
+        else (
+            f"time windows, from one initial condition; the growth is fitted from a {EARLIEST}th of the "
+            "integration interval on, when an oscillation has shown its size"
+        )
     )
     return picture(
         figure,
         "drift",
-        "Drift of the energy and its law",
-        f"Markers: root mean square of the error over {over}. Lines: the law that was fitted, "
-        "a floor with a growth; its power of t stands with its 95 % interval. Bounded or t^1/2 is the best "
-        "there is; a law is what these samples show, not a proof."
+        "Growth of the energy error",
+        f"Markers: root mean square of the error over {over}. Lines: the fitted growth, a constant floor "
+        "with a power of t, printed with its 95 % interval. Rounding errors without bias grow as t^1/2. The "
+        "fit describes these samples and proves nothing beyond them."
         + (f" {drift.told(starts)}." if starts > 1 else ""),
-        "Law of each case. " + "; ".join(f"{c.record.case.method}: {said[c.record.id]}" for c in shown) + ".",
+        "Growth of each case. "
+        + "; ".join(f"{c.record.case.method}: {said[c.record.id]}" for c in shown)
+        + ".",
         Plot([Panel("", Axis("time", log=True), Axis(label, log=True), traces)]),
     )
 

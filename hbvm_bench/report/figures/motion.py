@@ -62,9 +62,9 @@ def still(cases: Sequence[Drawn], title: str) -> Picture | None:
         figure,
         "motion",
         title,
-        "The two primaries run round each other in the plane, the planetoid belongs on the axis through "
-        "their barycentre. The still shows the last revolution that each run reached. Between two samples, "
-        "half a unit of time apart, the moving view follows a smooth curve.",
+        "The two primaries move around each other in the plane; the planetoid stays on the axis through "
+        "their barycentre in the exact solution. The picture shows the last revolution that each run "
+        "reached. The animation interpolates between samples half a unit of time apart.",
         f"Where the planetoid is at the end. {said}.",
         Plot([Panel("", Axis("time"), Axis("z of the planetoid"), traces)]),
     )

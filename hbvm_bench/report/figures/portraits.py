@@ -32,7 +32,7 @@ def portrait(problem: Problem, cases: Sequence[Drawn]) -> Picture | None:
         "phase-portrait",
         "Phase portrait",
         "All samples of each case."
-        + " The true motion stays on one closed curve; a spread across it is an error of the energy."
+        + " The exact solution stays on one closed curve; a spread across it is an error of the energy."
         * ("energy" in problem.system.invariants),
         ("q", "p"),
     )

@@ -101,7 +101,7 @@ def options(record: Record) -> str:
 def panels(records: Sequence[Record]) -> list[tuple[str, list[Record]]]:
     """Divide cases into panels: by library, and by method where a library has more than `IN_A_PANEL`."""
     made: list[tuple[str, list[Record]]] = []
-    libraries = by(lambda record: "ours" if record.role == "ours" else record.library, records)
+    libraries = by(lambda record: "hbvm-bench" if record.role == "ours" else record.library, records)
     for library, members in libraries.items():
         names = by_family(members)
         if len(members) <= IN_A_PANEL:

@@ -50,8 +50,8 @@ def axis_motion(problem: Problem, cases: Sequence[Drawn], reference: Reference |
         figure,
         "axis-motion",
         f"The planetoid on the axis, the last {LAST:.0f} time units",
-        "Rings: the stored 128-bit reference. A line that is missing has left the picture: its planetoid "
-        "is far away. A curve that misses the rings conserves, at best, the energy of another motion.",
+        "Rings: the stored 128-bit reference. A missing line has left the axes: its planetoid is far away. "
+        "A curve that misses the rings has a wrong position, whatever its energy error.",
         f"z at t = {problem.t_end:g}. {ends}.",
         Plot([Panel("", Axis("time"), Axis("z of the planetoid"), [*curves, *truth])]),
     )
@@ -91,10 +91,10 @@ def primaries(problem: Problem, cases: Sequence[Drawn], reference: Reference | N
         figure,
         "primaries",
         "The paths of the primaries in their plane",
-        f"Grey: the first revolution of case {best.look.number}; the true orbits keep their place. "
+        f"Grey: the first revolution of case {best.look.number}; the exact orbits do not turn. "
         "Colour: the last three revolutions that the run reached. Grid lines at −2.5, 0 and 2.5.",
-        "An orbit turned against the grey one is the sham rotation of a method whose step is too large "
-        "for the direction of the apsides, whatever its energy says.",
+        "An orbit turned against the grey one shows spurious precession: the step is too large for the "
+        "direction of the apsides, whatever the energy error.",
         Plot([Panel(f"primary {i + 1}", Axis("x"), Axis("y"), curves[i]) for i in (0, 1)], "paths"),
     )
 
@@ -127,8 +127,8 @@ def step_sizes(cases: Sequence[Drawn]) -> Picture | None:
     return picture(
         figure,
         "step-sizes",
-        "Step sizes of what stalled",
-        "The run was ended by a watchdog that saw the time stand still, not by a time limit.",
+        "Step sizes of stalled runs",
+        "The watchdog ended the run because the time no longer advanced; no time limit was reached.",
         "; ".join(f"{c.record.case.method}: {c.record.result.reason}" for c in shown) + ".",
         Plot(
             [

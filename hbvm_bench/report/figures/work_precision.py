@@ -34,7 +34,7 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
     figure.subplots_adjust(left=0.06, right=0.99, top=0.94, bottom=0.11, wspace=0.2)
     left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.95])
     times = [_number(case.record, "warm_seconds") for case in shown]
-    plotted, seconds_ = [], "seconds for the whole span (median)"
+    plotted, seconds_ = [], "seconds per integration (median)"
     for axes, key in ((left, keys[0]), (right, keys[1])):
         values = [_number(case.record, key) for case in shown]
         floor = 10.0 ** math.floor(math.log10(min(value for value in values if value > 0)))
@@ -69,10 +69,9 @@ def work_precision(cases: Sequence[Drawn]) -> Picture | None:
         "work-precision",
         "Work and precision",
         "Lower left is better. The same cases in both panels: energy is never shown without position. "
-        f"{left_out} {'case' if left_out == 1 else 'cases'} of another trajectory or that did not reach the "
-        "end are not in this picture; "
-        "points beyond the upper edge are drawn on it. Lines join the settings of a method that none of its "
-        "others beats.",
+        f"{left_out} {'case' if left_out == 1 else 'cases'} on another trajectory or ended early are not "
+        "shown; points beyond the upper edge are drawn on it. A line is the Pareto front of a method's "
+        "settings.",
         f"{len(shown)} cases. The smallest position error, {_number(best.record, 'position_end'):.1e}, "
         f"is that of {best.record.case.method}.",
         Plot(plotted, "points"),
@@ -90,7 +89,7 @@ def _envelopes(axes: Axes, cases: Sequence[Drawn], spots: Sequence[tuple[float, 
         x, y = np.array(best).T
         look = members[0][1].look
         axes.plot(x, y, color=look.light, linewidth=0.8, zorder=1)
-        made.append(Trace(look.number, f"best of {name}", x, y, "law", "no setting is better in both"))
+        made.append(Trace(look.number, f"best of {name}", x, y, "law", "on the Pareto front"))
     return made
 
 

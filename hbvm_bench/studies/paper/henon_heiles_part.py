@@ -1,4 +1,4 @@
-"""The Henon-Heiles experiment in the report: the paper's four figures, its claims, who escapes from where."""
+"""The Henon-Heiles experiment in the report: the four figures, the claims, which orbits escape."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -58,9 +58,9 @@ def _blocks(results: Results) -> list[Maker]:
         ("Figure 3", lambda: hbvm_plane(results["hbvm"])),
         ("Figure 4", lambda: hamiltonian(results["gauss"][1], results["hbvm"])),
         ("the escape times", lambda: fates(results.each("escapes", METHODS))),
-        ("who escapes from where", lambda: maps(_maps(results))),
-        ("the table of steps", lambda: _step_table(results.each("steps", METHODS))),
-        ("the other integrators", lambda: _others(results)),
+        ("which initial conditions escape", lambda: maps(_maps(results))),
+        ("step sizes", lambda: _step_table(results.each("steps", METHODS))),
+        ("other integrators", lambda: _others(results)),
     ]
 
 
@@ -121,7 +121,7 @@ def _claims(results: Results) -> list[Claim]:
             "in the text",
             f"of {experiment.STEP_STARTS} neighbouring starts none leaves for any h tried up to "
             f"{largest['hbvm']:g} with HBVM(4,2), up to {largest['gauss']:g} with Gauss. Inside is not true: "
-            f"with h = 1 either orbit agrees with the true one up to t ≈ {agrees:.0f} only",
+            f"with h = 1 either orbit agrees with the reference solution up to t ≈ {agrees:.0f} only",
             "holds" if largest["hbvm"] > largest["gauss"] else "no",
         ),
     ]
@@ -148,13 +148,13 @@ def _step_table(steps: Mapping[str, Sequence[StepRow]]) -> Table:
         return str(len(gone)), f"{gone[0]:.0f}" if gone else "–", f"{row.agrees:g}"
 
     return Table(
-        "The step and who stays",
+        "Step size and escape",
         ("h", *("leave", "the first at", "agrees until t") * 2),
         [(f"{a.h:g}", *cells(a), *cells(b)) for a, b in zip(steps["gauss"], steps["hbvm"], strict=True)],
-        f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {T_END:,.0f}; "
-        "a step whose equations find no solution counts as leaving. Agrees: time up to which the first of "
-        f"them is within {experiment.AGREES:g} of the true orbit. Staying inside is what the energy gives; "
-        "a true orbit takes a smaller step under either method.",
+        f"{experiment.STEP_STARTS} neighbouring starts, followed to t = {T_END:,.0f}; a step whose equations "
+        "find no solution counts as leaving. Agrees: time up to which the first of them is within "
+        f"{experiment.AGREES:g} of the reference solution. Conserving the energy keeps the orbit inside; an "
+        "accurate orbit needs a smaller step with either method.",
         words=(),
         key="henon-heiles-steps",
         groups=(("", 1), ("Gauss, s = 2", 3), ("HBVM(4,2)", 3)),
@@ -194,8 +194,9 @@ def level_curves(figure: Figure, trace: Array) -> Said:
     say(axes, "O", (0, 0), (5, 4), fontsize=9)
     _bounds(axes, 1.25, -0.75)
     return (
-        "The level 1/6 is the triangle of the three saddles. The true orbit from our start, H₀ = 1/6 − "
-        f"{GAP:g}, to t = 300: it comes close to the sides, where a small error of the energy lets it out.",
+        "The level 1/6 is the triangle of the three saddles. The reference solution from this initial "
+        f"condition, H₀ = 1/6 − {GAP:g}, to t = 300: it comes close to the sides, where a small error of the "
+        "energy lets it out.",
         "The orbit fills the triangle and stays inside.",
     )
 
@@ -259,7 +260,7 @@ def hamiltonian(figure: Figure, gauss: Orbit, hbvm: Orbit) -> Said:
     )
 
 
-@drawn("henon-heiles-fates", "Beyond the paper · the escape time is chance", WIDTH * 0.66, 3.2)
+@drawn("henon-heiles-fates", "Beyond the paper · the escape time is random", WIDTH * 0.66, 3.2)
 def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     """Draw how long neighbouring starts stay: the distribution behind the paper's one number."""
     axes = figure.subplots()
@@ -282,7 +283,7 @@ def fates(figure: Figure, times: Mapping[str, Sequence[float | None]]) -> Said:
     )
 
 
-@drawn("henon-heiles-map", "Beyond the paper · who escapes from where", WIDTH, 3.6, values=True)
+@drawn("henon-heiles-map", "Beyond the paper · which initial conditions escape", WIDTH, 3.6, values=True)
 def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     """Escape times over starts and energies, both methods."""
     panels = figure.subplots(1, 2, sharey=True)
@@ -309,8 +310,8 @@ def maps(figure: Figure, found: Mapping[str, Array]) -> Said:
     inside = gone["gauss"][np.asarray(GAPS) >= 4e-3]
     return (
         f"Orbits from (0, 1/2) in every direction, with energies from 1/6 − {number(max(GAPS))} (bottom) to "
-        f"1/6 − {number(min(GAPS))} (top), followed to t = {experiment.MAP_END:,.0f}. Under Gauss the "
-        "triangle leaks where 1/6 is nearer than the error of H; the blank cells among the coloured ones are "
+        f"1/6 − {number(min(GAPS))} (top), followed to t = {experiment.MAP_END:,.0f}. Under Gauss orbits "
+        "escape where 1/6 − H₀ is below the error of H; the blank cells among the coloured ones are "
         "orbits that have not left yet, or regular ones that never will. Under HBVM nothing leaves.",
         f"Under Gauss {gone['gauss'].sum()} of {gone['gauss'].size} orbits leave, {inside.sum()} of "
         f"{inside.size} of those with 1/6 − H₀ ≥ 4e-3; under HBVM {gone['hbvm'].sum()}.",

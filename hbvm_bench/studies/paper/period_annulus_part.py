@@ -37,10 +37,10 @@ PROBLEM = (
     "exceeds 1. The exact edge is at c* = 0.37570559292634522367."
 )
 LONG_SPAN = (
-    "Why the HBVM entries are a few units in the last place off over the span of 2500, and exact "
-    "over a span of 100: an orbit within 1e-15 of the loop needs about 33 units of time for a "
+    "Why the HBVM entries are a few units in the last place off over an interval of 2500, and exact over "
+    "an interval of 100: an orbit within 1e-15 of the loop needs about 33 units of time for a "
     "revolution, most of it at the saddle, and every revolution adds its round-off to H. Once H has "
-    "risen above H*, the orbit departs. The paper's own footnote says that HBVM needs no long span."
+    "risen above H*, the orbit departs. The paper's own footnote says that HBVM needs no long interval."
 )
 DIGITS = (
     "Why the Gauss entries agree with the paper within a factor and not in their digits: under "
@@ -72,10 +72,10 @@ def _blocks(results: Results) -> list[Maker]:
     return [
         ("the problem", lambda: PROBLEM),
         ("Table 1", lambda: _table(entries("cell"))),
-        ("the long span", lambda: LONG_SPAN),
-        ("what limits the long span", lambda: _limit_table(entries("cell"), entries("limit"))),
+        ("the long interval", lambda: LONG_SPAN),
+        ("the limit of the long interval", lambda: _limit_table(entries("cell"), entries("limit"))),
         ("the digits", lambda: DIGITS),
-        ("how much is chance", lambda: _spread_table(entries("spread"))),
+        ("the random part", lambda: _spread_table(entries("spread"))),
         ("Figure 1", level_curves),
         ("Figure 2", lambda: closeup(results["drawn"])),
         ("the period", lambda: periods(results["periods"])),
@@ -127,7 +127,7 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "HBVM finds the edge to machine precision, whatever order and step",
             "errors in H ≤ 1.22e-15",
-            f"errors in H ≤ {number(long)} over the span of 2500, ≤ {number(short)} over 100",
+            f"errors in H ≤ {number(long)} over the interval of 2500, ≤ {number(short)} over 100",
             "holds" if long <= 1e-14 else "partly",
         ),
         Claim(
@@ -141,7 +141,7 @@ def _claims(results: Results) -> list[Claim]:
         Claim(
             "HBVM needs no long integration",
             "footnote",
-            f"with a span of 100 its worst entry is off by {number(short)}, better than with "
+            f"over an interval of 100 its worst entry is off by {number(short)}, better than with "
             "2500. (Gauss looks better too, because many of its late departures are not seen.)",
             "holds" if short <= long else "no",
         ),
@@ -171,7 +171,7 @@ def _table(cells: Mapping[Key, Mapping[str, Edge]]) -> Table:
     pair = ("c, paper", "c, here", "error, paper", "error, here")
     return Table(
         "Table 1 · the edge found by bisection",
-        ("h", "s", "k", *pair, "ratio", *pair, "error, span 100"),
+        ("h", "s", "k", *pair, "ratio", *pair, "error, interval 100"),
         rows,
         "The point is (0, c); the error is |H(0, c) − H*|/H*, evaluated in double-double; ratio: of "
         "the error here to the printed one.",
@@ -190,15 +190,15 @@ def _limit_table(cells: Mapping[Key, Mapping[str, Edge]], limits: Mapping[Key, t
     values = energy(np.stack([np.zeros(points.size), points], axis=1))
     spacing = float((values[-1] - values[0]) / (points.size - 1) / H_STAR)
     return Table(
-        "What limits the long span",
+        "The limit of the long interval",
         ("h", "s", "k", "error in H", "departs at", "H has risen by", "error in H"),
         rows,
-        "The nearest start that departs: when, and by how many H* round-off has raised its H up to "
-        "then. That rise is the error of the entry. Over a span of 100 there are three revolutions at most, "
+        "The nearest start that departs: when, and by how many H* round-off has raised its H up to then. "
+        "That rise is the error of the entry. Over an interval of 100 there are three revolutions at most, "
         f"and what is left is the spacing of the doubles at c*, which is {number(spacing)} in H/H*.",
         words=(),
         key="table-1-limit",
-        groups=(("", 3), ("HBVM(k, s), span 2500", 3), ("span 100", 1)),
+        groups=(("", 3), ("HBVM(k, s), interval 2500", 3), ("interval 100", 1)),
     )
 
 
@@ -209,7 +209,7 @@ def _spread_table(spreads: Mapping[Key, Sequence[float]]) -> Table:
         found = (printed, errors[0], min(errors), middle, max(errors))
         rows.append((f"{h:g}", str(s), *(number(one, 3) for one in found), f"{middle / printed:.2f}"))
     return Table(
-        "How much of a Gauss entry is chance",
+        "The random part of a Gauss entry",
         ("h", "s", "paper", "Q = (0, 1)", "smallest", "median", "largest", "median/paper"),
         rows,
         "The same bisection from ends Q = (0, 1), (0, 1 + 1/64), (0, 1 + 2/64), …, which visits "
@@ -226,7 +226,7 @@ def _others(results: Results) -> Table:
         results.each("other", others.PERIOD_ANNULUS),
         {"c": ("c", POINT), "error in H": ("error", partial(number, digits=3))},
         "The same bisection with other integrators",
-        f"Judged over a span of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
+        f"Judged over an interval of {experiment.SHORT_SPAN:g}; c* = {C_STAR!r}.",
     )
 
 

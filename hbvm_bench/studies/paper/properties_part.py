@@ -68,7 +68,7 @@ def _claims(results: Results) -> list[Claim]:
     scans: list[tuple[list[Row], int]] = [(results["cubic"], 3), (results["quintic"], 5)]
     kept = max(_kept(rows, nu) for rows, nu in scans)
     below = min(error for rows, nu in scans for s, k, error in rows if 2 * k < nu * s and s <= 3)
-    same = "; the same doubles come out" if results["same bits"] else ""
+    same = "; the results are bitwise identical" if results["same bits"] else ""
     ranks_right = results["ranks"] == [s for _, s in PAIRS]
     turns = [count for _, count in results["iterations"]]
     met = max(value for k, s, value in results["extended"] if 2 * k >= 5 * s)
@@ -168,8 +168,8 @@ def threshold(figure: Figure, cubic: Sequence[Row], quintic: Sequence[Row]) -> S
     left.legend(loc="upper right", ncols=1)
     return (
         "Largest relative error of H over [0, 50] with h = 1. Filled: k ≥ νs/2, where the paper "
-        "promises exact conservation. The dips to round-off just below it, at high s, are errors too "
-        "small to see, not conservation.",
+        "promises exact conservation. The dips to round-off just below it, at high s, are errors below "
+        "round-off, not conservation.",
         f"Largest error for k ≥ νs/2: {_kept(cubic, 3):.1e} for degree 3, {_kept(quintic, 5):.1e} for "
         "degree 5.",
     )

@@ -23,9 +23,7 @@ LARGEST = 0.6  # step whose rotation is drawn
 Scan = Sequence[tuple[int, float, float | None]]  # k, energy error, and when the planetoid is lost
 
 
-@drawn(
-    "sitnikov-nodes", "Beyond the paper · how many nodes make the conservation practical", WIDTH * 0.62, 3.4
-)
+@drawn("sitnikov-nodes", "Beyond the paper · nodes needed for conservation to round-off", WIDTH * 0.62, 3.4)
 def by_nodes(figure: Figure, scans: Mapping[float, Scan]) -> Said:
     """Draw the energy error of HBVM(k, 2) against k: practical conservation."""
     axes = figure.subplots()
@@ -46,8 +44,8 @@ def by_nodes(figure: Figure, scans: Mapping[float, Scan]) -> Said:
     axes.legend(handles=[*handles, lost_ones], loc="upper right")
     return (
         f"HBVM(k,{DEGREE}) on Sitnikov's problem over [0, {T_END:g}]. The error falls by a constant "
-        "factor per node down to round-off; k = 2 is the Gauss method. The first to keep the energy to "
-        f"1e-13: {' and '.join(enough)}; the paper takes k = 18 with h = 0.5.",
+        "factor per node down to round-off; k = 2 is the Gauss method. The first with an energy error of "
+        f"at most 1e-13: {' and '.join(enough)}; the paper takes k = 18 with h = 0.5.",
         "; ".join(
             f"h = {h:g}: {rows[0][1]:.0e} for k = {rows[0][0]}, {rows[-1][1]:.0e} for k = {rows[-1][0]}"
             for h, rows in scans.items()
@@ -55,9 +53,9 @@ def by_nodes(figure: Figure, scans: Mapping[float, Scan]) -> Said:
     )
 
 
-@drawn("sitnikov-steps", "Beyond the paper · what the step costs", WIDTH, 3.7)
+@drawn("sitnikov-steps", "Beyond the paper · the effect of the step size", WIDTH, 3.7)
 def by_step(figure: Figure, rows: Sequence[StepRow]) -> Said:
-    """Draw the sham rotation against h, and the time at which the planetoid is lost."""
+    """Draw spurious precession against h, and the time at which the planetoid is lost."""
     left, right = figure.subplots(1, 2)
     small = [row for row in rows if row.h <= LARGEST]
     looks: dict[str, Any] = {
@@ -82,7 +80,9 @@ def by_step(figure: Figure, rows: Sequence[StepRow]) -> Said:
     left.set_xticks([], minor=True)
     low = int(np.floor(np.log10(min(abs(r.turn) for r in small))))
     log_axis(left, "y", max(low - 1, -9), 1)
-    left.set(xlabel="step h", ylabel="degrees per revolution, less the true rate", title="the sham rotation")
+    left.set(
+        xlabel="step h", ylabel="degrees per revolution, less the exact rate", title="spurious precession"
+    )
     left.legend(loc="lower right")
     _losses(right, [r for r in rows if r.s == 2])
     rate = {r.h: r.turn for r in rows if (r.family, r.s) == ("hbvm", 2)}
@@ -108,7 +108,7 @@ def _losses(axes: Axes, rows: Sequence[StepRow]) -> None:
     axes.set_xticks(range(len(steps)), labels=[FRACTIONS.get(h, f"{h:g}") for h in steps], rotation=55)
     axes.grid(visible=False, axis="x")
     axes.set(ylim=(0, T_END * 1.02), xlabel="step h", ylabel="time until the planetoid is lost")
-    axes.set_title("who keeps the planetoid to t = 1500")
+    axes.set_title("planetoid stays to t = 1500")
     handles = [
         Line2D([], [], marker=marker, linestyle="", color=colour, label=label)
         for marker, colour, label in (
@@ -131,17 +131,17 @@ def step_table(rows: Sequence[StepRow]) -> Table:
     heads = (
         "planetoid lost at",
         "energy error",
-        "sham rotation, degrees per rev.",
+        "spurious precession, degrees per rev.",
         "error of the period",
         "z at 1500 off by",
     )
     return Table(
-        "The step and its price",
+        "Step size and errors",
         ("s", "h", *("Gauss", "HBVM") * len(heads)),
         lines,
-        "HBVM with k = 18. Largest relative error of H; rotation of the ellipses less the true one; "
-        "relative error of the primaries' period; |z − true z| at the end. A planetoid that is lost has no "
-        "such numbers.",
+        "HBVM with k = 18. Largest relative error of H; precession of the ellipses less the exact one; "
+        "relative error of the primaries' period; |z − reference z| at the end. A planetoid that is lost "
+        "has no such numbers.",
         words=(),
         key="sitnikov-step-table",
         groups=(("", 2), *((head, 2) for head in heads)),
@@ -154,7 +154,7 @@ def _cells(row: StepRow) -> tuple[str, ...]:
     return (fate, number(row.energy), *rates)
 
 
-@drawn("sitnikov-truth", "Beyond the paper · against the true trajectory", WIDTH, 3.4)
+@drawn("sitnikov-truth", "Beyond the paper · position error", WIDTH, 3.4)
 def truth_compared(figure: Figure, runs: Sequence[tuple[str, str, Array, Array]]) -> Said:
     """Draw |z - true z| over time for several runs: (label, family, t, error)."""
     axes = figure.subplots()
@@ -163,16 +163,16 @@ def truth_compared(figure: Figure, runs: Sequence[tuple[str, str, Array, Array]]
         look = {"color": COLOURS[family], "linestyle": next(unused[family]), "linewidth": 1.2}
         axes.plot(t[1:], np.maximum(error[1:], 1e-16), label=label, marker="o", markersize=2.5, **look)
     log_axis(axes, "y", -13, 1, most=7)
-    axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − true z|")
+    axes.set(xlim=(0, T_END), xlabel="time", ylabel="|z − reference z|")
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return (
-        "Conserving the energy is not accuracy: all HBVM runs here keep the energy to 1e-13. The error "
-        "of the height at the times of the stored 128-bit reference.",
+        "A small energy error does not imply a small position error: all HBVM runs here conserve the energy "
+        "to 1e-13. The error of the height at the times of the stored 128-bit reference.",
         "; ".join(f"{label}: {error[-1]:.2e} at the end" for label, _, _, error in runs),
     )
 
 
-@drawn("sitnikov-chaos", "Beyond the paper · is it chaos?", WIDTH, 4.4)
+@drawn("sitnikov-chaos", "Beyond the paper · chaotic or regular", WIDTH, 4.4)
 def chaos(
     figure: Figure, rows: Sequence[Growth], points: Sequence[tuple[float, Array]], critical: float
 ) -> Said:
@@ -215,7 +215,13 @@ def chaos(
     )
 
 
-@drawn("sitnikov-territory", "Beyond the paper · who stays on the axis", WIDTH * 0.72, 4.0, values=True)
+@drawn(
+    "sitnikov-territory",
+    "Beyond the paper · planetoids that stay on the axis",
+    WIDTH * 0.72,
+    4.0,
+    values=True,
+)
 def territory(figure: Figure, left_after: Array) -> Said:
     """Where planetoids stay: revolutions until they leave, over eccentricity and speed."""
     es, speeds, turns = axis_motion.MAP_ECCENTRICITIES, axis_motion.MAP_SPEEDS, axis_motion.MAP_TURNS
@@ -232,8 +238,8 @@ def territory(figure: Figure, left_after: Array) -> Said:
     gone = np.flatnonzero(~np.isnan(left_after[nearest]))
     edge = speeds[gone[0]] if gone.size else math.nan
     return (
-        "For each eccentricity of the primaries and each speed at the start: how long the planetoid "
-        "stays, on the axis and without rounding's help or harm. The edge of the blank region is the "
+        "For each eccentricity of the primaries and each speed at the start: how long the planetoid stays, "
+        "with its motion confined to the axis exactly. The edge of the blank region is the "
         "end of regular motion; the paper's run lies inside it.",
         f"At e = {es[nearest]:g} the slowest planetoid that leaves has speed {edge:.3g}.",
     )

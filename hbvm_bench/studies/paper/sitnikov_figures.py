@@ -19,7 +19,7 @@ SHOWN = 350.0  # the span of time that the paper shows z(t) on
 REACH = 3.2  # of the drawings of the primaries' plane
 
 
-@drawn("sitnikov-1", "Figure 1 · the configuration and the true motion", WIDTH, 4.0)
+@drawn("sitnikov-1", "Figure 1 · the configuration and the reference solution", WIDTH, 4.0)
 def configuration(figure: Figure, truth: Orbit) -> Said:
     """sit_fig1: the three bodies, and the true z(t)."""
     grid = figure.add_gridspec(2, 2, width_ratios=[0.8, 1.2])
@@ -28,7 +28,7 @@ def configuration(figure: Figure, truth: Orbit) -> Said:
         axes = figure.add_subplot(grid[row, 1])
         shown = truth.t <= end
         axes.plot(truth.t[shown], truth.z[shown], color=INK, linewidth=width)
-        axes.set(xlim=(0, end), ylim=(-2, 2), ylabel="z", title=f"the planetoid's true height, t ≤ {end:g}")
+        axes.set(xlim=(0, end), ylim=(-2, 2), ylabel="z", title=f"the planetoid's height, t ≤ {end:g}")
         axes.set_xlabel("time" if row else "")
     return (
         "Left: two equal masses on ellipses of eccentricity 0.75, a planetoid of mass 1e-5 on the axis "
@@ -60,8 +60,8 @@ def stays(figure: Figure, run: Orbit, truth: Orbit, ellipses: Sequence[Array]) -
         left.annotate(str(number), (1.11 * x[far], 1.11 * y[far]), **look)
     return (
         "Left: the primaries at every step, and one of them in its 1st, 16th and 31st revolution as a line: "
-        "the ellipses turn, the paper's sham rotation. Right: the planetoid on the paper's range of time, "
-        "over the true motion in grey.",
+        "the ellipses turn, a spurious precession (the paper's “sham rotation”). Right: the planetoid on "
+        "the paper's range of time, over the reference solution in grey.",
         _reached(run),
     )
 
@@ -86,7 +86,7 @@ def _trajectories(figure: Figure, run: Orbit, truth: Orbit, colour: str, end: fl
     left.set_title(f"primaries, every step to t = {run.t[-1]:g}")
     shown, past = run.t <= end, truth.t <= end
     if run.lost is None:
-        right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="true motion")
+        right.plot(truth.t[past], truth.z[past], color=TRUTH, linewidth=2.2, label="reference solution")
         right.set(ylim=(-2, 2), title="the planetoid on the axis")
     else:
         right.set_title(f"{run.method}: the planetoid on the axis", color=INK)
@@ -125,8 +125,8 @@ def distances(figure: Figure, runs: Mapping[str, Orbit]) -> Said:
     top = max(6.0, 1.05 * float(runs["gauss"].distance.max()))
     panels[0].set(ylabel="distance of the primaries", ylim=(0, top))
     return (
-        "Dashed: the true apocentre distance, 5. HBVM keeps it because the energy fixes the length of "
-        "the axis; Gauss does not.",
+        "Dashed: the exact apocentre distance, 5. HBVM preserves it because the energy determines the "
+        "semi-major axis; Gauss does not.",
         "; ".join(summary),
     )
 
@@ -146,10 +146,10 @@ def errors(figure: Figure, runs: Mapping[str, Orbit]) -> Said:
         axes.set(xlim=(0, T_END), xlabel="time", title=title)
     left.set_ylabel("relative error")
     figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    both = "; the line integral method, which the paper does not have, keeps both" if "both" in runs else ""
+    both = "; the line integral method, which is not in the paper, conserves both" if "both" in runs else ""
     return (
-        "Largest value in each of 300 spans of time; evaluated in double-double. Each of the paper's "
-        f"methods keeps one of the two laws and not the other{both}.",
+        "Largest value in each of 300 equal time intervals; evaluated in double-double. Each of the "
+        f"paper's methods conserves one of the two quantities and not the other{both}.",
         "; ".join(
             f"{run.method}: energy {run.energy.max():.1e}, angular momentum {run.momentum.max():.1e}"
             for run in shown.values()

@@ -61,15 +61,15 @@ def _blocks(results: Results) -> list[Maker]:
         ("Figure 3", lambda: figures.stays(run("hbvm"), run("fine"), results["ellipses"])),
         ("Figure 4", lambda: figures.distances(results["orbits"])),
         ("Figure 5", lambda: figures.errors(results["orbits"])),
-        ("both laws at once", lambda: _both_laws(results["orbits"])),
+        ("energy and angular momentum together", lambda: _both_laws(results["orbits"])),
         ("nodes", lambda: beyond.by_nodes(results.each("nodes", NODE_STEPS))),
         ("steps", lambda: beyond.by_step(_steps(results))),
-        ("the table of steps", lambda: beyond.step_table(_steps(results))),
-        ("the true trajectory", lambda: beyond.truth_compared(results["truth"])),
-        ("what is right and what is wrong", lambda: _plainly(results)),
-        ("is it chaos?", lambda: beyond.chaos(results["growth"], results["section"], CRITICAL)),
-        ("who stays", lambda: beyond.territory(np.stack(results["stays"]))),
-        ("the other integrators", lambda: _others(results)),
+        ("step sizes", lambda: beyond.step_table(_steps(results))),
+        ("position error", lambda: beyond.truth_compared(results["truth"])),
+        ("errors of HBVM(18,2)", lambda: _plainly(results)),
+        ("chaotic or regular", lambda: beyond.chaos(results["growth"], results["section"], CRITICAL)),
+        ("planetoids that stay", lambda: beyond.territory(np.stack(results["stays"]))),
+        ("other integrators", lambda: _others(results)),
     ]
 
 
@@ -94,10 +94,10 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
     early = float(apart[hbvm.t <= figures.SHOWN].max())
     spans = {family: runs[family].apocentres for family in ("gauss", "hbvm")}
     axis, plane = max(hbvm.off_axis, gauss.off_axis), max(hbvm.plane, gauss.plane)
-    exact = "exactly 0, because rounding keeps the symmetry" if axis == 0 else number(axis)
+    exact = "exactly 0, because rounding preserves the symmetry" if axis == 0 else number(axis)
     moves = (
-        f", that of the true motion by {number(truth.plane)}: the planetoid's momentum is not balanced, "
-        "the barycentre moves"
+        f", that of the reference solution by {number(truth.plane)}: the planetoid's momentum is not "
+        "balanced, the barycentre moves"
     )
     like = oscillates(hbvm.z, truth.z, early)
     return [
@@ -252,10 +252,11 @@ def _both_laws(runs: Mapping[str, Orbit]) -> str | None:
     run, off = runs["both"], float(abs(runs["both"].z[-1] - runs["truth"].z[-1]))
     axis = "exactly on the axis" if run.off_axis == 0 else f"{number(run.off_axis)} off the axis"
     return (
-        f"Beyond the paper, both laws at once. `{run.method}` corrects the polynomial so that two line "
-        f"integrals vanish: it keeps the energy to {number(run.energy.max())} and the angular momentum to "
-        f"{number(run.momentum.max())} at the paper's step, with the planetoid {axis} and within |z| ≤ "
-        f"{np.abs(run.z).max():.4f}. That, too, is not accuracy: its z at t = 1500 is off by {off:.2f}."
+        f"Beyond the paper: energy and angular momentum together. `{run.method}` corrects the polynomial so "
+        f"that two line integrals vanish: it conserves the energy to {number(run.energy.max())} and the "
+        f"angular momentum to {number(run.momentum.max())} at the paper's step, with the planetoid {axis} "
+        f"and within |z| ≤ {np.abs(run.z).max():.4f}. Its position is nevertheless inaccurate: the error of "
+        f"z at t = 1500 is {off:.2f}."
     )
 
 
@@ -292,9 +293,9 @@ def _others(results: Results) -> Table:
             "evaluations": ("evaluations", "{:,.0f}".format),
         },
         "The same run with other integrators",
-        "One setting per method, chosen by us for accuracy. Evaluations: of the vector field, where the "
-        "library counts them. `hbvm-bench run sitnikov` has all settings, with times. Off the axis the "
-        "trajectory is another one, and its other numbers say nothing.",
+        "One setting per method, chosen for accuracy by the authors of this bench. Evaluations: of the "
+        "vector field, where the library counts them. `hbvm-bench run sitnikov` has all settings, with "
+        "times. Off the axis the trajectory is another one, and its other numbers say nothing.",
     )
 
 
@@ -311,7 +312,7 @@ def _remark(numbers: Mapping[str, float]) -> str:
     if numbers.get("energy_max", 0.0) > BLOWN:
         return "blows up"
     if numbers.get("guard_max", 0.0) > 1e-6:
-        return "thrown off the axis by asymmetric rounding"
+        return "leaves the axis through asymmetric rounding"
     return "loses the planetoid" if numbers.get("z_error", 0.0) > sitnikov.LOST else ""
 
 

@@ -110,14 +110,14 @@ def table(found: Sequence[Pair]) -> Table:
             )
         )
     return Table(
-        "Every peer through this bench, over the same library alone",
+        "Each library through this bench, relative to the same library alone",
         (
             *("method", "problem", "bench / alone", "time alone"),
             *("steps, bench", "steps, alone", "end states differ by"),
         ),
         rows,
-        "Median and quartiles of the ratio of the processor's times in each round, the two in turn in one "
-        f"process, compiled and set up before; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} microseconds a "
+        "Median and quartiles of the ratio of CPU times in each round; the two alternate in one process, "
+        f"compiled and set up beforehand; {ALLOWED:g} is allowed, or {OVERHEAD * 1e6:g} microseconds a "
         "call. The end states of REBOUND's fixed steps differ because it adds up its clock, which our "
         "adapter sets to whole steps.",
         words=(0, 1),

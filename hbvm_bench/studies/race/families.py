@@ -7,7 +7,7 @@ from hbvm_bench.campaign.identity import fixed_step, is_ours, make_method
 from hbvm_bench.campaign.spec import parse_spec
 
 OURS = ""
-FIXED, OWN = "fixed step", "own steps"
+FIXED, OWN = "fixed step size", "adaptive step size"
 
 
 class Family(NamedTuple):
@@ -18,7 +18,7 @@ class Family(NamedTuple):
     code: str
 
 
-WHEEL = "the wheel's, for any x86-64"
+WHEEL = "from the wheel, for any x86-64"
 WHEEL_AND_FORCES = f"{WHEEL}; forces other than gravity compiled here by numba"
 
 FAMILIES: dict[str, Family] = {
@@ -33,7 +33,7 @@ FAMILIES: dict[str, Family] = {
     "WHFast512": Family(
         "REBOUND, WHFast512",
         "WHFast512",
-        "the wheel's, in AVX-512 instructions; on other processors it does not run",
+        "from the wheel, with AVX-512 instructions; on other processors it does not run",
     ),
     "Leapfrog": Family("REBOUND, leapfrog", "leapfrog", WHEEL_AND_FORCES),
     "DOP853": Family(

@@ -20,7 +20,7 @@ from hbvm_bench.summaries.standings import TIME
 FLOOR = -17  # power of ten: smaller errors, exactly 0 among them, are drawn here
 TOP = 1
 DOTTED = (0, (1, 1.2))
-SECONDS = "seconds for the whole span (median)"
+SECONDS = "seconds per integration (median)"
 
 
 @styled
@@ -46,10 +46,10 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
         figure,
         f"work-precision-{race.key}",
         f"Work and precision: {race.title}",
-        "Every setting is a mark, lower left is better: a full one has a fixed step, an empty one chooses "
-        "its steps. Lines join the settings of a row that no other of it beats in both time and this error, "
-        f"dotted where steps are chosen. Dashed: what is asked for, {energy} and {position}. Only "
-        "settings on the trajectory that was asked for are drawn.",
+        "Every marker is a setting; lower left is better. A filled marker has a fixed step size, an open "
+        "one an adaptive step size. A line is the Pareto front of a row in time and this error, dotted "
+        f"where the step size is adaptive. Dashed: the required accuracy, {energy} and {position}. Settings "
+        "that left the trajectory are not drawn.",
         _summary(race),
         Plot(panels, "points"),
     )
@@ -78,7 +78,7 @@ def _panel(
         colour, own = look[family_of(records[0])].light, row.steps == OWN
         axes.plot(x, y, color=colour, linewidth=1.1, linestyle=DOTTED if own else "solid")
         if len(line) > 1:
-            number, note = look[family_of(line[0])].number, "none of the row's settings is better in both"
+            number, note = look[family_of(line[0])].number, "on the Pareto front of its row"
             lines.append(Trace(number, f"best of {row.title}", x, y, "law", note))
         for record in records:
             mark = look[family_of(record)]
@@ -99,7 +99,7 @@ def _panel(
         title,
         Axis(SECONDS, log=True),
         Axis(title, log=True),
-        [*marks, *lines, Trace(0, "what is asked for", *asked_for, "law")],
+        [*marks, *lines, Trace(0, "required accuracy", *asked_for, "law")],
     )
 
 

@@ -20,37 +20,37 @@ from hbvm_bench.summaries import outcomes
 from hbvm_bench.summaries.table import Table
 
 RULES_TEXT = """
-Fixed steps and steps that a method chooses itself are rows of their own, for every family that has both:
-ours, and IAS15, which at epsilon = 0 keeps its step. heyoka's Taylor method and DOP853 choose their steps
-always, WHFast and the leapfrog never, so that each of these has one row.
+Fixed and adaptive step sizes have separate rows in every family that has both: HBVM and Gauss, and IAS15,
+whose step size is fixed with epsilon = 0. heyoka's Taylor method and DOP853 always have an adaptive step
+size, WHFast and the leapfrog a fixed one, so each of these has one row.
 
 Every row has the same number of settings on every problem, declared before the run in
 hbvm_bench/campaign/shipped/race.toml. The fastest setting that is accurate enough is picked afterwards, by
 the same rule for every row. A ratio, and with it a goal, compares families, in rounds that did not choose
-the settings, and from the same number of settings of each: of a family with two rows, ours and IAS15,
+the settings, and from the same number of settings of each: of a family with two rows (HBVM and Gauss, IAS15),
 every second setting of either row takes part, counted in the order of declaration. The
 rule does not look at results.
 
-Energy is never ranked without position: a setting counts only if both errors are small enough. A run
-that leaves the trajectory which a symmetry prescribes is void.
+Energy is never ranked without position: a setting counts only if both errors are small enough. A run that
+leaves the trajectory which a symmetry prescribes is excluded.
 
 The same initial doubles and the same vector field for all, from one definition; REBOUND, which computes
 gravity itself, receives the same bodies.
 
 One process, one thread, one core. All settings of a problem are timed in interleaved rounds, each round
-in an order shuffled anew, with garbage collection off; all samples are kept. Timed is the call that
-integrates from the start to the end time and returns the end state, without output; compiling and
-setting up are not in it. A sample is as many such runs one after the other as last
+in an order shuffled anew, with garbage collection off; all samples are kept. The timed call integrates from
+the start to the end time and returns the end state, without output; it does not include compilation and
+setup. A sample is as many such runs in a row as last
 {shortest} ms. The overhead of one call is in the tables.
 
-The energy error is the largest at some {count} times, one in each equal part of the span
-and at no common phase, at the methods' own steps where the step is fixed, else by the means that cost
-the method nothing; it is evaluated in double-double arithmetic.
+The energy error is the largest at some {count} times, one in each equal part of the integration interval and
+at no common phase, at the ends of steps where the step size is fixed, else in a way that does not change the
+steps; it is evaluated in double-double arithmetic.
 
 The position error is that of the end state of the very run that is timed. {position}
 
-SciPy's DOP853 is Python and calls a compiled vector field: on a small system most of its time is Python's,
-and a ratio of times to it is one of implementations. The evaluations compare the methods.
+SciPy's DOP853 is Python and calls a compiled vector field: on a small system most of its time is spent in
+Python, and a ratio of times compares implementations. The number of evaluations compares the methods.
 
 A setting too slow for all rounds takes part in fewer, and the table says so. What did not finish, or
 does not apply, is a row with its reason.
@@ -87,7 +87,7 @@ def overview(results: Results) -> Table:
 
 @block
 def ratios(results: Results) -> Table:
-    """Return the peers' best times over ours."""
+    """Return the other libraries' best times over those of HBVM and Gauss."""
     return tables.headline(of(results))
 
 
@@ -124,7 +124,7 @@ def terms(results: Results) -> Section:
     families = [f"{family.title}: {family.code}" for family in FAMILIES.values()]
     blocks = [
         Items(rules(of(results)), "numbered"),
-        "What machine code runs:",
+        "Origin of the machine code:",
         Items(families),
     ]
     return Section("The rules", blocks, "rules", nav="Rules")
@@ -176,12 +176,15 @@ def remarks(race: Race) -> list[str]:
     if absent:
         said.append(f"Does not apply: {', '.join(absent)}.")
     if race.quick:
-        said.append("This is the quick run: a tenth of the span and few settings; its ratios mean little.")
+        said.append(
+            "This is the quick run: a tenth of the integration interval and few settings; its ratios are "
+            "not meaningful."
+        )
     if race.calibration:
         calibration = median(race.calibration)
         worst = max(abs(value / calibration - 1.0) for value in race.calibration)
         said.append(
-            f"A fixed computation beside it took {calibration * 1e3:.2f} ms, and in its worst round "
+            f"The calibration loop beside it took {calibration * 1e3:.2f} ms, and in its worst round "
             f"{worst:.0%} more or less."
         )
     return said + outcomes.compilations(race.records) + outcomes.beside(race.records)

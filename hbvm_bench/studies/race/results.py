@@ -131,7 +131,7 @@ class Race:
         return standings.best(able, {ENERGY: energy, POSITION: position})
 
     def at(self, family: str, energy: float, position: float) -> Comparison:
-        """Compare the best settings of a peer and of ours at one accuracy."""
+        """Compare the best settings of a peer and of HBVM and Gauss at one accuracy."""
         ours, theirs = (self.best(who, energy, position) for who in (OURS, family))
         return standings.compare(ours, theirs, chosen=True)
 

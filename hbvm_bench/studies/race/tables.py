@@ -24,13 +24,13 @@ SHOWN = (*ERRORS, "steps", "evaluations")
 
 CACHES = {
     "empty": "nothing",
-    "kernel": "our kernel, not this problem",
+    "kernel": "the kernel, not this problem",
     "full": "everything",
 }
 
 
 def headline(races: Sequence[Race]) -> Table:
-    """Return every contest at the accuracy it asks for: the peers' best times over ours."""
+    """Return the ratios of the libraries' best times to those of HBVM and Gauss at the required accuracy."""
     ours = [row for row in dict.fromkeys(row for race in races for row in race.rows) if row.family == OURS]
     peers = [f for f in FAMILIES if f != OURS and any(f in race.families for race in races)]
     rows = []
@@ -46,19 +46,21 @@ def headline(races: Sequence[Race]) -> Table:
             )
         )
     return Table(
-        "How many times as long as our fastest setting each peer's fastest takes, at the same accuracy",
+        "Time of each library's fastest setting relative to the fastest of HBVM and Gauss, at the same "
+        "accuracy",
         (
             "problem",
             "energy, position",
-            *(f"ours, {row.steps}" for row in ours),
+            *(f"HBVM and Gauss, {row.steps}" for row in ours),
             *(FAMILIES[peer].short for peer in peers),
         ),
         rows,
-        "A ratio compares the fastest of the same number of settings of every family: of ours and of IAS15, "
-        "which have a fixed and an adaptive step size, every second setting of either kind takes part, in "
-        "the order of declaration. The two columns of times are chosen from all settings of their kind. "
-        "Median of the ratio within each interleaved round, in brackets its quartiles. Below 1 the peer is "
-        "faster. Not reached: by none of the declared settings; a smaller step or tolerance may.",
+        "A ratio compares the fastest of the same number of settings of every family: of HBVM and Gauss and "
+        "of IAS15, which have a fixed and an adaptive step size, every second setting of either kind takes "
+        "part, in the order of declaration. The two columns of times are chosen from all settings of their "
+        "kind. Median of the ratio within each interleaved round, in brackets its quartiles. Below 1 the "
+        "other library is faster. Not reached: no declared setting is as accurate; a smaller step or "
+        "tolerance may be.",
     )
 
 
@@ -71,7 +73,7 @@ def behind(races: Sequence[Race]) -> Table:
         rows.append((race.title, *(NONE if one is None else one.case.method for one in best)))
     return Table(
         "The settings behind these ratios",
-        ("problem", "ours", *(FAMILIES[peer].short for peer in peers)),
+        ("problem", "HBVM and Gauss", *(FAMILIES[peer].short for peer in peers)),
         rows,
         words=range(len(peers) + 2),
     )
@@ -98,9 +100,10 @@ def overview(races: Sequence[Race]) -> Table:
         "The fastest setting, and the time of each method relative to it",
         tuple(head[i] for i in kept),
         [tuple(row[i] for i in kept) for row in rows],
-        "At the accuracy that the next table names; HBVM and Gauss are chosen from 15 to 17 settings each, "
+        "At the accuracy named in the next table; HBVM and Gauss are chosen from 15 to 17 settings each, "
         "the others from 16. Some rounds chose the setting, the others are compared: it can be below 1. The "
-        "ratios of the next table are smaller where HBVM and Gauss together have as many settings as a peer.",
+        "ratios of the next table are smaller where HBVM and Gauss together have as many settings as "
+        "another library.",
         words=(0, 1),
     )
 
@@ -119,7 +122,7 @@ def _relative(first: Record, other: Record) -> str:
 
 
 def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
-    """Return the peers' best times over ours, one column for each kind of processor."""
+    """Return the ratios of the best times, one column for each kind of processor."""
     keys = dict.fromkeys(race.key for races in by_kind.values() for race in races)
     rows = []
     for key in keys:
@@ -139,9 +142,9 @@ def kinds(by_kind: Mapping[str, Sequence[Race]]) -> Table:
         "The same ratios by kind of processor",
         ("problem", "peer", *by_kind),
         rows,
-        "How many times as long as our fastest setting each peer's fastest takes. "
+        "Time of each library's fastest setting relative to the fastest of HBVM and Gauss. "
         + machine.COLUMNS
-        + " Left out: peers without a ratio anywhere.",
+        + " Left out: libraries without a ratio on any problem.",
         words=(0, 1),
     )
 
@@ -173,9 +176,9 @@ def fastest(race: Race) -> Table:
         )
     return Table(
         f"The fastest settings with energy error ≤ {power(energy)} and position error ≤ {power(position)}",
-        ("family", "setting", "time", "energy", "position", "steps", "evaluations", "× ours"),
+        ("family", "setting", "time", "energy", "position", "steps", "evaluations", "× HBVM and Gauss"),
         rows,
-        "× ours: relative to the fastest of our settings that compete with the other families.",
+        "× HBVM and Gauss: relative to the fastest of their settings that compete with the other families.",
         words=(0, 1),
     )
 
@@ -197,14 +200,19 @@ def levels(race: Race) -> Table:
         )
     return Table(
         "At other accuracies",
-        ("energy, position ≤", "our fastest", "time", *(f"{FAMILIES[p].short} × ours" for p in peers)),
+        (
+            "energy, position ≤",
+            "fastest of HBVM and Gauss",
+            "time",
+            *(f"{FAMILIES[p].short} × HBVM and Gauss" for p in peers),
+        ),
         rows,
         words=(0, 1),
     )
 
 
 def defaults(race: Race) -> Table | None:
-    """Return the peers at their defaults beside the fastest of ours that is as accurate; ``None`` without."""
+    """Return the default settings beside the fastest of HBVM and Gauss that is as accurate, or ``None``."""
     rows = []
     for family in race.families:
         found = standings.untuned(race.records, family, ERRORS)
@@ -224,10 +232,11 @@ def defaults(race: Race) -> Table | None:
     if not rows:
         return None
     return Table(
-        "At the libraries' defaults, against the fastest of ours that is no worse in energy nor in position",
-        ("default", "time", "energy", "position", "ours", "time", "× ours"),
+        "At the libraries' defaults, against the fastest setting of HBVM and Gauss that is no less "
+        "accurate in energy and position",
+        ("default", "time", "energy", "position", "HBVM and Gauss", "time", "× HBVM and Gauss"),
         rows,
-        "Ours is chosen from all its settings, theirs is not.",
+        "HBVM and Gauss are chosen from all their settings, the other libraries are not.",
         words=(0, 4),
     )
 
@@ -268,8 +277,8 @@ def everything(race: Race) -> Table:
         f"All {len(rows)} settings, as declared before the run",
         ("setting", "time", "energy", "position", "steps", "evaluations", "call", "remark"),
         rows,
-        "Time: median of a run, with its quartiles. Call: a run that goes next to nowhere, which bounds the "
-        "overhead in each time. Brackets: void.",
+        "Time: median of a run, with its quartiles. Call: a run over a negligible interval, which bounds "
+        "the overhead in each time. Brackets: excluded.",
         words=(0, 7),
     )
 
@@ -294,7 +303,7 @@ def _headline_cell(race: Race, peer: str, found: Comparison) -> str:
         return NONE
     if found.theirs is None:
         return _why_none(race, peer)
-    return ratio_text(found.ratio) if found.ours is not None else "only the peer reaches it"
+    return ratio_text(found.ratio) if found.ours is not None else "reached only by the other library"
 
 
 def _level_cell(found: Comparison) -> str:

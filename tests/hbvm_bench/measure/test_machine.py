@@ -64,7 +64,10 @@ def test_what_was_not_recorded_is_said_and_not_guessed():
     assert "znver5" in machine.sentence(ZEN5)
     assert "arithmetic 256 bits wide, 3.7 GHz." in machine.sentence(ZEN4)
     restricted = machine.sentence(ZEN4 | {"ours_built_for": "AVX2"})
-    assert "handed to REBOUND and SciPy, was restricted to AVX2, the peers' own code was not" in restricted
+    assert (
+        "handed to REBOUND and SciPy, was restricted to AVX2, the code of the other libraries was not"
+        in restricted
+    )
     assert "not recorded" in machine.sentence({})
 
 
@@ -207,6 +210,6 @@ def test_races_of_several_kinds_are_columns_of_one_table():
     text = markdown(page_of(results_of(*runs)))
     assert "LLVM: znver5" in text
     assert "by kind of processor" in text
-    goal = "time of Taylor over ours, energy ≤ 1e-13, position ≤ 1e-10"
+    goal = "time of Taylor relative to HBVM and Gauss, energy ≤ 1e-13, position ≤ 1e-10"
     assert f"| Outer Solar System, six bodies, 12 000 years | {goal} | 2026-11-21 | ≥ 10 | 15.0×" in text
     assert "| Outer Solar System, six bodies, 12 000 years | `Gauss(s=8, h=1.5)` | `Taylor()` |" in text

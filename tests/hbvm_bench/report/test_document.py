@@ -177,7 +177,7 @@ def test_a_figure_of_a_campaign_that_fails_loses_no_other(tmp_path, monkeypatch,
     whole = document(store)
     monkeypatch.setattr("hbvm_bench.report.problem.drift_figure", lambda cases: broken())
     made = document(store)
-    assert [part.title for part in made.failed] == ["Drift of the energy, pendulum(q=0.0, p=1.0)"]
+    assert [part.title for part in made.failed] == ["Energy drift, pendulum(q=0.0, p=1.0)"]
     assert [p.key for p in made.pictures] == [p.key for p in whole.pictures if p.key != "drift"]
     monkeypatch.setattr("hbvm_bench.report.words.summary", lambda records: broken())
     assert "the summary of pendulum(q=0.0, p=1.0)" in [part.title for part in document(store).failed]

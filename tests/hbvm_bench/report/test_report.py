@@ -177,7 +177,7 @@ def test_our_own_weaknesses_are_said_with_their_numbers(run):
         "implicit",
         "angular momentum",
         "4.7",
-        "z wrong by 1.8",
+        "an error of z of 1.8",
         "3.4e-03",
         "3.2e-14",
     ):
@@ -254,7 +254,7 @@ def test_the_rules_name_the_tolerance_that_is_used():
         (TimingPlan(rounds=2), ["Each of 2 rounds", "fresh process"], ["in turn"]),
         (
             TimingPlan(rounds=5, interleaved=True, clock="thread", shortest=1e-9),
-            ["in turn, in 5 rounds", "processor's for this thread", "one integration"],
+            ["in turn, in 5 rounds", "CPU time of this thread", "one integration"],
             ["fresh process", "lasts at least"],
         ),
     ],

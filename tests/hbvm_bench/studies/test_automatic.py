@@ -78,7 +78,7 @@ def test_other_problems_and_too_few_rounds_are_refused(capsys):
 
 def test_a_side_that_is_less_accurate_is_told():
     ahead, behind = (automatic.duels(made({}, 3.0, worse=worse))[0] for worse in (1.0, 3.0))
-    assert (ahead.words, behind.words) == ("reached", "not as accurate")
+    assert (ahead.words, behind.words) == ("reached", "less accurate")
     assert behind.ratio.median == 3.0
 
 

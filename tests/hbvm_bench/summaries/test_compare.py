@@ -150,7 +150,7 @@ def test_the_command_says_what_changed_and_its_exit_code_too(tmp_path, capsys):
     make(tmp_path / "a")
     make(tmp_path / "b", prefix="1", edit=lambda i, r: with_value(r, "steps", 7.0))
     assert cli.main(["compare", str(tmp_path / "a"), str(tmp_path / "a")]) == 0
-    assert "nothing changed beyond noise" in capsys.readouterr().out
+    assert "no change exceeds the noise" in capsys.readouterr().out
     assert cli.main(["compare", str(tmp_path / "a"), str(tmp_path / "b")]) == 1
     out = capsys.readouterr().out
     assert "9 compared, 6 equal, 0 within rounding, 3 changed" in out

@@ -67,7 +67,7 @@ def test_energy_alone_ranks_nobody():
 def test_a_peer_on_another_trajectory_or_without_a_position_is_not_compared():
     for peer in ("IAS15", "DOP853"):
         found = judged(Goal(against=peer, ratio=1.0))
-        assert (found.verdict, found.why) == ("missed", "the peer has no setting as accurate")
+        assert (found.verdict, found.why) == ("missed", "no setting of the other library is as accurate")
 
 
 def test_a_goal_may_ask_ours_to_be_no_worse_than_the_peer():
@@ -82,7 +82,7 @@ def test_a_goal_may_ask_ours_to_be_no_worse_than_the_peer():
 def test_where_none_of_ours_is_as_accurate_there_is_no_ratio():
     found = judged(Goal(against="Taylor()", ratio=1.0, no_worse={"energy_max": 1.0, "position_end": 1.0}))
     assert (found.verdict, found.measured) == ("missed", "–")
-    assert found.why == "none of ours is as accurate"
+    assert found.why == "no setting of HBVM and Gauss is as accurate"
 
 
 def test_a_number_of_ours_is_at_most_what_is_asked():
@@ -148,7 +148,7 @@ def test_a_single_round_says_that_it_chose_what_it_compares():
     ours = [record(f"Gauss(s=8, h={h})", [1.0], 1e-14, 1e-12) for h in (0.1, 0.2)]
     found = judged(Goal(against="Taylor", ratio=3.0), [*ours, record("Taylor()", [8.0], 1e-14, 1e-12)])
     assert found.verdict == "reached"
-    assert found.why == "of the rounds that chose the settings, for there are no others"
+    assert found.why == "from the rounds that chose the settings: there are no others"
 
 
 @pytest.mark.parametrize("load", [Load(others=0.4, stolen=0.0), Load(others=0.0, stolen=0.2)])
@@ -160,7 +160,7 @@ def test_a_speed_measured_beside_other_work_is_not_judged(load):
     for ratio in (1.0, 100.0):  # neither reached nor missed
         found = judged(Goal(against="Taylor", ratio=ratio), records)
         assert found.verdict == "not judged"
-        assert found.why == f"other work took {max(load.others, load.stolen):.0%} of a core meanwhile"
+        assert found.why == f"other work took {max(load.others, load.stolen):.0%} of a core during the timing"
         assert not found.reached
     assert judged(Goal(at=100.0, method="Gauss(s=8, h=0.1)"), records).verdict == "not judged"
     energy = Goal(metric="energy_max", at=1e-13, method="Gauss(s=8, h=0.1)")

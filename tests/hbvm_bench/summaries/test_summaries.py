@@ -90,7 +90,7 @@ def test_a_problem_on_which_a_family_did_not_run_is_not_one_that_it_failed_to_so
     assert (found.solved("IAS15"), found.ran("IAS15"), found.share("IAS15", 1.0)) == (1, 1, 1.0)
     assert (found.solved("Gauss"), found.ran("Gauss")) == (2, 3)  # it ran on toda()
     rows = dict(row[:2] for row in needs.table([*RUN, refused, alone]).rows)
-    assert "IAS15 (1 of 1)" in rows["a position right to 1e-8, in little time"]
+    assert "IAS15 (1 of 1)" in rows["position error ≤ 1e-8, least time"]
 
 
 def test_a_family_without_the_count_that_is_compared_has_not_failed():
@@ -103,9 +103,9 @@ def test_a_family_without_the_count_that_is_compared_has_not_failed():
 
 def test_needs_name_the_families_near_the_best_most_often():
     rows = {title: rest for title, *rest in needs.table(RUN).rows}
-    said = "Gauss (2 of 2, 1.5 times the best); Taylor (1 of 2, 4.5 times the best)"
-    assert rows["a position right to 1e-8, in little time"] == [said, "2"]
-    assert "the way back to the start" not in rows
+    said = "Gauss (2 of 2, 1.5× slower); Taylor (1 of 2, 4.5× slower)"
+    assert rows["position error ≤ 1e-8, least time"] == [said, "2"]
+    assert "smallest time-reversal error" not in rows
 
 
 def test_the_matrix_says_what_the_best_setting_did_and_why_others_did_not():
@@ -179,6 +179,6 @@ def test_times_of_a_busy_machine_are_doubtful():
     (quiet,) = outcomes.doubts([timed(1.0, [], load=Load(others=0.01, stolen=0.0))])
     assert "doubtful" not in quiet
     assert "not steady" in outcomes.doubts([timed(1.0, [0.01, 0.01, 0.03, 0.03])])[0]
-    assert "No times" in outcomes.doubts([record("Taylor()")])[0]
+    assert "Nothing was timed" in outcomes.doubts([record("Taylor()")])[0]
     slow = record("Radau(rtol=1, atol=1)", outcome="timeout", status="", metrics={})
     assert "time limit ended 1 cases (Radau 1)" in " ".join(outcomes.doubts([slow]))

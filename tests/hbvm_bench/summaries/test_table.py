@@ -39,10 +39,10 @@ ALL = [FAR, STALLED, OFF, NEAR, REFUSED, DIVERGED]
 
 def test_a_table_without_positions_does_not_claim_to_be_sorted_by_them():
     ((title, _),) = grouped(rows([record("a()")]))
-    assert title == "At the end; no reference tells how far from the trajectory that was asked for"
+    assert title == "At the end; without a reference solution, so that the position error is unknown"
     (ranked, _), (alone, _), (ended, _) = grouped(rows([record("a()"), NEAR, STALLED]))
-    assert ranked == "On the trajectory that was asked for, by position error at the end"
-    assert "position error" not in alone + ended
+    assert ranked == "On the requested trajectory, by position error at the end"
+    assert "by position error" not in alone + ended
 
 
 def test_settings_that_nobody_recommended_are_not_called_so():

@@ -107,7 +107,9 @@ def test_the_tables_say_why_there_is_no_ratio(race):
 def test_goals_are_listed_with_their_verdict(race):
     verdicts = {verdict.goal.against: verdict.verdict for verdict in race.goals}
     assert verdicts == {"Taylor": "reached", "IAS15": "missed", "WHFast": "reached"}
-    assert [row[-1] for row in tables.goals([race]).rows][1] == "missed: the peer has no setting as accurate"
+    assert [row[-1] for row in tables.goals([race]).rows][
+        1
+    ] == "missed: no setting of the other library is as accurate"
 
 
 def test_a_race_without_any_valid_run_has_no_figure(race):
@@ -119,16 +121,16 @@ def test_fixed_and_own_steps_are_rows_of_their_own_and_the_faster_counts(race):
     own = record("HBVM(tol=1e-14)", 0.0005, 5e-14, 5e-11)
     both = replace(race, records=[*race.records, own])
     rows = {row[0]: row[1] for row in tables.fastest(both).rows}
-    assert rows["HBVM and Gauss, fixed step"] == "Gauss(s=8, h=1.5)"
-    assert rows["HBVM and Gauss, own steps"] == "HBVM(tol=1e-14)"
-    assert (rows["heyoka, Taylor, own steps"], rows["REBOUND, WHFast, fixed step"]) == (
+    assert rows["HBVM and Gauss, fixed step size"] == "Gauss(s=8, h=1.5)"
+    assert rows["HBVM and Gauss, adaptive step size"] == "HBVM(tol=1e-14)"
+    assert (rows["heyoka, Taylor, adaptive step size"], rows["REBOUND, WHFast, fixed step size"]) == (
         "Taylor()",
         "not reached",
     )
     table = tables.headline([both])
     cells = dict(zip(table.head, table.rows[0], strict=True))
-    assert cells["ours, fixed step"].startswith("2 ms")
-    assert cells["ours, own steps"].startswith("500 µs")
+    assert cells["HBVM and Gauss, fixed step size"].startswith("2 ms")
+    assert cells["HBVM and Gauss, adaptive step size"].startswith("500 µs")
     assert cells["heyoka"].startswith("60.0×")
 
 

@@ -53,7 +53,7 @@ def test_the_settings_are_printed_without_running(capsys):
     assert main(["race", "--settings", "--problem", "kepler"]) == 0
     said = capsys.readouterr().out
     assert "Gauss(s=16, h=0.5)" in said
-    assert "heyoka, Taylor, own steps, 16" in said
+    assert "heyoka, Taylor, adaptive step size, 16" in said
 
 
 COMMAND = ["race", "--quick", "--problem", "kepler", "--rounds", "2"]
