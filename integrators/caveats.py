@@ -83,11 +83,12 @@ def warnings(
     if not kinks:
         return said
     t, h = kinks[0]
+    place = f"between t = {t!r} and {t + h!r}" if h else f"at t = {t!r}"
     return (
         *said,
-        f"the field jumps or has a kink (places kept: {len(kinks)}, the first between t = {t!r} "
-        f"and {t + h!r}): steps were cut there, and what lies between two nodes may have been missed; "
-        "give breakpoints where the times are known.",
+        f"the field jumps or has a kink (places kept: {len(kinks)}, the first {place}): steps "
+        "were cut there, and what lies between two nodes may have been missed; give breakpoints where the "
+        "times are known.",
     )
 
 

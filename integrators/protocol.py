@@ -124,6 +124,7 @@ class Status(StrEnum):
     NOT_FINITE = "not_finite"
     STALLED = "stalled"
     NOT_INVARIANT = "not_invariant"
+    SLIDING = "sliding"
     MAX_STEPS = "max_steps"
     USER_ERROR = "user_error"
     INTERRUPTED = "interrupted"

@@ -27,9 +27,10 @@ Integers = NDArray[np.int64]
 # SCATTERED: the iteration has converged, but not to the trajectory. NOT_KEPT: a quantity that a line
 # integral is to keep is no invariant. HALTED: a search for events has to be attended to before the next step.
 # UNSCALED: the step ahead does not become good enough however short it is, and the sizes that the blocks
-# will reach may say that it is. UNSEEN: a partial step sees what the step ahead has not.
+# will reach may say that it is. UNSEEN: a partial step sees what the step ahead has not. SLIDING: the field
+# pushes back to a switching surface from both sides.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
-UNSCALED, UNSEEN = 9, 10
+UNSCALED, UNSEEN, SLIDING = 9, 10, 11
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -57,6 +58,12 @@ MOST_SIDES = 1 + MOST  # rows of what tells the sides of switching surfaces
 # What is known of the field where a step ends: NOTHING; the values that its polynomial says, EXTRAPOLATED,
 # which are compared with those of the next; that they are right, SEEN. At a START it may jump.
 START, NOTHING, EXTRAPOLATED, SEEN = range(-1, 3)
+
+# Where a solved step crosses a switching surface, besides at a node: after the last one; nowhere.
+END_ACROSS, NO_SURFACE = -1, -2
+
+# A state on a switching surface: at the end of a step; at the start of the trajectory.
+AT_STEP_END, AT_ORIGIN = 1, 2
 
 # Legendre coefficients of the field that a step is judged by: gamma_0 .. gamma_3, that before and that of
 # `Context.error_degree`, the last two that k nodes see, two from the middle. Then the field at a step's ends.
@@ -308,6 +315,16 @@ class Context(Memory):
     side_times = Array("lanes")
     side_state = Array(2, "padded")  # a state there
     crossed = Integer()  # 1: a switching surface lies in the step that was attempted
+    across = Integer()  # the first node beyond one, or END_ACROSS, or NO_SURFACE
+    # Steps that end on a switching surface; see `step.surfaces`.
+    locating = Integer()  # attempts at the step ahead to end it there; 0: none
+    near = Real()  # length of the longest of them that crosses none, and
+    far = Real()  # of the shortest that does
+    apart_from_surface = Real()  # how far the surface was from the end of the last one, in parts of it
+    surface = Integer()  # row of the distance that vanishes there; 0: unknown
+    length_wanted = Real()  # of the step ahead, before that
+    landing = Integer()  # 1: the step that is solved ends on a surface
+    on_surface = Integer()  # the present state is on one: AT_STEP_END, AT_ORIGIN; 0: it is not
     kinked = Integer()  # 1: in the step that was estimated the field does not look smooth
     kinks = Integer()  # places where steps were rejected for that
     kink_end = Real()  # where the first such step at the last place would have ended
@@ -328,6 +345,7 @@ class Context(Memory):
     behind_error = Array(2, "padded")
     behind_time = Real()
     behind_low = Real()
+    behind_on_surface = Integer()  # `on_surface` there
     kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
 
     def __init__(self, shape: Shape, tables: Mapping[str, Numbers], more: Mapping[str, int] | None = None):

@@ -122,6 +122,7 @@ class HBVMStepper(ABC):
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
         "length_limit", "kinks", "kink_end", "doubt_end",
         "border", "border_ahead", "behind_time", "behind_low",
+        "landing", "on_surface", "surface", "length_wanted", "behind_on_surface",
         "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
@@ -268,8 +269,8 @@ class HBVMStepper(ABC):
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
         from others. With steps of varying length also the method's ``"k"`` and ``"s"`` and, where the field
         jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a step had to be cut for and the
-        length at which it was found, of the first 64 places. With variations ``"variations"``, a dict: their
-        iterations.
+        length at which it was found, or the time and 0 where a step ends on a switching surface, of the first
+        64 places. With variations ``"variations"``, a dict: their iterations.
         """
         ctx = self._context
         return Stats(

@@ -14,6 +14,7 @@ from integrators.kernel.context import (
     LAND,
     NOTHING,
     SIDE,
+    SLIDING,
     START,
     UNDERFLOW,
     UNSCALED,
@@ -345,5 +346,11 @@ class AdaptiveStepper(HBVMStepper):
             return Status.STEP_UNDERFLOW, (
                 f"no step from t = {self.t!r} is short enough for tol={self._program.tol!r}; "
                 "the solution may end or be singular here."
+            )
+        if outcome == SLIDING:
+            return Status.SLIDING, (
+                f"on both sides of the switching surface that is reached at t = {self.t!r} the field points "
+                "to it: the trajectory slides along it or sticks there, as by dry friction, and the formulas "
+                "do not say how it goes on."
             )
         return super()._failure(outcome)

@@ -66,7 +66,7 @@ def touches(ctx, i, low, high):
         call_field(ctx.sides, ctx.side_times, ctx.sums, ctx.par, values)
         nearest = 0
         for lane in range(lanes):
-            if values[lane] != ctx.side_ends[0]:
+            if values[lane] != ctx.side_values[0]:
                 return matters(ctx, low, width)
             if abs(values[lanes * i + lane]) < abs(values[lanes * i + nearest]):
                 nearest = lane
@@ -106,7 +106,7 @@ def matters(ctx, low, width):
         most = max(smooth, least * block_size(ctx, ctx.block[d]))
         for lane in range(lanes):
             far = abs(values[lanes * d + lane] - polynomial(ctx, d, low + width * lane))
-            if sides[lane] != ctx.side_ends[0] and far > most:
+            if sides[lane] != ctx.side_values[0] and far > most:
                 return True
     return False
 

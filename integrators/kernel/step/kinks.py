@@ -1,10 +1,10 @@
 """Jumps and kinks of the field: steps over them are cut until they do not matter."""
 
 from integrators.kernel.context import (
+    AT_ORIGIN,
     AT_START,
     EXTRAPOLATED,
     KINKS_KEPT,
-    MOST_SIDES,
     NOTHING,
     SEEN,
     START,
@@ -28,7 +28,7 @@ JUST = 1e-12  # part of a step: as near to a breakpoint the field is looked at
 
 @compiled
 def kink(ctx, ends):
-    """Whether the step that was estimated has a kink that matters; count its place if so.
+    """Whether the step that was estimated has a kink that matters; count its place, unless it is a surface's.
 
     Nodes do not see what is between the first or the last of them and the end of the step. What
     polynomials of two steps say of the field where they meet is compared, if ``ends``. If
@@ -47,7 +47,8 @@ def kink(ctx, ends):
                 ctx.border = SEEN
             return False
         return jumps_at_an_end(ctx, suspect)
-    count(ctx, ctx.t0, ctx.h)
+    if ctx.crossed == 0:
+        count(ctx, ctx.t0, ctx.h)
     return True
 
 
@@ -67,39 +68,9 @@ def jumps_at_an_end(ctx, suspect):
         return False
     if not differs_at_an_end(ctx):
         return ctx.undone == 1
-    count(ctx, ctx.t0, ctx.h)
+    if ctx.crossed == 0:
+        count(ctx, ctx.t0, ctx.h)
     return True
-
-
-@compiled
-def crosses(ctx):
-    """Whether the field is evaluated on two sides of a switching surface in the solved step, or at its end.
-
-    Nodes may not show it: a derivative that jumps changes the last coefficients by less than they are in a
-    smooth step, but the square of that is not its error.
-    """
-    if ctx.sides == 0:
-        return False
-    lanes, rows, found = ctx.lanes, ctx.rows, ctx.side_values
-    size, first = lanes * ctx.padded, 0.0
-    for call in range(ctx.calls):
-        values = found + lanes * MOST_SIDES * call
-        call_field(ctx.sides, ctx.times + lanes * call, ctx.stages + size * call, ctx.par, values)
-        if call == 0:
-            first = found[0]
-        for lane in range(lanes):
-            if values[lane] != first:
-                return True
-    times, ends, second = ctx.side_times, ctx.sums, ctx.second
-    for lane in range(lanes):
-        times[lane] = ctx.t0 + (ctx.h if lane else 0.0)
-    for d in range(rows):
-        after = 8 * (d // 4) + 4 + d % 4 if second else d
-        ends[lanes * d] = ctx.row_state[d]
-        for lane in range(1, lanes):
-            ends[lanes * d + lane] = ctx.next_state[after]
-    call_field(ctx.sides, times, ends, ctx.par, ctx.side_ends)
-    return ctx.side_ends[0] != first or ctx.side_ends[1] != first
 
 
 @compiled
@@ -177,6 +148,11 @@ def differs_at_an_end(ctx):
     for d in range(rows):
         before = abs(values[lanes * d] - total(coefficient(ctx, d, AT_START)))
         after = abs(values[lanes * d + 1] - total(get(ctx.borders, 8 * d)))
+        # On a switching surface rounding tells on which side the state is.
+        if ctx.on_surface:
+            before = 0.0
+        if ctx.locating:
+            after = 0.0
         far = max(finite(before), finite(after))
         # A crossing beyond the last node is no smooth field's distance from its polynomial.
         smooth = 0.0 if ctx.crossed else OUTSIDE * ctx.lasts[d]
@@ -227,6 +203,7 @@ def keep_end(ctx):
     ctx.lasts, ctx.lasts_behind = ctx.lasts_behind, ctx.lasts
     ctx.border, ctx.border_ahead = ctx.border_ahead, NOTHING
     ctx.behind_time, ctx.behind_low = ctx.t0, ctx.time_low
+    ctx.behind_on_surface = ctx.on_surface
 
 
 @compiled
@@ -239,6 +216,7 @@ def undo(ctx):
     ctx.next_length = RETREAT * h
     ctx.length_behind = 0.0
     ctx.border = NOTHING
+    ctx.on_surface, ctx.surface = AT_ORIGIN if ctx.behind_on_surface else 0, 0
     ctx.undone = 0
     ctx.steps -= 1
     forget(ctx)

@@ -21,6 +21,7 @@ from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.projection import measure_energy
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.sample import dimension, followed, read, sample, vectors_of_state, write
+from integrators.kernel.step.surfaces import find_surface
 from integrators.kernel.step.vary import CLOSE, ready, remaining, take
 
 context = view(Context)
@@ -173,6 +174,7 @@ def reset(ctx, start):
     ctx.n = ctx.age = ctx.free = ctx.made = 0
     ctx.solved = UNSOLVED
     ctx.border = ctx.border_ahead = NOTHING
+    find_surface(ctx)
     ctx.outcome = DONE
     ctx.time_low, ctx.rate = 0.0, FIRST_RATE
     if ctx.strategy != ALWAYS_IMPLICIT:

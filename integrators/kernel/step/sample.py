@@ -167,6 +167,7 @@ def land(ctx, side, t):
     copy(side.next_error, ctx.error, vectors_of_state(ctx))
     copy(side.values, ctx.values, ctx.calls * ctx.padded * ctx.lanes // 8)
     ctx.length, ctx.older_length = side.h, 0.0
+    ctx.on_surface = 0
     if ctx.varying:
         keep_end_of_part(ctx, side)
         ctx.length_behind = side.h

@@ -6,14 +6,19 @@ Where the fixed-point iteration allows much less than the errors do, the implici
 from math import log, log2
 
 from integrators.kernel.context import (
+    AT_STEP_END,
     BY_VALUES,
     DIVERGED,
     DONE,
+    END_ACROSS,
     FIXED_POINT,
+    NO_SURFACE,
     NOT_KEPT,
     NOTHING,
     RUNNING,
     SCATTERED,
+    SLIDING,
+    START,
     UNDERFLOW,
     UNSCALED,
     UNSOLVED,
@@ -43,9 +48,10 @@ from integrators.kernel.step.finish import count_step, finish
 from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
-from integrators.kernel.step.kinks import count, crosses, keep_end, kink, undo
+from integrators.kernel.step.kinks import count, keep_end, kink, undo
 from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sums import time_after
+from integrators.kernel.step.surfaces import AGAIN, LANDED, leave, locate, look_across
 from integrators.kernel.step.sweep import sweep_measured
 
 GROW = FARTHEST  # of the length from one step to the next, at most
@@ -237,6 +243,10 @@ def ready(ctx):
     begin_attempts(ctx)
     failure = UNDERFLOW
     while True:
+        # Its first stages are on one side only if they are beyond the surface; what follows from the state
+        # alone may be on either.
+        if ctx.on_surface and ctx.length == 0.0 and not leave(ctx) and ctx.locating + ctx.attempts == 0:
+            return SLIDING
         h = within(ctx, ctx.next_length)
         too_short = not abs(h) > SHORTEST * abs(ctx.t0)
         if (too_short or ctx.attempts > 0) and failure == UNDERFLOW and ctx.asks == 1 and ctx.rescaled == 0:
@@ -274,7 +284,7 @@ def crawls(ctx, h):
 @compiled
 def begin_attempts(ctx):
     """Begin to look for the length of the step ahead."""
-    ctx.rejected = ctx.attempts = ctx.doubts = 0
+    ctx.rejected = ctx.attempts = ctx.doubts = ctx.locating = ctx.landing = 0
 
 
 @compiled
@@ -289,7 +299,20 @@ def accepts(ctx, outcome, iterations, implicit):
     if outcome == DONE and ctx.blind and abs(ctx.h) > ctx.longest_blind:
         reject(ctx, outcome, ctx.longest_blind / abs(ctx.h), implicit)
         return False
-    if not is_good(error, ctx.allowed_error, defect, ctx.allowed_defect):
+    good = is_good(error, ctx.allowed_error, defect, ctx.allowed_defect)
+    if ctx.sides and (ctx.locating or (ctx.across != NO_SURFACE and not good)):
+        found = locate(ctx, outcome, good)
+        if found == AGAIN:
+            again(ctx, outcome, implicit)
+            return False
+        if found == LANDED:
+            land_on_surface(ctx, factor, iterations, implicit)
+            return True
+        ctx.locating = 0
+        if ctx.across != NO_SURFACE:
+            count(ctx, ctx.t0, ctx.h)
+            good = False
+    if not good:
         reject(ctx, outcome, factor, implicit)
         return False
     follow(ctx, factor, iterations, implicit)
@@ -300,9 +323,10 @@ def accepts(ctx, outcome, iterations, implicit):
 def estimate_attempt(ctx, outcome, implicit):
     """Return the estimated errors of the attempted step; infinite: it failed, or has a kink that matters."""
     ctx.undone = 0
+    across = look_across(ctx, outcome) if ctx.sides else NO_SURFACE
     if outcome != DONE:
         return INFINITY, INFINITY
-    ctx.crossed = 1 if crosses(ctx) else 0
+    ctx.crossed = 1 if across >= 0 or (across == END_ACROSS and ctx.locating == 0) else 0
     error, defect = estimate_implicit(ctx) if implicit else estimate(ctx)
     fits = is_good(error, ctx.allowed_error, defect, ctx.allowed_defect)
     if implicit:
@@ -316,7 +340,7 @@ def estimate_attempt(ctx, outcome, implicit):
             ctx.doubt_end = ctx.t0 + ctx.h
         if (fits or ctx.doubts >= SURE) and kink(ctx, fits):
             error = INFINITY
-    if ctx.surfaces and fits and error < INFINITY and ctx.crossed == 0 and grazes(ctx):
+    if ctx.surfaces and fits and error < INFINITY and across == NO_SURFACE and grazes(ctx):
         count(ctx, ctx.t0, ctx.h)
         error = INFINITY
     return error, defect
@@ -355,6 +379,28 @@ def follow(ctx, factor, iterations, implicit):
 
 
 @compiled
+def again(ctx, outcome, implicit):
+    """Forget the attempted step, whose next attempt is to end on a switching surface."""
+    if implicit:
+        ctx.implicit_steps -= 1
+    ctx.rejections += 1
+    ctx.length = 0.0
+    if outcome == DONE and ctx.across < 0:
+        ctx.length, ctx.rejected = ctx.h, 1
+
+
+@compiled
+def land_on_surface(ctx, factor, iterations, implicit):
+    """Let the attempted step, which ends on a switching surface, be followed by one as long as was wanted."""
+    count(ctx, ctx.t0 + ctx.h, 0.0)
+    follow(ctx, factor, iterations, implicit)
+    ctx.landing = 1
+    wanted = ctx.length_wanted
+    if abs(wanted) > abs(ctx.length_after):
+        ctx.length_after = wanted
+
+
+@compiled
 def reject(ctx, outcome, factor, implicit):
     """Set the length of the next attempt, this one's times a factor at most."""
     h = ctx.h
@@ -390,3 +436,15 @@ def take(ctx):
     ctx.length_behind = ctx.h
     ctx.error_behind = ctx.error_ahead
     ctx.defect_behind = ctx.defect_ahead
+    if ctx.sides:
+        arrive_on_surface(ctx)
+
+
+@compiled
+def arrive_on_surface(ctx):
+    """Begin anew where the step behind has ended on a switching surface."""
+    ctx.on_surface = AT_STEP_END if ctx.landing else 0
+    if ctx.landing:
+        ctx.landing = 0
+        ctx.length = ctx.length_behind = 0.0
+        ctx.border = START

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from problems import Foreign, VectorField
 
 from .general import _forward
-from .references import exact, forced_oscillator
+from .references import dry_friction, exact, forced_oscillator
 from .shape import Shape
 
 GROUP = "jumping"
@@ -110,6 +110,12 @@ def _of_window(rng, t0, t_end):
     return rng.uniform(-1.0, 1.0, 2), {"c": c, "d": max(d, c + 0.5), "force": rng.uniform(-3.0, 3.0)}
 
 
+def _of_friction(rng, t0, t_end):
+    """Return a start from which it takes five turns at least to come to rest."""
+    y0 = rng.uniform(-2.0, 2.0, 2)
+    return y0, {"mu": rng.uniform(0.001, 0.09) * np.hypot(*y0)}
+
+
 def _foreign(name, f, dim, parameters, member, reference):
     system = Foreign(f, dim=dim, parameters=parameters, name=name)
     return Shape(GROUP, name, system, _forward(5.0, 12.0), member, reference, 8)
@@ -173,6 +179,23 @@ SHAPES = [
             {"a": rng.uniform(0.5, 1.5), "b": rng.uniform(0.5, 3.0), "c": rng.uniform(0.05, 0.95) * t_end},
         ),
         exact(_spring),
+    ),
+    _shape(
+        "dry friction",
+        lambda y, par, m: [y[1], -y[0] - par.mu * m.where(y[1] > 0, 1, -1)],
+        2,
+        {"mu": 0.1},
+        _of_friction,
+        exact(lambda times, case: dry_friction(times, case.t0, case.y0, case.par.mu)[:2]),
+        25,
+    ),
+    _shape(
+        "dry friction by abs",
+        lambda y, par, m: [y[1], -y[0] - par.mu * y[1] / m.abs(y[1])],
+        2,
+        {"mu": 0.1},
+        _of_friction,
+        exact(lambda times, case: dry_friction(times, case.t0, case.y0, case.par.mu)[:2]),
     ),
     _foreign(
         "Python, t > c",

@@ -26,8 +26,9 @@ def _valley(times, case):
     g, height = case.par.g, case.y0[0]
     quarter = math.sqrt(2.0 * height / g)
     s = (times - case.t0) % (4.0 * quarter)
-    up = np.where(s <= quarter, s, np.where(s <= 3.0 * quarter, s - 2.0 * quarter, s - 4.0 * quarter))
-    sign = np.where(np.abs(s - 2.0 * quarter) < quarter, -1.0, 1.0)
+    below = np.abs(s - 2.0 * quarter) < quarter
+    up = np.where(below, s - 2.0 * quarter, np.where(s < 2.0 * quarter, s, s - 4.0 * quarter))
+    sign = np.where(below, -1.0, 1.0)
     return sign * (height - g * up * up / 2.0), -sign * g * up
 
 

@@ -103,6 +103,31 @@ def piecewise_oscillator(
     return found[0], found[1]
 
 
+def dry_friction(times: Array, t0: float, y0: Array, mu: float) -> tuple[Array, Array, float]:
+    """Return position and velocity of x'' = -x - mu sign(x'), and when it comes to rest; infinite: never.
+
+    Up to the last of the times. Between two turns it is a cosine about -mu or mu.
+    """
+    order = np.argsort(times)
+    x, v, now, rest = float(y0[0]), float(y0[1]), t0, math.inf
+    found = np.empty((2, times.size))
+    i = 0
+    while i < times.size:
+        if v == 0.0 and abs(x) <= mu:
+            found[:, order[i:]] = [[x], [0.0]]
+            rest = now
+            break
+        centre = -math.copysign(mu, v if v != 0.0 else -x)
+        radius, angle = math.hypot(x - centre, v), math.atan2(-v, x - centre)
+        wait = math.pi if v == 0.0 else -angle % math.pi
+        while i < times.size and times[order[i]] <= now + wait:
+            phase = angle + times[order[i]] - now
+            found[:, order[i]] = centre + radius * math.cos(phase), -radius * math.sin(phase)
+            i += 1
+        x, v, now = centre + math.copysign(radius, -centre), 0.0, now + wait
+    return found[0], found[1], rest
+
+
 def heyoka(trajectory: Trajectory) -> Reference:
     """Return heyoka's Taylor integrator as the reference, where two tolerances agree."""
 
