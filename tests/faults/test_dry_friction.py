@@ -1,5 +1,7 @@
 """Fields that jump on a surface in the state: steps end there, and say where the trajectory would slide."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -81,7 +83,7 @@ def test_backwards_and_back_again():
 
 
 def test_samples_and_checkpoints_on_and_beside_a_surface():
-    program = HBVM().compile(FRICTION["where"])
+    program: Any = HBVM().compile(FRICTION["where"])
     plain = integrate(Problem(FRICTION["where"], y0=STARTS[2], t_end=END), HBVM(), [END / 2], sample="steps")
     on_surface = plain.t[np.abs(plain.y[:, 1]) < 1e-14]
     assert on_surface.size == 6
