@@ -470,6 +470,16 @@ class Variations(Protocol):
         """
         ...
 
+    def scale(self, factors: ArrayLike) -> None:
+        """Multiply the vectors by numbers, from the last own step on; powers of 2 round nothing.
+
+        Parameters
+        ----------
+        factors : array_like, shape (n,)
+            For each of the vectors, whose parts in the parameters are 0.
+        """
+        ...
+
 
 class Gradients(Protocol):
     """A stepper whose steps can be recorded, for their adjoint."""

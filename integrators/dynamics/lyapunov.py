@@ -6,12 +6,13 @@ J.-M. Strelcyn, Meccanica 15 (1980), 9-20 and 21-30).
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
 from integrators import registry
-from integrators.protocol import Array, MethodBase, Samples, Status, Variations, check_problem, offers
+from integrators.dynamics.vectors import with_variations
+from integrators.protocol import Array, MethodBase, Samples, Status
 from problems.checks import at_least, checked_arguments
 from problems.errors import InputError
 from problems.problem import Problem
@@ -93,16 +94,13 @@ def lyapunov(
     ((4,), True)
     """
     method = registry.create("HBVM") if method is None else method
-    check_problem(problem, method)
     system, end = problem.system, problem.t_end if t_end is None else t_end
     n = system.dim if count is None else count
     if n > system.dim:
         raise InputError(f"count={n} is more than the {system.dim} components of {system.name}.")
     if not problem.t0 + skip < end or skip < 0.0:
         raise InputError(f"t_end={end!r} leaves no time after t0={problem.t0!r} and skip={skip!r}.")
-    stepper: Any = method.compile(system).start(problem.y0, problem.par, problem.t0)
-    if not offers(stepper, Variations):
-        raise InputError(f"{method!r} has no variations; use Gauss or HBVM.")
+    stepper = with_variations(problem, method)
     frame, none = _frame(system.dim, system.dof)[:, :n], np.zeros((system.n_par, n))
     stepper.follow(frame, none)
     times, growth, made = [], [], None

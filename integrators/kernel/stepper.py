@@ -209,6 +209,11 @@ class HBVMStepper(ABC):
     def march(self, end: float, most: int) -> Samples:
         """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
 
+    def scale(self, factors: ArrayLike) -> None:
+        """Multiply the vectors by numbers; see `integrators.protocol.Variations`."""
+        if self._vectors is not None:
+            self._vectors.scale(np.asarray(factors, dtype=np.float64))
+
     def look_to(self, end: float) -> Status:
         """Look for events from the last own step to a time that lies in the step ahead."""
         search = self.search

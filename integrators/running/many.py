@@ -174,20 +174,8 @@ def integrate_many(
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system
-    values = _values(system, parameters)
-    first, n = _number(starts, values)
-    grid = check_times([problem.t_end] if times is None else times, problem.t0)
-    if starts is None:
-        starts = np.tile(problem.y0, (n, 1))
-    rows = as_numbers("starts", starts)
-    if rows.ndim != 2 or rows.shape[1] != system.dim or not n:
-        raise InputError(f"starts must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
-    par = np.tile(problem.par, (n, 1))
-    places = system.unpack(np.arange(system.n_par, dtype=np.float64))
-    for name, value in values.items():
-        if value.ndim > np.ndim(places[name]) and len(value) != n:
-            raise InputError(f"parameter {name!r} has {len(value)} values, and {first} {n}; give as many.")
-        par[:, np.asarray(places[name], dtype=int)] = value
+    rows, par = members("integrate_many", problem, starts, parameters)
+    n, grid = len(rows), check_times([problem.t_end] if times is None else times, problem.t0)
     check_batch(rows, par, grid, system)
     program = _program(system, method, backend)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
@@ -213,6 +201,29 @@ def integrate_many(
     if start is not None:
         made.events.extend({} for _ in range(n - len(made.events)))
     return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
+
+
+def members(who: str, problem: Problem, starts: ArrayLike | None, parameters: Any) -> tuple[Array, Array]:
+    """Return the starts, (n, dim), and the parameters, (n, n_par), that are given to a function.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For starts or parameters of a wrong shape, and numbers of them that do not agree.
+    """
+    system = problem.system
+    values = _values(system, parameters)
+    first, n = _number(who, starts, values)
+    rows = as_numbers("starts", np.tile(problem.y0, (n, 1)) if starts is None else starts)
+    if rows.ndim != 2 or rows.shape[1] != system.dim or not n:
+        raise InputError(f"starts must have shape (n, {system.dim}) with n >= 1, not {rows.shape}.")
+    par = np.tile(problem.par, (n, 1))
+    places = system.unpack(np.arange(system.n_par, dtype=np.float64))
+    for name, value in values.items():
+        if value.ndim > np.ndim(places[name]) and len(value) != n:
+            raise InputError(f"parameter {name!r} has {len(value)} values, and {first} {n}; give as many.")
+        par[:, np.asarray(places[name], dtype=int)] = value
+    return rows, par
 
 
 def _program(system: System, method: MethodBase, backend: str | None) -> Program:
@@ -293,13 +304,13 @@ def _values(system: System, parameters: Any) -> dict[str, Array]:
     return found
 
 
-def _number(starts: ArrayLike | None, values: dict[str, Array]) -> tuple[str, int]:
+def _number(who: str, starts: ArrayLike | None, values: dict[str, Array]) -> tuple[str, int]:
     """Return what says how many trajectories there are, in words, and how many."""
     if starts is not None:
         return "starts", len(np.atleast_1d(as_numbers("starts", starts)))
     counts = {name: len(value) for name, value in values.items() if value.ndim}
     if not counts:
-        raise InputError("integrate_many needs starts=, an array (n, dim), or parameters= with n values.")
+        raise InputError(f"{who} needs starts=, an array (n, dim), or parameters= with n values.")
     name = max(counts, key=lambda name: (values[name].ndim, counts[name]))
     return f"parameter {name!r}", counts[name]
 

@@ -168,6 +168,18 @@ class Vectors:
             own.age = 0
             first += n
 
+    def scale(self, factors: Array) -> None:
+        """Multiply the vectors at the last own step by numbers."""
+        first, rows = 0, self._context.shape.rows
+        for own, _ in self._pairs:
+            n = own.shape.rows // rows
+            state = own.state.copy()
+            own.write(_laid_out(np.tile(factors[first : first + n], (self.shape[0], 1)), rows))
+            own.error[:] *= own.state
+            own.state[:] *= state
+            own.length = own.older_length = 0.0
+            first += n
+
     @property
     def _step_ahead(self) -> list[Array]:
         """What the vectors need of the trajectory's step ahead, which may be solved."""

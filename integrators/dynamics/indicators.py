@@ -1,0 +1,229 @@
+"""Indicators of chaos: MEGNO, alignment indices, finite-time exponents.
+
+MEGNO (P. M. Cincotta, C. M. Giordano, C. Simó, Physica D 182 (2003), 151-178) and the alignment indices SALI
+and GALI_k (Ch. Skokos, T. C. Bountis, Ch. Antonopoulos, Physica D 231 (2007), 30-54) tell regular from
+chaotic motion in a shorter time than exponents do.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from integrators import registry
+from integrators.dynamics.vectors import Course, random_vectors, sampling_times
+from integrators.protocol import Array, MethodBase, Status
+from problems.checks import at_least, checked_arguments
+from problems.errors import InputError
+from problems.problem import Problem
+
+SAMPLES = 2048  # at which the vectors are looked at, by default
+
+Samples = Annotated[int, at_least(2)]
+
+
+@dataclass(frozen=True, eq=False)
+class Indicator:
+    """An indicator along one trajectory.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Times.
+    values : ndarray, shape (m,)
+        The indicator there.
+    status, reason
+        How the integration ended; after a failure, the values are those up to there.
+    steps : int
+        How many the trajectory took.
+    """
+
+    t: Array
+    values: Array
+    status: Status
+    reason: str
+    steps: int
+
+    @property
+    def value(self) -> float:
+        """The last one; NaN where there is none."""
+        return float(self.values[-1]) if self.values.size else np.nan
+
+
+@checked_arguments
+def megno(
+    problem: Problem,
+    method: MethodBase | None = None,
+    *,
+    t_end: float | None = None,
+    samples: Samples = SAMPLES,
+) -> Indicator:
+    r"""Return the mean exponential growth factor of nearby orbits, averaged over time.
+
+    With the length d of a tangent vector, Y(t) = 2/t int_0^t (d'/d) s ds, and the indicator is its mean over
+    the time from 0 to t. It tends to 2 for quasi-periodic orbits of nonlinear systems, to 0 for linear
+    oscillators, and grows as lambda t / 2, with the largest exponent lambda, for chaotic orbits.
+
+    Integrated by parts, Y(t) = 2 log d(t) - 2/t int log d ds. Both integrals are sums of trapezoids over the
+    samples: with the length growing like the time, 2048 samples change the limit by less than 1e-4.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to integrate; traced.
+    method : MethodBase, optional
+        `Gauss` or `HBVM`; by default ``HBVM()``.
+    t_end : float, optional
+        The end; by default the problem's.
+    samples : int
+        How often to look at the vector, in equal distances but for a dense beginning. With a fixed step size
+        it is looked at after whole steps, so there may be fewer.
+
+    Returns
+    -------
+    Indicator
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a method or a system without variations, or an end that is not after the start.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import megno
+    >>> found = megno(problems.load("kepler", e=0.3), Gauss(s=6, h=0.1), t_end=2000.0)
+    >>> bool(abs(found.value - 2.0) < 0.05)
+    True
+    """
+    t, _, logarithms, course = _followed(problem, method, 1, t_end, samples)
+    times = np.concatenate([[0.0], t - problem.t0])
+    lengths = np.concatenate([[0.0], logarithms[:, 0]])
+    growth = np.zeros(times.size)
+    growth[1:] = 2.0 * (lengths[1:] - _integral(times, lengths) / times[1:])
+    return Indicator(t, _integral(times, growth) / times[1:], course.status, course.reason, course.steps)
+
+
+@checked_arguments
+def sali(
+    problem: Problem,
+    method: MethodBase | None = None,
+    *,
+    t_end: float | None = None,
+    samples: Samples = SAMPLES,
+) -> Indicator:
+    """Return the smaller alignment index: the shorter of u - v and u + v, for tangent vectors of length 1.
+
+    On chaotic orbits it falls like exp(-(lambda_1 - lambda_2) t), down to rounding; on regular orbits of
+    systems with two degrees of freedom or more it stays of the order of 1.
+
+    Parameters, returns and errors are those of `megno`.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import sali
+    >>> bool(sali(problems.load("henon_heiles"), Gauss(s=6, h=0.25), t_end=500.0).value < 1e-8)
+    True
+    """
+    t, directions, _, course = _followed(problem, method, 2, t_end, samples)
+    u, v = directions[:, :, 0], directions[:, :, 1]
+    values = np.minimum(np.linalg.norm(u - v, axis=1), np.linalg.norm(u + v, axis=1))
+    return Indicator(t, values, course.status, course.reason, course.steps)
+
+
+@checked_arguments
+def gali(
+    problem: Problem,
+    method: MethodBase | None = None,
+    *,
+    k: Annotated[int, at_least(2)] = 2,
+    t_end: float | None = None,
+    samples: Samples = SAMPLES,
+) -> Indicator:
+    """Return the generalized alignment index of order k: the volume that k tangent vectors of length 1 span.
+
+    It is the product of the singular values of the matrix of the vectors. On chaotic orbits it falls
+    exponentially; on regular orbits on an N-dimensional torus it stays of the order of 1 for k <= N and falls
+    like a power of t for larger k.
+
+    Parameters
+    ----------
+    k : int
+        How many vectors, 2 to the dimension of the state.
+
+    Other parameters, returns and errors are those of `megno`.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import gali
+    >>> bool(gali(problems.load("henon_heiles"), Gauss(s=6, h=0.25), k=3, t_end=500.0).value < 1e-12)
+    True
+    """
+    t, directions, _, course = _followed(problem, method, k, t_end, samples)
+    values = np.prod(np.linalg.svd(directions, compute_uv=False), axis=1)
+    return Indicator(t, values, course.status, course.reason, course.steps)
+
+
+@checked_arguments
+def finite_time_exponent(
+    problem: Problem,
+    method: MethodBase | None = None,
+    *,
+    t_end: float | None = None,
+    samples: Samples = SAMPLES,
+) -> Indicator:
+    """Return the largest finite-time Lyapunov exponent: log(sigma)/t, with the norm sigma of the tangent map.
+
+    A map of it over starts shows the separatrices of a flow. Unlike the exponent, it is a function of the
+    start and of the time, and knows no average.
+
+    Parameters, returns and errors are those of `megno`.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss
+    >>> from integrators.dynamics import finite_time_exponent
+    >>> saddle = problems.load("pendulum", q=3.14159265, p=0.0)
+    >>> round(finite_time_exponent(saddle, Gauss(s=4, h=0.1), t_end=5.0).value, 3)
+    1.0
+    """
+    dim = problem.system.dim
+    t, directions, logarithms, course = _followed(problem, method, dim, t_end, samples)
+    largest = logarithms.max(axis=1, initial=-np.inf)
+    maps = directions * np.exp(logarithms - largest[:, np.newaxis])[:, np.newaxis]
+    norms = np.linalg.norm(maps, 2, axis=(1, 2))
+    return Indicator(
+        t, (largest + np.log(norms)) / (t - problem.t0), course.status, course.reason, course.steps
+    )
+
+
+def _integral(t: Array, values: Array) -> Array:
+    """Return the integrals up to each time but the first, by trapezoids."""
+    return np.cumsum(np.diff(t) * (values[1:] + values[:-1]) / 2.0)
+
+
+def _followed(
+    problem: Problem, method: MethodBase | None, count: int, t_end: float | None, samples: int
+) -> tuple[Array, Array, Array, Course]:
+    """Return the times, directions and logarithms of the lengths of vectors, and how it ended."""
+    method = registry.create("HBVM") if method is None else method
+    dim = problem.system.dim
+    if count > dim:
+        raise InputError(
+            f"{count} tangent vectors are more than the {dim} components of {problem.system.name}."
+        )
+    times = sampling_times(problem, method, t_end, samples)
+    course = Course(problem, method, random_vectors(dim, count))
+    chunks = list(course.through(times))
+    return (
+        np.concatenate([times[:0], *(chunk.t for chunk in chunks)]),
+        np.concatenate([np.empty((0, dim, count)), *(chunk.directions for chunk in chunks)]),
+        np.concatenate([np.empty((0, count)), *(chunk.logarithms for chunk in chunks)]),
+        course,
+    )
