@@ -70,6 +70,7 @@ def test_the_error_of_the_trajectory_follows_the_tolerance():
 def test_a_step_takes_half_of_the_iterations(problem):
     def iterations(projection):
         stats = integrate(problem, HBVM(k=8, s=7, tol=1e-3, projection=projection), [300.0]).stats
+        assert stats.iterations is not None
         return stats.iterations / stats.steps
 
     assert iterations("energy") < 0.5 * iterations(None)  # .42 and .39
