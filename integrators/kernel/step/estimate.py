@@ -32,6 +32,9 @@ NARROWEST = 1e-12  # part of the time: shorter steps do not look for a kink any 
 # Times as much is negligible in such a step: next to a zero of a component none might be short enough.
 BESIDE_NOTHING = 1e3
 OUTSIDE = 100.0  # times the last coefficients: a smooth field is no farther from its polynomial at the ends
+# A component's low coefficients that are larger than this part of all do not fall off, and are those of a
+# mode at rest where the error they would make is at most that part of the allowed one; see `log_decay`.
+RESTLESS, RESTING = 0.1, 0.1
 ALIKE = 1e-14  # part of the field's mean that its other coefficients are at most where it does not change
 
 
@@ -338,23 +341,28 @@ def measure_blocks(ctx):
 def log_decay(ctx):
     """Return the logarithm of the factor from one low coefficient of the field to the next, after `estimate`.
 
-    Of the block where they fall off slowest. High ones drown in rounding where h J is
-    large and the solution smooth; 0 where one of them does not, for `estimate` is right then.
+    Of the component where they fall off slowest. High ones drown in rounding where h J is
+    large and the solution smooth; 0 where one of them does not, for `estimate` is right then. A component
+    whose low ones do not fall off either, and would not be an error even if they were what is left out, is a
+    fast mode at rest that rounding moves: it says nothing about the step.
     """
     steps = min(3, ctx.error_degree - 1)
     if steps < 1:
         return 0.0
     h = abs(ctx.h)
     slowest = -INFINITY
-    for b in range(ctx.block_count):
-        if is_visible(h, ctx.gamma_error[b], block_size(ctx, b)):
-            return 0.0
     for d in range(ctx.rows):
         b, found = ctx.block[d], ctx.estimates + 8 * d
-        last = found[GAMMA_3]
+        last, size = found[GAMMA_3], block_size(ctx, b)
         if steps == 3:
             last = next_coefficient(last, found[GAMMA_2], ctx.error_decay)
-        if is_visible(h, last, block_size(ctx, b)):
+        if last > RESTLESS * ctx.slope[b]:
+            slope = slope_beside(ctx.slope[b], ctx.steepest[ctx.group[b]], ctx.least_slope)
+            if local_error(h, last, slope, size) <= RESTING * ctx.allowed_error:
+                continue
+        if is_visible(h, next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], ctx.error_decay), size):
+            return 0.0
+        if is_visible(h, last, size):
             slowest = max(slowest, log(last / ctx.slope[b]) / steps)
     return max(slowest, log(TINY))
 
