@@ -215,7 +215,7 @@ def blind(k: int | None, tol: float | None, solver: str) -> str | None:
     Where k is chosen, it is large enough.
     """
     if tol is None:
-        return "steps of one length are not cut there"
+        return "fixed steps are not cut there"
     if solver in ("newton", "blended"):
         return f"kinks are not looked for with solver={solver!r}"
     if k is not None and k < FEWEST:

@@ -194,8 +194,8 @@ class Samples:
     Attributes
     ----------
     t : ndarray, shape (n,)
-        The times reached: a leading part of the times asked for, or the
-        method's own steps with ``sample="steps"``.
+        The times reached: a leading part of the times asked for, or the steps of the
+        method with ``sample="steps"``.
     y : ndarray, shape (n, dim)
         The states at these times, in the problem's coordinates.
     status : Status
@@ -233,9 +233,9 @@ class Trajectories:
     status, reason : list, length n
         How each trajectory ended, and one sentence where it failed.
     t_stop : ndarray, shape (n,)
-        The last time, or that of the last own step before a failure.
+        The last time, or that of the last step before a failure.
     steps : ndarray of int, shape (n,)
-        Own steps; accepted ones where lengths vary.
+        Steps; accepted ones where lengths vary.
     extra : dict of int to dict
         By a trajectory's number, what of its `Stats.extra` warnings may follow from; see `telling`.
     """
@@ -286,7 +286,7 @@ class Stepper(Protocol):
             first may be the present time.
         sample : {"side", "steps", "land", "dense"}, optional
             How states between steps are made (``None``: the method's best
-            that leaves its own steps untouched, or landing where landing
+            that leaves its steps untouched, or landing where landing
             costs it nothing). A method refuses what it cannot do.
 
         Returns
@@ -436,7 +436,7 @@ class EventStepper(Protocol):
     search: Any
 
     def look_to(self, end: float) -> Status:
-        """Look for events from the last own step to a time within the step ahead."""
+        """Look for events from the last step to a time within the step ahead."""
         ...
 
 
@@ -485,7 +485,7 @@ class Gradients(Protocol):
     """A stepper whose steps can be recorded, for their adjoint."""
 
     def march(self, end: float, most: int) -> Samples:
-        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
         ...
 
     def recorder(self, capacity: int) -> Any:

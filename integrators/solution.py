@@ -122,7 +122,7 @@ class Solution:
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times that the trajectory covers.
 
-        From a sample before a time the method goes on as it began there: own steps, and what
+        From a sample before a time the method goes on as it began there: steps, and what
         its `Stepper.advance` makes between them. It goes on past the next
         samples as long as it meets them. So these states have the method's order, and
         those of an energy-preserving method its energy, which no interpolation has; the price is

@@ -1,4 +1,4 @@
-"""Bases of integrators written in Python: the book-keeping around somebody's own steps.
+"""Bases of integrators written in Python: the book-keeping around another solver's steps.
 
 `FixedStep` is for a method with a fixed step: it says how it takes steps, and all the rest of
 `integrators.protocol` comes with it. `ProgramBase` and `StepperBase` are for methods that choose
@@ -77,9 +77,9 @@ class StepperBase:
     `_serve`, `_own_steps` and `_one`. One with checkpoints is a `RestorableStepper`.
 
     The *present* time ``t`` and state ``y`` are those last returned. The library
-    itself may be ahead of them (an adaptive method, whose own steps are not
-    shortened for a sample) or behind (a fixed step, where the sample came from a
-    throw-away step).
+    itself may be ahead of them (an adaptive method, whose steps are not
+    shortened for a sample) or behind (a fixed step, where the sample came from a partial
+    step).
     """
 
     samplings: ClassVar[tuple[str, ...]] = ()
@@ -199,11 +199,11 @@ class StepperBase:
         raise NotImplementedError
 
     def _own_steps(self, end: float) -> tuple[Array, Array]:
-        """Return the own steps from the present (excluded) to ``end`` (included), as `_serve` does."""
+        """Return the steps from the present (excluded) to ``end`` (included), as `_serve` does."""
         raise NotImplementedError
 
     def _one(self) -> tuple[float, Array] | None:
-        """Take one own step and return where it arrived; ``None`` after a failure."""
+        """Take one step and return where it arrived; ``None`` after a failure."""
         raise NotImplementedError
 
 
@@ -249,10 +249,10 @@ class FixedStepper(RestorableStepper):
     """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
 
     ``"side"`` (default)
-        Times that are a multiple of h are own steps; for others a throw-away copy
-        takes one step of the missing length.
+        Times that are a multiple of h are ends of steps; for others a copy takes one partial
+        step.
     ``"steps"``
-        The own steps up to the last time.
+        The steps up to the last time.
     ``"land"``
         The last step before each time is shortened onto it; steps count from there then.
 
@@ -349,7 +349,7 @@ class FixedStepper(RestorableStepper):
         self._load_steps(steps)
 
     def _march(self, count: int) -> None:
-        """Take ``count`` own steps, no more than ``at_once``."""
+        """Take ``count`` steps, no more than ``at_once``."""
         self._steps(self._t0, self._h, self._n, count, self._here)
         self._evaluated(count)
 
@@ -368,17 +368,17 @@ class FixedStepper(RestorableStepper):
             self._stats.evaluations = (self._stats.evaluations or 0) + steps * each
 
     def _state(self) -> Array:
-        """Return a copy of the state at the last own step."""
+        """Return a copy of the state at the last step."""
         return self._here.copy()
 
     def _aside(self, part: float) -> Array:
-        """Return the state a throw-away step of length ``part`` after the last own step."""
+        """Return the state a partial step of length ``part`` after the last step."""
         y = self._here.copy()
         self._steps(self._time(), part, 0, 1, y)
         return y
 
     def _shorten(self, part: float) -> None:
-        """Take one step of length ``part`` after the last own step."""
+        """Take one step of length ``part`` after the last step."""
         self._here = self._aside(part)
         self._evaluated(1)
 

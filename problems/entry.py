@@ -30,9 +30,9 @@ class Expected:
     energy : float
         The largest relative energy error in 400 such steps.
     default : float
-        The largest relative energy error over the whole span with HBVM().
+        The largest relative energy error over the whole integration interval with HBVM().
     until : float, optional
-        Where that run ends instead, if doubles cannot hold the whole span.
+        Where that run ends instead, if doubles cannot hold the whole integration interval.
     small : mapping
         Arguments with which every engine compiles it in a second.
     """

@@ -1,4 +1,4 @@
-"""A problem: a system, a start, parameters and a span of time."""
+"""A problem: a system, a start, parameters and an integration interval."""
 
 import copy
 import re
@@ -36,7 +36,7 @@ class Problem:
     parameters : mapping of str to float or sequence of float
         Values that differ from the system's defaults.
     t0, t_end : float
-        Span of time; ``t_end`` may lie before ``t0``.
+        Integration interval; ``t_end`` may lie before ``t0``.
     name : str, optional
         The name under which `problems.load` knows it.
     title : str, optional

@@ -80,7 +80,7 @@ class Checks(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     Attributes
     ----------
     starts : int
-        Trajectories from which the law of the drift is found: the problem's own start
+        Trajectories from which the error growth is found: the problem's own start
         and perturbed ones; see `hbvm_bench.measure.starts`. 0: no law is sought.
     reversal : float
         Share of the span that is integrated there and back again; 0: none.

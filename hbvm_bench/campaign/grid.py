@@ -48,7 +48,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         Moves every time between the ends to the nearest multiple of this after the start, such
         as a year, which a step may divide.
     own_steps : bool
-        Whether samples are moved to the nearest own steps of a method with a fixed one, so
+        Whether samples are moved to the nearest ends of steps of a method with a fixed one, so
         that they cost it nothing in quality, and the end is that of a run without samples,
         the one that is timed.
 

@@ -21,7 +21,7 @@ def paper(
         int | None, typer.Option(min=1, help="Number of processes; default one per core.")
     ] = None,
 ) -> None:
-    """Run the seed paper's experiments again and write the report: claim, paper, here.
+    """Run the original paper's experiments again and write the report: claim, paper, here.
 
     What every computation returns is kept as soon as it has ended, and a run that was interrupted goes on.
     """

@@ -170,7 +170,7 @@ def virtual() -> Finding:
 
 
 def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
-    """Time a fixed computation again and again on one core, and tell how steady that is."""
+    """Time the calibration loop again and again on one core, and tell how steady that is."""
     with machine.staying_on_a_core():
         measure()  # compiled now
         stolen, wall, busy = psutil.cpu_times().steal, time.perf_counter(), time.process_time()

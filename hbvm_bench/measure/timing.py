@@ -266,7 +266,7 @@ def _compilation(run: Timeable) -> Compile:
 
 
 def busy() -> tuple[float, float, float, float]:
-    """Return, in seconds, the busy and stolen time of all cores, our own, and the wall clock's."""
+    """Return, in seconds, the busy and steal time of all cores, our own, and the wall clock's."""
     all_, own = psutil.cpu_times(), os.times()
     spent = all_.user + all_.nice + all_.system + all_.irq + all_.softirq
     return spent, all_.steal, own.user + own.system, own.elapsed
@@ -281,7 +281,7 @@ def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | 
 
 
 def calibrate(clock: Callable[[], float] = time.perf_counter) -> float:
-    """Return the seconds, by the clock of the samples, of a fixed computation without any integrator.
+    """Return the seconds, by the clock of the samples, of the calibration loop without any integrator.
 
     It divides out how fast the machine is at the moment: square roots, divisions and
     multiply-adds in four independent chains, compiled, about 10 ms.

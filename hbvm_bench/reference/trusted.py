@@ -140,7 +140,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             f"two computations of {problem!r} differ by {opinions.apart[1]:.1e} already at "
             f"t = {float(opinions.times[1])!r}; ask for less with until=."
         )
-    horizon = "the whole span" if opinions.times[kept - 1] == problem.t_end else "this horizon"
+    horizon = "the whole interval" if opinions.times[kept - 1] == problem.t_end else "this horizon"
     text = str if problem.system.dim <= SMALL else _few_digits
     return solutions.of(
         problem,

@@ -102,7 +102,7 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
     share : float
         Processor seconds per wall second while sampling: below 1 something else used the core.
     calibration : list of float
-        Seconds of a fixed computation before each sample and after the last.
+        Seconds of the calibration loop before each sample and after the last.
     number : int or None
         Of the interleaved round, from 0; ``None`` for a visit by itself.
     compilation : int
@@ -123,7 +123,7 @@ class TimingRound(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def calibrated(self) -> list[float]:
-        """Return the samples in units of the fixed computation; empty where it was not taken."""
+        """Return the samples in units of the calibration loop; empty where it was not taken."""
         return [sample / median(self.calibration) for sample in self.samples] if self.calibration else []
 
 

@@ -49,9 +49,9 @@ class Findings:
     dimension: int  # length of the state
     separable: bool  # whether H = sum c_i p_i^2/2 + V(q, t)
     degree: int | None  # of the energy as a polynomial in the state; ``None`` if it is none
-    exact: tuple[tuple[int, int], ...]  # pairs s, k: HBVM(k, s) keeps the energy, a polynomial, exactly
+    exact: tuple[tuple[int, int], ...]  # pairs s, k: HBVM(k, s) conserves the energy, a polynomial, exactly
     cyclic: tuple[str, ...]  # positions that do not occur: their momenta are constant
-    depends_on_time: bool  # whether the time occurs, so that the energy is not kept
+    depends_on_time: bool  # whether the time occurs, so that the energy is not conserved
     invariants: tuple[str, ...]
     guards: tuple[str, ...]  # what stays exactly 0
     parameters: dict[str, Any]

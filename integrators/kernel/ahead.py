@@ -17,7 +17,7 @@ ENGINES = {
     "implicit solvers": solver,
     "line integrals": line,
     "ensembles": run,
-    "ensembles with own steps": run_own,
+    "ensembles with adaptive steps": run_own,
     "events": look,
     "variations": follow,
     "recorded steps": record,

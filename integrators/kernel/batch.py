@@ -203,7 +203,7 @@ class _InLanes:
 
     @property
     def steps(self) -> Counts:
-        """Own steps of every trajectory."""
+        """Steps of every trajectory."""
         raise NotImplementedError
 
     @property
@@ -233,7 +233,7 @@ class _InLanes:
 
 
 class _Fixed(_InLanes):
-    """Steps of one length: a group of trajectories after the other."""
+    """Fixed steps: a group of trajectories after the other."""
 
     @classmethod
     def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:
@@ -248,7 +248,7 @@ class _Fixed(_InLanes):
 
 
 class _Own(_InLanes):
-    """Steps of varying length: in each lane one trajectory after the other."""
+    """Adaptive steps: in each lane one trajectory after the other."""
 
     @classmethod
     def plan(cls, lanes: Lanes, work: _Work) -> tuple[float, dict[str, Any]]:

@@ -149,7 +149,7 @@ class Context(Memory):
     chunks = Integer()  # groups of 8 stages that carry weight
     route = Integer()  # 8, 16: one matrix of so many columns; WIDE: a larger one; THROUGH: by coefficients
     second = Integer()  # 1: second-order form
-    varying = Integer()  # 1: steps of varying length
+    varying = Integer()  # 1: adaptive steps
     unit = Integer()  # 1: the row's factor is in the matrix
     k = Integer()  # stages, for the counters
     s = Integer()  # degree
@@ -233,7 +233,7 @@ class Context(Memory):
     last = Real()  # change; see `step.iterate`
     change = Real()  # the largest of the last fused sweep
     tolerance = Real()  # the relative change at which the iteration has converged
-    trusted = Real()  # a change from which on steps of varying length iterate without a test,
+    trusted = Real()  # a change from which on adaptive steps iterate without a test,
     log_trusted = Real()  # and the binary logarithm of one before which they do
     log_rest = Real()  # binary logarithm of what may be left of a change when the step is solved
     rate = Real()  # binary logarithm of the iteration's contraction, as measured
@@ -262,7 +262,7 @@ class Context(Memory):
     switches = Integer()
     rejections = Integer()
 
-    # --- steps of varying length; see `step.vary` ---
+    # --- adaptive steps; see `step.vary` ---
     allowed_error = Real()  # the estimated local error of a step, relative, at most
     allowed_defect = Real()  # the same of the quadrature; infinite: any
     error_degree = Integer()  # of the Legendre coefficient that the error is estimated by

@@ -1,4 +1,4 @@
-"""A trajectory by steps of one length."""
+"""A trajectory with fixed step size."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from integrators.running.times import Counts, plan
 
 
 class FixedStepper(HBVMStepper):
-    """A trajectory of HBVM(k, s) by steps of one length; see `HBVMStepper`.
+    """A trajectory of HBVM(k, s) with fixed step size; see `HBVMStepper`.
 
     The present time is ``t0 + n h`` with an integer n, never an accumulated sum.
     """
@@ -47,7 +47,7 @@ class FixedStepper(HBVMStepper):
 
     @one_thread
     def take(self, count: int) -> Samples:
-        """Take ``count`` own steps and return them."""
+        """Take ``count`` steps and return them."""
         ctx = self._context
         targets = ctx.n + np.arange(1, count + 1)
         times = np.asarray(ctx.t0 + targets * ctx.h, dtype=np.float64)
@@ -55,7 +55,7 @@ class FixedStepper(HBVMStepper):
 
     @one_thread
     def march(self, end: float, most: int) -> Samples:
-        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
         ctx = self._context
         if (end - self.t) * ctx.h < 0.0:
             self._turn(self.t)

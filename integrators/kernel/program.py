@@ -1,4 +1,4 @@
-"""HBVM(k, s) compiled for one system, with steps of one length or of varying length: a `Program`."""
+"""HBVM(k, s) compiled for one system, with fixed or adaptive step size: a `Program`."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""One trajectory of HBVM(k, s) under way: what steps of one length and of varying length have in common."""
+"""One trajectory of HBVM(k, s) under way: what fixed and adaptive steps have in common."""
 
 import math
 import threading
@@ -100,10 +100,10 @@ class HBVMStepper(ABC):
     ``advance`` offers every sampling:
 
     ``"side"`` (default)
-        A throw-away step of the missing length from the last own step: order 2s,
-        energy as at the own steps, and the own steps are untouched.
+        A partial step from the last step: order 2s,
+        energy as at the steps, and the steps are untouched.
     ``"steps"``
-        The own steps themselves, up to the last time (and the present state, if
+        The steps themselves, up to the last time (and the present state, if
         the first time is the present).
     ``"land"``
         The last step before each time is shortened onto it and the next begins
@@ -111,7 +111,7 @@ class HBVMStepper(ABC):
         method (k = s) its long-time behaviour.
     ``"dense"``
         The polynomial of the step: free, but of order s + 1 only, and it does not
-        keep the energy.
+        conserve the energy.
     """
 
     # What a checkpoint holds; the values matter to the next start.
@@ -207,7 +207,7 @@ class HBVMStepper(ABC):
 
     @abstractmethod
     def march(self, end: float, most: int) -> Samples:
-        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
 
     def scale(self, factors: ArrayLike) -> None:
         """Multiply the vectors by numbers; see `integrators.protocol.Variations`."""
@@ -215,12 +215,12 @@ class HBVMStepper(ABC):
             self._vectors.scale(np.asarray(factors, dtype=np.float64))
 
     def look_to(self, end: float) -> Status:
-        """Look for events from the last own step to a time that lies in the step ahead."""
+        """Look for events from the last step to a time that lies in the step ahead."""
         search = self.search
         if search is not None and search.trouble is None and self._status is Status.RUNNING:
             if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
                 return self._status
-            if not self._context.solved:  # as after samples that are own steps
+            if not self._context.solved:  # as after samples that are ends of steps
                 made = self.advance([end], sample="side")
                 if made.status is not Status.FINISHED:
                     reason = f"{made.reason} Events are known up to t = {self.t!r} only."
@@ -240,14 +240,14 @@ class HBVMStepper(ABC):
 
     @property
     def t(self) -> float:
-        """Time of the last own step."""
+        """Time of the last step."""
         ctx = self._context
         return ctx.t0 + ctx.n * ctx.h
 
     @property
     @one_thread
     def y(self) -> Array:
-        """A copy of the state at the last own step."""
+        """A copy of the state at the last step."""
         return self._context.read()
 
     @property
@@ -267,12 +267,12 @@ class HBVMStepper(ABC):
         ``extra`` holds: partial steps made; restarts from a bad extrapolation;
         ``"lanes"``, whether the field runs on all stages at once; ``"form"``, whether
         stages hold the positions only ("second") or the whole state ("first"); and, once
-        there is an implicit solver, ``"implicit"``, a dict: own steps that it solved, times
+        there is an implicit solver, ``"implicit"``, a dict: steps that it solved, times
         that it took over, Jacobians (and whether they are "traced" or by "differences"),
         factorizations, rescues of steps that a fixed Jacobian could not solve. With several
         invariants also ``"lost"``, how often one had moved in a step by more than rounding
         accounts for (k is then too small), and ``"left_out"``, the names of those that follow
-        from others. With steps of varying length also the method's ``"k"`` and ``"s"`` and, where the field
+        from others. With adaptive step size also the method's ``"k"`` and ``"s"`` and, where the field
         jumps or has a kink, ``"kinks"``: pairs (t, h), the place that a step had to be cut for and the
         length at which it was found, or the time and 0 where a step ends on a switching surface, of the first
         64 places. With variations ``"variations"``, a dict: their iterations.
@@ -376,7 +376,7 @@ class HBVMStepper(ABC):
 
     @abstractmethod
     def take(self, count: int) -> Samples:
-        """Take ``count`` own steps and return them."""
+        """Take ``count`` steps and return them."""
 
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:

@@ -6,7 +6,7 @@ a million steps even a relative 1e-17 of it shows as a linear drift of the
 energy (measured on the outer Solar System: up to 8e-19 per year for some h,
 against 1e-19 or less with the rule that follows). So rows are rounded such that
 they keep their first moments: what they make of a field that is constant,
-linear or quadratic over the step is right to 1e-19 or so. This costs nothing
+linear or quadratic over the step is accurate to 1e-19 or so. This costs nothing
 when the rows are used.
 """
 
@@ -27,13 +27,13 @@ Array = NDArray[np.float64]
 WIDE, THROUGH = 0, 1
 
 # Coefficients that are extrapolated. P_j(2) grows like 5.8^j: with more, that amplifies rounding more than
-# it helps. Steps of varying length are long, and what they leave out is larger than that.
+# it helps. Adaptive steps are long, and what they leave out is larger than that.
 MODES, MODES_VARYING = 13, 16
 MOMENTS = 3
 PER_OCTAVE = 32
 _UP = 1.0 + np.arange(PER_OCTAVE + 1) / PER_OCTAVE
 RATIOS = np.append(0.5 * _UP[:-1], _UP)
-"""Steps of varying length are so many times as long as the step before, with up to 16 stages, where nothing
+"""Adaptive steps are so many times as long as the step before, with up to 16 stages, where nothing
 else asks for more or less: there are tables for these ratios. Lanes do not use them."""
 
 FARTHEST = 4.0  # units in the last place of its largest entry by which an entry of a row may move

@@ -1,4 +1,4 @@
-"""A trajectory by steps of varying length."""
+"""A trajectory with adaptive step size."""
 
 import math
 import sys
@@ -87,12 +87,12 @@ class AdaptiveStepper(HBVMStepper):
 
     @one_thread
     def take(self, count: int) -> Samples:
-        """Take ``count`` own steps and return them."""
+        """Take ``count`` steps and return them."""
         ahead = self._context.next_length > 0.0
         return self.walk(sys.float_info.max if ahead else -sys.float_info.max, limit=count)
 
     def march(self, end: float, most: int) -> Samples:
-        """Take own steps, ``most`` at most and none beyond the time ``end``; return them."""
+        """Take steps, ``most`` at most and none beyond the time ``end``; return them."""
         return self.walk(end, limit=most)
 
     def _advance(self, grid: Array, sample: str) -> Samples:
@@ -289,7 +289,7 @@ class AdaptiveStepper(HBVMStepper):
     def walk(
         self, end: float, *, limit: int | None = None, longest: float = math.inf, present: bool = False
     ) -> Samples:
-        """Take own steps, none beyond the time ``end``, and return them.
+        """Take steps, none beyond the time ``end``, and return them.
 
         Parameters
         ----------

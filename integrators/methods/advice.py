@@ -1,6 +1,6 @@
-"""Which of our methods, and with which step: found by trying them on the whole trajectory.
+"""Which of HBVM and Gauss, and with which step: found by trying them on the whole trajectory.
 
-Three settings that are accurate to rounding integrate the whole span. Where they differ, no
+Three settings that are accurate to rounding integrate the whole integration interval. Where they differ, no
 method in double precision knows the positions: that tells how far neighbouring trajectories
 diverge, without a model of it. Every candidate runs the span too, and its positions are
 compared with theirs, its energies with the first. Steps of fixed length are sought on a piece
@@ -31,12 +31,12 @@ LOOK = 2.0  # seconds that one run of the span may take; what comes later is not
 FIRST = 1e-6  # of the span: what is looked at first, without knowing what it costs
 PIECE = 200  # steps of HBVM() that a piece is long
 SAMPLES = 64  # states that are compared
-SHORTEST = 0.02  # of an own step of HBVM(): shorter fixed steps are not tried
+SHORTEST = 0.02  # of a step of HBVM(): shorter fixed steps are not tried
 SEARCH = 8  # lengths of steps tried for each method on the piece, ...
 REPEATS = 3  # ... and on the span
 ROUNDS = 5  # timings of a candidate, of which the fastest counts
 SAFETY = 0.3  # the share of the accuracy that an expected error may take: the samples are not the whole
-WIDTH = 16.0  # ratio of long to short own steps above which fixed steps are not tried
+WIDTH = 16.0  # ratio of long to short adaptive steps above which fixed steps are not tried
 KEPT = 1e-13  # error of an energy that is kept
 FLOOR = 1e-15  # of what positions are known to
 NEAR = 30.0  # times that: errors there are rounding errors, or theirs too
@@ -48,7 +48,7 @@ LONGEST_S = 14  # the degree at which HBVM() works: lengths of steps are first g
 
 @dataclass(frozen=True)
 class Proposal:
-    """One setting, and what it is expected to do over the problem's whole span.
+    """One setting, and what it is expected to do over the problem's whole integration interval.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Proposal:
         The setting.
     position : float
         Expected largest error of q (of y, for systems that are not Hamiltonian), relative to the
-        largest component there is, over the whole span.
+        largest component there is, over the whole integration interval.
     energy : float or None
         Largest relative error of the energy up to where was looked; ``None`` where there is none.
     seconds : float
@@ -163,8 +163,8 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
 
     Notes
     -----
-    Tried are `HBVM` with own steps, and Gauss and HBVM with fixed ones, each on the whole span: some thirty
-    trajectories. Where step lengths vary much, fixed steps are not tried. The errors are differences from
+    `HBVM` with adaptive step size, and Gauss and HBVM with fixed ones, are tried, each on the whole
+    integration interval: some thirty trajectories. Where step lengths vary much, fixed steps are not tried. The errors are differences from
     trajectories in double precision, and at least as large as those differ among themselves.
 
     Examples
@@ -217,7 +217,7 @@ class _Scout:
 
     @property
     def varying(self) -> bool:
-        """Whether own steps differ so much that a fixed one is wasted on most of the way."""
+        """Whether adaptive steps differ so much that a fixed one is wasted on most of the way."""
         low, high = np.quantile(self.lengths, [0.02, 0.9])
         return bool(high > WIDTH * low)
 
@@ -404,6 +404,7 @@ def _why(scout: _Scout, span: _Part, proposals: tuple[Proposal, ...], met: bool,
         )
     elif scout.varying:
         words.append(
-            f"Own steps vary by {np.ptp(np.log10(scout.lengths)):.1f} decades, so fixed steps were not tried."
+            f"Adaptive steps vary by {np.ptp(np.log10(scout.lengths)):.1f} decades, so fixed steps were not "
+            "tried."
         )
     return " ".join(words)

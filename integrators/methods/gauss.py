@@ -85,7 +85,7 @@ class Gauss(MethodBase):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.h is None and self.tol is None:
-            raise InputError("Gauss needs a step h, or a tolerance tol for steps of varying length.")
+            raise InputError("Gauss needs a step h, or a tolerance tol for an adaptive step size.")
         try:
             self.as_hbvm()
         except InputError as error:

@@ -1,4 +1,4 @@
-"""Hamiltonian Boundary Value Methods, HBVM(k, s), with a fixed step or with steps of varying length."""
+"""Hamiltonian Boundary Value Methods, HBVM(k, s), with fixed or adaptive step size."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -70,19 +70,19 @@ class HBVM(MethodBase):
     field has such places, give ``breakpoints`` (times) or ``max_step``. Jumps and kinks of
     the field that nodes do see, such as those of ``m.abs`` and ``m.where``, are found, and steps cut until
     they do not matter; the places are in ``stats.extra["kinks"]`` and the solution's
-    ``warnings`` say so. In steps that vary (``tol``) the formulas tell where these and tables switch in
+    ``warnings`` say so. In adaptive steps (``tol``) the formulas tell where these and tables switch in
     the state, so that weak kinks are found as well. In time, and in fields that are code, the nodes have to
     show it: eight, or four on a formula with these, in steps that the fixed-point iteration solves.
     Kinks are not looked for with ``h`` and on Poisson systems; of a field with these, ``warnings`` say so
     (`test_own_steps`, `test_weak_kinks`).
 
-    These equations do not keep the energy of a Poisson system y' = B(y) grad H(y)
+    These equations do not conserve the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
 
         gamma_j = sum_l b_l P_j(c_l) B(Y_l) sum_i P_i(c_l) G_i
 
     takes the place of the first: the same for constant B and for k = s, of the same
-    order, and the energy is kept because B is skew-symmetric; the Casimirs of B are
+    order, and the energy is conserved because B is skew-symmetric; the Casimirs of B are
     not (``tests/integrators/kernel/line/test_poisson``).
 
     Parameters
@@ -304,7 +304,7 @@ def _not_projected(system: System) -> str | None:
     """Return why steps cannot end on a surface of the system's energy; ``None`` if they can."""
     energy = system.invariants.get("energy")
     if system.kind == "poisson":
-        return "is not for Poisson systems, whose line integrals keep the energy"
+        return "is not for Poisson systems, whose line integrals conserve the energy"
     if energy is None or not system.traced:
         return f"needs a field and an energy that are formulas, the energy without time; not {system.name}"
     if len(energy.outputs) != 1 or any(node.flags & T for node in energy.roots):

@@ -59,7 +59,7 @@ class LineIntegral(MethodBase):
     * order 2s (`test_order`); symmetric (`test_symmetry`);
     * all named invariants are conserved in practice, once k is so large that the
       quadrature error is below round-off (`test_sitnikov`, `test_kepler`,
-      `test_poisson`), also with steps of varying length (`test_varying`);
+      `test_poisson`), also with adaptive step size (`test_varying`);
     * bodies that mirror each other keep doing so to the last bit (`test_sitnikov`).
 
     Rounding is taken back: before each step the invariants are evaluated at the
@@ -138,7 +138,7 @@ class LineIntegral(MethodBase):
                 f"field than {self.s} coefficients hold, and the correction is identically 0; raise k."
             )
         if self.h is None and self.tol is None:
-            raise InputError("LineIntegral needs a step h, or a tolerance tol for steps of varying length.")
+            raise InputError("LineIntegral needs a step h, or a tolerance tol for an adaptive step size.")
         if self.tol is None and self.atol is not None:
             raise InputError(
                 f"LineIntegral takes atol with a tolerance only, not with h={self.h!r} alone; give tol."

@@ -196,11 +196,11 @@ class SciPyStepper(RestorableStepper):
     """A trajectory of one of SciPy's solvers.
 
     ``"side"`` (default)
-        The solver's own steps are untouched. A time between two of them is reached
-        by a throw-away solver from the earlier one, with the same tolerances; its
+        The steps of the solver are untouched. A time between two of them is reached
+        by a separate solver from the earlier one, with the same tolerances; its
         evaluations are counted apart, in ``stats.extra["side_evaluations"]``.
     ``"steps"``
-        The solver's own steps, up to the last time.
+        The steps of the solver, up to the last time.
     ``"land"``
         The last step before each time is shortened onto it, as `solve_ivp` does at its end.
 
@@ -316,7 +316,7 @@ class SciPyStepper(RestorableStepper):
         return sign
 
     def _step(self, watch: "Crawl") -> bool:
-        """Take one own step; return whether it succeeded."""
+        """Take one step; return whether it succeeded."""
         solver, stats = self._solver, self._stats
         before, jacobians, factored = float(solver.t), solver.njev, solver.nlu
         try:
@@ -341,7 +341,7 @@ class SciPyStepper(RestorableStepper):
         self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
 
     def _aside(self, t: float) -> Array:
-        """Return the state at ``t``, within the last own step, from a throw-away solver."""
+        """Return the state at ``t``, within the last step, from a separate solver."""
         start = float(self._solver.t_old)
         aside = self._make(self._evaluate_aside, start, self._solver.y_old, t, abs(t - start))
         with np.errstate(all="ignore"):

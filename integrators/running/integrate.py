@@ -104,7 +104,7 @@ def integrate(
         ends nothing: the solution warns of it.
     resume : path, optional
         Go on from the checkpoint in this file, of the same problem, method, times, sampling and events: the
-        solution has the same bits as without the break. If there is no such file and ``checkpoint`` is
+        solution is bitwise identical to one without the break. If there is no such file and ``checkpoint`` is
         the same path, begin at the beginning. Only give a file that you made: it is a pickle.
 
     Returns
@@ -277,9 +277,7 @@ def wanted_events(events: Any, sample: str | None) -> dict[str, Event]:
     if isinstance(events, tuple | list) and not events:
         return {}
     if sample == "land":
-        raise InputError(
-            "events are those of the method's own steps, which sample='land' changes; use 'side'."
-        )
+        raise InputError("events are located on the method's steps, which sample='land' changes; use 'side'.")
     return named(events)
 
 
@@ -297,7 +295,7 @@ def started(
 
 
 def _goes_by_steps(stepper: Any, sample: str | None) -> bool:
-    """Whether own steps can be taken between two samples, and change nothing of the samples."""
+    """Whether steps can be taken between two samples, and change nothing of the samples."""
     ways = stepper.samplings if offers(stepper, Samplings) else SAMPLINGS
     return "steps" in ways and (sample or ways[0]) != "land"
 
@@ -307,7 +305,7 @@ def _next_piece(
 ) -> tuple[Array, str | None, int]:
     """Return the times of the next piece, how to sample them, and how many of the grid they serve.
 
-    A piece goes on for about ``length``: to the samples that lie there, or else by own steps, or else to
+    A piece goes on for about ``length``: to the samples that lie there, or else by steps, or else to
     the next sample. So pieces give the bits of one call of ``advance``.
     """
     sign = 1.0 if grid[-1] >= here else -1.0

@@ -38,7 +38,7 @@ class Progress:
     fraction : float
         Of the way, from 0 to 1.
     steps : int
-        Own steps until now.
+        Steps until now.
     seconds, left : float
         Since it began, or was resumed; and until its end, if it goes on as fast: infinite as long as
         nothing is known of that.

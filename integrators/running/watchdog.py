@@ -1,4 +1,4 @@
-"""When steps of varying length have collapsed: the same rule for every method, ours and the peers'."""
+"""When adaptive steps have collapsed: the same rule for every method."""
 
 import math
 from typing import Protocol

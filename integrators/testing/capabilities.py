@@ -187,7 +187,7 @@ def tangents_follow_and_change_nothing(method: MethodBase, problem: Problem) -> 
     except InputError as refusal:
         return str(refusal)
     followed, plain = stepper.advance(grid), start(method, problem).advance(grid)
-    require(np.array_equal(followed.y, plain.y), "the trajectory has the same bits with tangent vectors")
+    require(np.array_equal(followed.y, plain.y), "the trajectory is bitwise identical with tangent vectors")
     require(stepper.variations is not None, "they are there after a sample")
     shift, size = np.zeros(dim), DIFFERENCE * float(np.max(np.abs(problem.y0)))
     shift[0] = size
@@ -218,7 +218,7 @@ def adjoints_are_what_tangents_say(method: MethodBase, problem: Problem) -> str 
         stepper.march(end, FEW)
     made = stepper.advance([end])
     plain = followed.advance([end])
-    require(np.array_equal(made.y, plain.y), "the trajectory has the same bits when it is recorded")
+    require(np.array_equal(made.y, plain.y), "the trajectory is bitwise identical when it is recorded")
     adjoint = stepper.adjoint(parameters=False)
     adjoint.begin(np.eye(dim)[0])
     for records in reversed(tapes):

@@ -1,4 +1,4 @@
-"""Checks of checkpoints: they continue with the same bits, and only where they belong."""
+"""Checks of checkpoints: they continue bitwise identically, and only where they belong."""
 
 import dataclasses
 from typing import Any
@@ -15,7 +15,7 @@ NONE = "it has no checkpoints"
 
 
 def checkpoints_continue_bit_for_bit(method: MethodBase, problem: Problem) -> str | None:
-    """Check that a restored checkpoint continues with the same bits, here and in a new stepper."""
+    """Check that a restored checkpoint continues bitwise identically, here and in a new stepper."""
     grid = irregular(problem)
     head, tail = grid[:7], grid[7:]
     program: Any = method.compile(problem.system)

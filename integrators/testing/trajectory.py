@@ -65,14 +65,14 @@ def returns_the_times_asked_for(method: MethodBase, problem: Problem) -> str | N
 
 
 def repeats_itself(method: MethodBase, problem: Problem) -> str | None:
-    """Check that the same call gives the same bits."""
+    """Check that the same call gives bitwise identical results."""
     first, second = (start(method, problem).advance(regular(problem, 9)) for _ in range(2))
     require(np.array_equal(first.y, second.y), f"{method!r} repeats itself bit for bit")
     return None
 
 
 def pieces_equal_the_whole(method: MethodBase, problem: Problem) -> str | None:
-    """Check that advancing in pieces gives the same bits as one call."""
+    """Check that advancing in pieces is bitwise identical to one call."""
     grid = irregular(problem)
     whole = start(method, problem).advance(grid)
     stepper = start(method, problem)
@@ -111,7 +111,7 @@ def samplings_work_or_are_refused(method: MethodBase, problem: Problem) -> str |
         finished(samples, method)
         if sample == "steps":
             require(samples.t.size == samples.y.shape[0], "as many states as steps")
-            require(bool(np.all(np.diff(samples.t) > 0)), "own steps come in order")
+            require(bool(np.all(np.diff(samples.t) > 0)), "steps come in order")
         else:
             require(np.array_equal(samples.t, grid), f"sample={sample!r} returns the times asked for")
     raises(
@@ -127,7 +127,7 @@ def energy_stays_sane(method: MethodBase, problem: Problem) -> str | None:
         return "the problem has no energy"
     solution = integrate(problem, method, regular(problem, 33))
     worst = float(np.max(solution.errors()["energy"]))
-    require(worst < ENERGY_BOUND, f"{method!r} keeps the energy within {ENERGY_BOUND}, not {worst:.2g}")
+    require(worst < ENERGY_BOUND, f"{method!r} conserves the energy within {ENERGY_BOUND}, not {worst:.2g}")
     return None
 
 

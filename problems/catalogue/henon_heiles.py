@@ -2,7 +2,7 @@
 
     H(q, p) = (p1^2 + p2^2)/2 + (q1^2 + q2^2)/2 + q1^2 q2 - q2^3/3
 
-Cubic, so HBVM(k, s) keeps the energy exactly for k >= 3s/2. Below the energy 1/6 an
+Cubic, so HBVM(k, s) conserves the energy exactly for k >= 3s/2. Below the energy 1/6 an
 orbit that starts in the triangle of the saddles never leaves it.
 """
 
@@ -50,7 +50,7 @@ def henon_heiles(
 
     Tests whether a method keeps an orbit in a bounded region near its escape
     energy: an energy error of 1e-3 lets it out. The default orbit is chaotic: when a
-    method that does not keep the energy lets it out depends on the last bit.
+    method that does not conserve the energy lets it out depends on the last bit.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def rigid_body(*, quartic: float = 0.0, t_end: float = 200.0) -> Problem:
 
     with the moments of inertia I = (2, 1, 2/3), from (cos 1.1, 0, sin 1.1). Tests a
     Casimir beside the energy: with ``quartic=0`` both are quadratic and every Gauss
-    method keeps them; otherwise only methods that keep the energy by design do.
+    method keeps them; otherwise only methods that conserve the energy by design do.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def sitnikov(
     Parameters
     ----------
     e : float
-        Eccentricity of the primaries' orbits, 0 <= e < 1. The seed paper calls the
+        Eccentricity of the primaries' orbits, 0 <= e < 1. The original paper calls the
         motion chaotic above about 0.725; from this start it was found regular along
         the axis up to about 0.8 (``hbvm-bench paper``).
     d : float

@@ -20,7 +20,7 @@ class Poisson(System):
     ----------
     H : callable
         The energy; names the arguments it needs among ``y, par, m`` (``t`` too, but
-        then the energy is not kept). Sums are Python's own: `m.sum` is for
+        then the energy is not conserved). Sums are Python's own: `m.sum` is for
         canonical systems.
     B : callable
         Returns the structure matrix, dim lists of dim entries, with

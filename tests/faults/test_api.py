@@ -221,7 +221,7 @@ integrate(P1, M1, events=lambda q: [q[0], q[0]])             | event 'event' ret
 integrate(P1, M1, events=lambda q: q[3])                     | q[3] does not exist; q has the indices 0 to 0
 integrate(P1, M1, events=Event)                              | <class 'integrators.events.event.Event'>:
 integrate(P1, M1, events=np.sin)                             | <ufunc 'sin'>: event 'sin' asks for an
-integrate(P1, M1, events=osc, sample='land')                 | events are those of the method's own steps,
+integrate(P1, M1, events=osc, sample='land')                 | events are located on the method's steps,
 section(P1, M1, 3)                                           | an event needs a function g, not 3
 section(P1, M1, osc, direction=3)                            | direction=3 of an event must be 1, -1 or 0
 section(P1, M1, osc, count=0)                                | count=0 of a section must be a whole number of

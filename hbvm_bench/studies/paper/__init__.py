@@ -1,4 +1,4 @@
-"""The seed paper's experiments, run again: ``hbvm-bench paper``.
+"""The original paper's experiments, run again: ``hbvm-bench paper``.
 
 L. Brugnano, F. Iavernaro, T. Susca, "Numerical comparisons between Gauss-Legendre
 methods and Hamiltonian BVMs defined over Gauss points".

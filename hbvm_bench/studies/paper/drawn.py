@@ -14,7 +14,7 @@ from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
 from hbvm_bench.report.figures.style import looks
 from integrators.protocol import Array
 
-# What is a property of the motion, not of a method, has a look of its own; the true motion is neutral.
+# What is a property of the motion, not of a method, has a look of its own; the reference solution is neutral.
 LOOKS = tuple(looks(("Gauss", "HBVM", "Motion")).values())
 COLOURS: dict[str, str] = dict(zip(("gauss", "hbvm", "motion"), (look.light for look in LOOKS), strict=True))
 SEQUENTIAL = LinearSegmentedColormap.from_list(

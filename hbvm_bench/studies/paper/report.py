@@ -1,4 +1,4 @@
-"""The page on the seed paper's experiments, from kept results alone: claim, paper, here."""
+"""The page on the original paper's experiments, from kept results alone: claim, paper, here."""
 
 from collections.abc import Callable
 from functools import partial

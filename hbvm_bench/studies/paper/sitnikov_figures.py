@@ -15,7 +15,7 @@ from hbvm_bench.studies.paper.experiments.sitnikov import LOST, REVOLUTIONS, T_E
 from integrators.protocol import Array
 
 TILT = 0.55  # of the oblique drawing of the configuration
-SHOWN = 350.0  # the span of time that the paper shows z(t) on
+SHOWN = 350.0  # the interval on which the paper shows z(t)
 REACH = 3.2  # of the drawings of the primaries' plane
 
 

@@ -83,7 +83,7 @@ def _claims(results: Results) -> list[Claim]:
 
 
 def _steps(results: Results) -> list[StepRow]:
-    """Return what Gauss and HBVM do with each step; the first row of either scan is the true motion."""
+    """Return what Gauss and HBVM do with each step; either scan begins with the reference solution."""
     return [*results["steps 2"][1:], *results["steps 3"][1:]]
 
 
@@ -108,7 +108,7 @@ def trajectories(runs: Mapping[str, Orbit], times: Sequence[float | None]) -> li
             "holds" if times.count(None) * 2 < len(times) else "partly",
         ),
         Claim(
-            "Under HBVM(18,2) it oscillates in bounds, very much like the true motion",
+            "Under HBVM(18,2) it oscillates in bounds, very much like the exact solution",
             "Figure 3, on [0, 350]",
             f"|z| ≤ {np.abs(hbvm.z).max():.4f} to t = 1500, in truth {np.abs(truth.z).max():.4f}. "
             f"{'z itself' if like == 'holds' else 'But z itself'} is off by up to {early:.2f} on [0, 350] "
@@ -172,7 +172,7 @@ def laws(
 
 
 def dynamics(steps: Sequence[StepRow], growth: Sequence[Growth]) -> list[Claim]:
-    """Return the claims on the sham rotation, chaos and the step."""
+    """Return the claims on the spurious precession, chaos and the step."""
     coarse, finer = row(steps, "hbvm", sitnikov.H), row(steps, "hbvm", 1 / 8)
     fits = [r for r in steps if r.family == "hbvm" and r.s == 2 and r.h <= 0.25]
     order = float(np.polyfit(np.log([r.h for r in fits]), np.log([abs(r.turn) for r in fits]), 1)[0])

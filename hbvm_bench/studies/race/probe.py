@@ -43,7 +43,7 @@ class Probe(msgspec.Struct, frozen=True, kw_only=True):
     family, method : str
         Of the setting that was compiled.
     caches : {"empty", "kernel", "full"}
-        What was on disk before: nothing; our kernel but not this problem; everything.
+        What was on disk before: nothing; the kernel but not this problem; everything.
     compile_seconds : list of float
         The method's own ``compile``.
     process_seconds : list of float

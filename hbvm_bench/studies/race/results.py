@@ -67,7 +67,7 @@ class Race:
 
     @property
     def calibration(self) -> list[float]:
-        """Seconds of a fixed computation, round by round."""
+        """Seconds of the calibration loop, round by round."""
         rounds = [one for record in self.records if record.timing for one in record.timing.rounds]
         found = {one.number: one.calibration[0] for one in rounds if one.calibration}
         return [found[place] for place in sorted(found, key=lambda place: place or 0)]

@@ -53,7 +53,7 @@ class Group(Memory):
     floored = Array("rows", "lanes")  # and beside its block, small ones raised to a part of the largest
     size = Array("rows", "lanes")
 
-    # --- steps of varying length ---
+    # --- adaptive steps ---
     modes = Integer()  # Legendre coefficients of the values that are extrapolated
     into_modes = Array()  # values -> coefficients, (modes, k)
     recurrence = Array()  # pairs; see `Context.recurrence`

@@ -146,7 +146,7 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
 
     Eight, which fill a register; more where the field has few components and the results of
     divisions, roots or other functions are waited for (Kepler: 15 % faster with sixteen, an
-    exponential of one component twice as fast with 32). Steps of varying length wait for those
+    exponential of one component twice as fast with 32). Adaptive steps wait for those
     of their control (Henon and Heiles: 8 % faster with sixteen).
     """
     nodes = reachable(system.function("force" if second else "field").roots)

@@ -72,7 +72,7 @@ def entry(address, memory):
 
 @compiled
 def set_start(ctx, search):
-    """Set the time and the state of the last own step."""
+    """Set the time and the state of the last step."""
     search.time, search.time_low = time_of_step(ctx.t0, ctx.time_low, float(ctx.n), ctx.h)
     write(ctx, ctx.state, search.step_state)
 

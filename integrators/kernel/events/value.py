@@ -58,9 +58,7 @@ def state_at(ctx, search, t):
     search.part = part_at(search, t)
     side = context(search.side)
     outcome = call_part(search.steps, PART, search.own, search.side, search.asked, state)
-    ctx.wanted = (
-        0  # a partial step that only the implicit solver would solve is none: own steps do not change
-    )
+    ctx.wanted = 0  # a partial step that only the implicit solver would solve is none: steps do not change
     search.iterations += side.iterations
     search.evaluations += side.evaluations
     search.partial += 1

@@ -84,7 +84,7 @@ class Kept:
         return LineContext(shape, {**tables, **self._tables}, self._numbers)
 
     def share(self, own: Context, side: Context) -> None:
-        """Let partial steps keep what the own steps do."""
+        """Let partial steps keep what the steps do."""
         for name in ("active", "owed", "metric") if self.names else ():
             side.point({name: getattr(own, name)})
 

@@ -1,4 +1,4 @@
-"""How the length of a step follows from estimated errors: what all steps of varying length share."""
+"""How the length of a step follows from estimated errors: what all adaptive steps share."""
 
 from math import log
 

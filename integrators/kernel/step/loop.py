@@ -1,4 +1,4 @@
-"""Whole trajectories: own steps to the times asked for."""
+"""Whole trajectories: steps to the times asked for."""
 
 from integrators.kernel.context import (
     ALWAYS_IMPLICIT,
@@ -29,7 +29,7 @@ context = view(Context)
 
 @compiled
 def repeat(ctx, target, budget):
-    """Take steps of one length to step number ``target``; return the outcome, and what is left to do."""
+    """Take fixed steps to step number ``target``; return the outcome, and what is left to do."""
     for _ in range(ctx.n, target):
         if budget == 0:
             return BUDGET, budget
@@ -42,7 +42,7 @@ def repeat(ctx, target, budget):
 
 @compiled
 def approach(ctx, t, budget):
-    """Take steps of varying length to the last one before t; return the outcome, and what is left to do."""
+    """Take adaptive steps to the last one before t; return the outcome, and what is left to do."""
     while True:
         rest, begin = remaining(ctx, t), ctx.t0
         if rest == 0.0:
@@ -71,7 +71,7 @@ def approach(ctx, t, budget):
 
 @compiled
 def advance(ctx, side, between, count, times, targets, parts, first, out, budget):
-    """Take own steps, and make the states asked for.
+    """Take steps, and make the states asked for.
 
     Parameters
     ----------
@@ -82,14 +82,14 @@ def advance(ctx, side, between, count, times, targets, parts, first, out, budget
     count : int
         Samples.
     times, targets, parts : doubles, integers, doubles; ``count`` of each
-        Sample i is at times[i]. With steps of one length that is parts[i] beyond step
+        Sample i is at times[i]. With fixed step size that is parts[i] beyond step
         n = targets[i]; `LAND` counts from sample i - 1.
     first : int
         The first sample still to be made.
     out : (count, dim) doubles
         Samples; overwritten.
     budget : int
-        Own steps after which to come back.
+        Steps after which to come back.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def advance(ctx, side, between, count, times, targets, parts, first, out, budget
 
 @compiled
 def walk(ctx, times, out, budget):
-    """Take ``budget`` steps of varying length at most, and note their times and states.
+    """Take ``budget`` adaptive steps at most, and note their times and states.
 
     None goes beyond times[0]. With a budget of 0, only look whether a step remains to be taken.
     """

@@ -1,4 +1,4 @@
-"""Steps of varying length: each as long as the estimated errors and the iterations allow.
+"""Adaptive steps: each as long as the estimated errors and the iterations allow.
 
 Where the fixed-point iteration allows much less than the errors do, the implicit solver takes over.
 """

@@ -158,7 +158,7 @@ class Vectors:
         return same and np.array_equal(directions.parameters, self._parameters)
 
     def put(self, state: Array) -> None:
-        """Set the vectors at the last own step; their parts in the parameters stay as they are."""
+        """Set the vectors at the last step; their parts in the parameters stay as they are."""
         first, rows = 0, self._context.shape.rows
         for own, _ in self._pairs:
             n = own.shape.rows // rows
@@ -220,7 +220,7 @@ class Vectors:
             self._known[t] = self._out[i]
 
     def note_now(self, t: float) -> None:
-        """Keep the vectors at the last own step, at time t."""
+        """Keep the vectors at the last step, at time t."""
         found = []
         for own, _ in self._pairs:
             rows = self._context.shape.rows

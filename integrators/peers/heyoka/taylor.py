@@ -356,7 +356,7 @@ class TaylorStepper(RestorableStepper):
                 return False
 
     def _pass(self, t: float, sign: float) -> bool:
-        """Take own steps until one passes ``t``; return whether that succeeded.
+        """Take steps until one passes ``t``; return whether that succeeded.
 
         heyoka's compiled loop shortens its last step to end at the time it is given, which would make
         the steps depend on the samples. That one step is taken back and taken at its own length.

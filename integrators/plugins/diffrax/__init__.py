@@ -176,7 +176,7 @@ class HBVM(_LineIntegral):
     Not that of a Poisson system y' = B(y) grad H(y) whose B varies: a term does not tell B.
 
     Equations and properties: see `integrators.HBVM`. The step is that of
-    `diffrax.diffeqsolve`, constant or chosen by a controller; the energy is kept
+    `diffrax.diffeqsolve`, constant or chosen by a controller; the energy is conserved
     for any sequence of steps. The error estimate is ``h |gamma_s|^2 / |gamma_0|``.
 
     Parameters

@@ -13,7 +13,7 @@ from integrators.plugins.diffrax.arithmetic import apply
 class LegendreInterpolation(dx.AbstractLocalInterpolation):
     """The polynomial of a step, ``y0 + sum_j G_j int_0^c P_j`` with G the leading axis of the leaves.
 
-    Its error inside the step is O(h^{s+1}), and it does not keep the energy there;
+    Its error inside the step is O(h^{s+1}), and it does not conserve the energy there;
     at the end of the step it is the solution of order 2s.
     """
 

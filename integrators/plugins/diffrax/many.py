@@ -68,7 +68,7 @@ class JaxProgram:
         gauss = isinstance(method, Gauss)
         if system.kind == "poisson" and not gauss and options["k"] > options["s"]:
             raise InputError(
-                f"{method} has no form on JAX that keeps the energy of a Poisson system such as "
+                f"{method} has no form on JAX that conserves the energy of a Poisson system such as "
                 f"{system.name}; use Gauss(s, h), or leave backend= out."
             )
         made: Any = plugin.Gauss if gauss else plugin.HBVM

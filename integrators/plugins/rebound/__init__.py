@@ -77,7 +77,7 @@ MESSAGES = {
     layout.DIVERGED: "The iteration for a step of HBVM did not converge; take a smaller sim.dt.",
     layout.UNRESOLVED: "A step of HBVM is too long: its estimated error exceeds "
     "sim.integrator.largest_error times the bodies' velocity; take a smaller sim.dt, or set "
-    "sim.integrator.tol for own steps.",
+    "sim.integrator.tol for an adaptive step size.",
 }
 
 # REBOUND keeps addresses of what is in here.
@@ -89,7 +89,7 @@ def install(simulation: Any, method: HBVM | Gauss) -> None:
     """Make ``method`` the integrator of a simulation, and its h, where it has one, the timestep.
 
     With ``tol``, as in ``HBVM(k=10, s=8, tol=1e-12)``, steps vary: for close encounters. A symplectic
-    method, such as Gauss, then loses its long-time behaviour, one with k > s keeps the energy.
+    method, such as Gauss, then loses its long-time behaviour, one with k > s conserves the energy.
 
     Parameters
     ----------

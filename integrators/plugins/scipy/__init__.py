@@ -80,7 +80,7 @@ class HBVM(OdeSolver):
         ``dense_output``, but an event that happens and is undone again within one is missed.
     interpolant : {"step", "polynomial"}
         How states between the steps (``t_eval``, ``dense_output``, ``events``) are made: by
-        a throw-away step from the step's start, which keeps order 2s and energy, or
+        a partial step from the step's start, which keeps order 2s and energy, or
         by the step's polynomial, which is free but of order s + 1 (functions in Python only).
 
     Attributes
@@ -124,7 +124,7 @@ class HBVM(OdeSolver):
         if h is not None:
             h = checked(name, "h", h, Step)
             if k is None:
-                raise InputError(f"HBVM needs k with steps of one length, h={h!r}; 2s or 3s, say.")
+                raise InputError(f"HBVM needs k with fixed step size, h={h!r}; 2s or 3s, say.")
             if first_step is not None or self.max_step < np.inf:
                 raise InputError(f"h={h!r} is the length of every step; leave out first_step and max_step.")
         one_stage = k == 1 and h is None  # tells the kernel nothing about the error of a step
@@ -132,7 +132,7 @@ class HBVM(OdeSolver):
             if interpolant != "step":
                 raise InputError(
                     "interpolant='polynomial' is for functions in Python; with a compiled field states "
-                    "between the steps come from the kernel's own steps: leave it out."
+                    "between the steps come from the kernel's steps: leave it out."
                 )
             self._steps = self._native(fun, compiled, k, h, first_step, every)
         if self._steps is None:
@@ -201,7 +201,7 @@ class HBVM(OdeSolver):
 class Gauss(HBVM):
     """Gauss(s), collocation at the Gauss nodes, which is HBVM(s, s): ``solve_ivp(..., method=Gauss)``.
 
-    Symplectic with constant steps, ``h=...``; with adaptive ones it keeps the energy no
+    Symplectic with constant steps, ``h=...``; with adaptive ones it conserves the energy no
     better than other methods of its order. Its s nodes do not show gamma_s, by which HBVM's steps are
     judged: gamma_{s-1} takes its place, so that steps are shorter than HBVM's, by far where s < 4, for a
     Python function as in the kernel. Parameters as for `HBVM`, without k.

@@ -109,7 +109,7 @@ class NativeSteps:
         return end, made.y[-1].copy()
 
     def _own(self) -> Samples:
-        """Take own steps, none beyond the bound."""
+        """Take steps, none beyond the bound."""
         if self._fixed is None:
             return self._stepper.walk(self._t_bound, limit=self._every, longest=self._longest)
         times = self._fixed.next(self._every)
@@ -146,7 +146,7 @@ class _Count:
 
 
 class Between:
-    """States between own steps, each by one throw-away step from the own step before it.
+    """States between steps, each by one partial step from the step before it.
 
     Parameters
     ----------
@@ -181,14 +181,14 @@ class Between:
 
 
 class NativeOutput(DenseOutput):
-    """States between own steps: of order 2s, and the energy is kept.
+    """States between steps: of order 2s, and the energy is conserved.
 
     Parameters
     ----------
     between : Between
         What makes them.
     times, states : ndarray, shapes (m,), (m, n)
-        Own steps.
+        Steps.
     """
 
     def __init__(self, between: Between, times: Array, states: Array) -> None:
@@ -210,7 +210,7 @@ class NativeOutput(DenseOutput):
 
 
 def nodes(system: System, s: int) -> tuple[int, float | None]:
-    """Return k, and what the error of a step's quadrature is bounded by, for steps that vary.
+    """Return k, and what the error of a step's quadrature is bounded by, for adaptive steps.
 
     A function that is not traced may have an energy; one that is tells whether it has.
     """

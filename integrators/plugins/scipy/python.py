@@ -242,7 +242,7 @@ class PythonSteps:
             return 0.0 if top == 0.0 else float(np.divide(top * top, bottom))
 
     def _unseen(self, solved: Solved) -> float:
-        """Return how much of the field k nodes do not see: up to 1, the energy is kept to round-off.
+        """Return how much of the field k nodes do not see: up to 1, the energy is conserved to round-off.
 
         The coefficients must have decayed to the root of that; what moves a component by less than ``atol``
         counts as moving it by so much, else a field whose rounding is all there is at first had no step.
@@ -264,9 +264,9 @@ class PythonSteps:
 class Output(DenseOutput):
     """States within a step from (t_old, y) to (t, end), e the compensation and G the coefficients.
 
-    ``by_a_step``, a throw-away step from the start of the step to each time: order 2s, and the
-    energy is kept. Otherwise the polynomial of the step: free, of order s + 1 inside the step, where it does
-    not keep the energy.
+    ``by_a_step``, a partial step from the start of the step to each time: order 2s, and the energy is
+    conserved. Otherwise the polynomial of the step: free, of order s + 1 inside the step, where it does
+    not conserve the energy.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ AGREES = 1e-2  # distance at which two orbits have parted
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A run at its own steps."""
+    """A run at its steps."""
 
     method: str  # as it prints
     t: Array  # shape (n,)
@@ -112,7 +112,7 @@ def by_step(family: str, steps: Sequence[float] = STEPS, starts: int = STEP_STAR
 
 
 def agreement(method: MethodBase, t_end: float = 100.0) -> float:
-    """Return the time of the first own step at which the orbit is `AGREES` away from the true one."""
+    """Return the time of the first step at which the orbit is `AGREES` away from the true one."""
     problem = start(t_end)
     found = integrate(problem, method, times=[t_end], sample="steps")
     truth = integrate(problem, TRUTH, times=found.t)

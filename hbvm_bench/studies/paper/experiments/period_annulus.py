@@ -118,7 +118,7 @@ def fates(method: MethodBase, gaps: Sequence[float], span: float = SPAN) -> list
 
 
 def orbit(method: MethodBase, c: float, span: float = SPAN) -> Path:
-    """Return the times and states at the own steps of the orbit from (0, c), up to its departure."""
+    """Return the times and states at the steps of the orbit from (0, c), up to its departure."""
     t, y, _ = own_steps(PROBLEM, method, np.array([0.0, c]), span)
     far = np.flatnonzero(_departed(y))
     return (t[: far[0]], y[: far[0]]) if far.size else (t, y)

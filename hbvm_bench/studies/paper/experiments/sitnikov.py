@@ -41,7 +41,7 @@ TRIALS = (
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A run at its own steps, reduced to what is drawn."""
+    """A run at its steps, reduced to what is drawn."""
 
     method: str  # as it prints
     t: Array  # shape (n,), from 0
@@ -88,7 +88,7 @@ class StepRow:
 
     @property
     def usable(self) -> bool:
-        """Whether the rates describe the whole span of a bound planetoid."""
+        """Whether the rates describe the whole integration interval of a bound planetoid."""
         return self.lost is None and not self.reason
 
     @property
@@ -104,7 +104,7 @@ def problem(e: float = E) -> Problem:
 
 
 def orbit(method: MethodBase, every: int = 1) -> Orbit:
-    """Integrate over the paper's span; keep every ``every``-th of the method's own steps."""
+    """Integrate over the paper's span; keep every ``every``-th of the steps of the method."""
     solution = _run(method)
     start = solution.problem
     y = np.vstack([start.y0, solution.y])[::every]
@@ -122,7 +122,7 @@ def orbit(method: MethodBase, every: int = 1) -> Orbit:
 
 
 def orbits() -> dict[str, Orbit]:
-    """Return the paper's two runs and the true motion on the grid of step 1/2, and that on its own grid.
+    """Return the paper's two runs and the reference on the grid of step 1/2, and that on its own grid.
 
     Where a method is installed that keeps both energy and angular momentum, ``both`` is its run.
     """
@@ -159,7 +159,7 @@ def energy_by_nodes(h: float, ks: Sequence[int] = range(DEGREE, 25)) -> list[tup
 
 
 def by_step(s: int, steps: Sequence[float] = STEPS) -> list[StepRow]:
-    """Return what Gauss(s) and HBVM(k, s) with many nodes do with each step, the true motion first."""
+    """Return what Gauss(s) and HBVM(k, s) with many nodes do with each step, the reference solution first."""
     truth = _run(TRUTH)
     rate, _ = turning(truth)
     rows = [_row(truth, "truth", 0.0, truth)]
