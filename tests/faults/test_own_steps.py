@@ -229,7 +229,7 @@ def test_smooth_fields_have_no_kinks(method):
 @pytest.mark.parametrize(
     ("method", "why"),
     [
-        (HBVM(k=4, s=2, h=0.1), "steps of one length are not cut there"),
+        (HBVM(k=4, s=2, h=0.1), "fixed steps are not cut there"),
         (LineIntegral(k=8, s=4, tol=1e-10, invariants=["energy"]), "do not look for kinks"),  # 2e-3
     ],
     ids=repr,
