@@ -164,8 +164,9 @@ def advise(problem: Problem, accuracy: Annotated[float, _Accuracy()] = 1e-10) ->
     Notes
     -----
     `HBVM` with adaptive step size, and Gauss and HBVM with fixed ones, are tried, each on the whole
-    integration interval: some thirty trajectories. Where step lengths vary much, fixed steps are not tried. The errors are differences from
-    trajectories in double precision, and at least as large as those differ among themselves.
+    integration interval: some thirty trajectories. Where step lengths vary much, fixed steps are not tried.
+    The errors are differences from trajectories in double precision, and at least as large as those differ
+    among themselves.
 
     Examples
     --------

@@ -184,7 +184,8 @@ def remarks(race: Race) -> list[str]:
         calibration = median(race.calibration)
         worst = max(abs(value / calibration - 1.0) for value in race.calibration)
         said.append(
-            f"During the timing, the calibration loop took {calibration * 1e3:.2f} ms, and in its worst round "
+            f"During the timing, the calibration loop took {calibration * 1e3:.2f} ms, and in its worst "
+            "round "
             f"{worst:.0%} more or less."
         )
     return said + outcomes.compilations(race.records) + outcomes.beside(race.records)
