@@ -1,22 +1,14 @@
 """Gradients of a function of the end, by the adjoint of the steps."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 
 from integrators import registry
-from integrators.protocol import (
-    Array,
-    Checkpoints,
-    Gradients,
-    MethodBase,
-    Samples,
-    Status,
-    check_problem,
-    offers,
-)
+from integrators.dynamics.recorded import MEMORY, Recorded
+from integrators.protocol import Array, MethodBase, check_problem
+from integrators.running.integrate import prepared
 from integrators.running.variations import START, TIME, places
 from problems import emit
 from problems.calculus.reverse import reverse
@@ -24,107 +16,7 @@ from problems.checks import Must, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 
-MEMORY = 2**28  # bytes for recorded stages, about
-SEGMENT = 4096  # steps that are recorded at a time, at most
-
 Bytes = Annotated[float, Must("a number of bytes above 0", lambda n: n > 0)]
-
-
-@dataclass
-class _Segment:
-    """Some steps, from a checkpoint on; their records, unless these were given up."""
-
-    start: Any
-    steps: int
-    records: Any
-
-
-class Recorded:
-    """A trajectory whose steps are kept, or can be made again, for adjoints.
-
-    Parameters
-    ----------
-    problem : Problem
-        Traced; its start and parameters.
-    method : MethodBase
-        `integrators.HBVM` or `integrators.Gauss`.
-    end : float
-        Time of the end.
-    memory : float
-        Bytes for the stages, about. Where these do not suffice, checkpoints are kept instead of the oldest
-        ones, and the steps from each are made again.
-
-    Attributes
-    ----------
-    y : ndarray, shape (dim,)
-        The end.
-    steps : int
-        Steps to it.
-    kept : int
-        Bytes of the records that were kept.
-    solver : str
-        What solved the steps.
-
-    Raises
-    ------
-    problems.errors.InputError
-        If the method has no adjoint, or the trajectory does not reach the end.
-    """
-
-    def __init__(self, problem: Problem, method: MethodBase, end: float, memory: float = MEMORY):
-        stepper: Any = method.compile(problem.system).start(problem.y0, problem.par, problem.t0)
-        if not (offers(stepper, Gradients) and offers(stepper, Checkpoints)):
-            raise InputError(f"{method!r} has no gradients; use Gauss or HBVM.")
-        self._stepper, self._end, self._segments = stepper, end, list[_Segment]()
-        size = stepper.recorder(1).bytes
-        self._length = int(max(1, min(memory // (2 * size), SEGMENT)))
-        room = max(1, int(memory // (size * self._length)))
-        while True:
-            start = stepper.checkpoint()
-            records = self._record(self._length)
-            self._segments.append(_Segment(start, len(records), records))
-            if len(self._segments) > room:
-                self._segments[-1 - room].records = None
-            if len(records) < self._length:
-                break
-        last = stepper.recorder(1)
-        stepper.record(last)
-        self.y = self._made(stepper.advance(np.array([end]))).y[0]
-        self._segments.append(_Segment(None, len(last), last))
-        self.steps = sum(segment.steps for segment in self._segments)
-        self.solver = stepper.stats.solver
-        self.kept = size * sum(segment.steps for segment in self._segments if segment.records)
-
-    def _record(self, most: int) -> Any:
-        records = self._stepper.recorder(most)
-        self._stepper.record(records)
-        self._made(self._stepper.march(self._end, most))
-        return records
-
-    def _made(self, samples: Samples) -> Samples:
-        if samples.status is not Status.FINISHED:
-            raise InputError(f"there is no gradient of what is not reached: {samples.reason}")
-        return samples
-
-    def pulled_back(self, gradient: Array, *, parameters: bool) -> tuple[Array, Array]:
-        """Return derivatives with respect to the start and the parameters of what has them at the end.
-
-        Parameters
-        ----------
-        gradient : ndarray, shape (dim,)
-            Derivatives with respect to the end.
-        parameters : bool
-            Whether those with respect to the parameters are wanted; else there are none, shape (0,).
-        """
-        adjoint = self._stepper.adjoint(parameters=parameters)
-        adjoint.begin(gradient)
-        for segment in reversed(self._segments):
-            records = segment.records
-            if records is None:
-                self._stepper.restore(segment.start)
-                records = self._record(segment.steps)
-            adjoint.follow(records)
-        return adjoint.gradient
 
 
 @checked_arguments
@@ -210,7 +102,8 @@ def gradient(
     end = problem.t_end if t_end is None else t_end
     function = system.trace(loss, "loss")
     inner = any(name in found for name in names)
-    recorded = Recorded(problem, method, end, memory)
+    program, _ = prepared(method, system)
+    recorded = Recorded(program, problem, end, memory=memory)
     value = emit.numpy_of(function, "loss")(end, recorded.y, problem.par)[0]
     back, by_par = recorded.pulled_back(_slope(problem, function, "state", end, recorded.y), parameters=inner)
     if inner:

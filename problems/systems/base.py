@@ -14,6 +14,7 @@ from problems.calculus.forward import forward
 from problems.calculus.function import Function, function_of, stacked
 from problems.calculus.gradient import gradient
 from problems.calculus.jacobian import Jacobian, jacobian
+from problems.calculus.reverse import Variables, reverse
 from problems.checks import NOTHING, Named, checked, number, numbers
 from problems.errors import InputError, shown, unknown
 from problems.systems.stored import check_system
@@ -120,6 +121,7 @@ class System:
         self._jacobians: dict[str, Jacobian | None] = {}
         self._gradients: dict[Function, Function] = {}
         self._tangents: dict[tuple[str, int, bool], Function] = {}
+        self._products: dict[Variables, Function] = {}
         self._together: dict[tuple[Function, ...], Function] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -386,6 +388,21 @@ class System:
                 name=f"{what}_along_{directions}",
             )  # fmt: skip
         return self._tangents[key]
+
+    def product(self, variables: Variables) -> Function:
+        """Return the products of weights with the field's derivatives; see `problems.calculus.reverse`.
+
+        Parameters
+        ----------
+        variables : {"state", "parameters"}
+            What the field is differentiated with respect to.
+        """
+        if variables not in self._products:
+            self._products[variables] = reverse(
+                self.function("field"), variables=variables, name=f"field_by_{variables}",
+                count=self.dim if variables == "state" else self.n_par,
+            )  # fmt: skip
+        return self._products[variables]
 
     def is_vector(self, invariant: str) -> bool:
         """Whether an invariant is a list of numbers."""

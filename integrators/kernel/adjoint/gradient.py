@@ -12,7 +12,6 @@ from integrators.kernel.native.memory import aligned
 from integrators.kernel.step.rule import FIRST_RATE, LOG_REST_VARYING, TOLERANCE
 from integrators.protocol import Array
 from problems import emit
-from problems.calculus.reverse import reverse
 from problems.problem import System
 
 
@@ -89,8 +88,7 @@ class Adjoint:
             c = tables.constants(c.k, c.s, False, c.lanes)
         self._forward, self._constants = c, adjoint(c)
         dim = system.dim
-        self._product = reverse(system.function("field"), variables="state", count=dim, name="field_adjoint")
-        field = compile_field(system, (-self._product).named(self._product.name), c.lanes)
+        field = compile_field(system, (-system.product("state")).named("adjoint"), c.lanes)
         halves = 1 if system.dof is None else 2
         block = np.arange(dim) // (dim // halves)
         own = Shape(
@@ -104,14 +102,11 @@ class Adjoint:
         made.tolerance, made.log_rest, made.varying = TOLERANCE, LOG_REST_VARYING, 1
         made.rate = FIRST_RATE
         made.par[:] = par
-        self._slopes = None
-        wanted = system.n_par if parameters else 0
+        self._wanted = parameters and system.n_par > 0
+        wanted = system.n_par if self._wanted else 0
         self._memory = Pullback({"parameters": wanted, "room": wanted * c.lanes, "states": dim}, {})
         if wanted:
-            self._slopes = reverse(
-                system.function("field"), variables="parameters", count=wanted, name="field_slopes"
-            )
-            self._memory.slopes = compile_field(system, self._slopes, c.lanes).address
+            self._memory.slopes = compile_field(system, system.product("parameters"), c.lanes).address
 
     def begin(self, gradient: Array) -> None:
         """Set the gradient with respect to the end."""
@@ -166,7 +161,7 @@ class Adjoint:
         t0, _, n, h = head[:4].tolist()
         times = t0 + (n + 1.0) * h - h * self._nodes
         units = np.repeat(np.eye(dim), k, axis=1)  # weights: each unit vector at each stage
-        product = emit.numpy(self._system, self._product)
+        product = emit.numpy(self._system, self._system.product("state"))
         at = np.concatenate([units, np.tile(stages, (1, dim))])
         jacobians = product(np.tile(times, dim), at, self._par).reshape(dim, dim, k)  # [d, e]: df_e/dy_d
         end = context.read()
@@ -178,9 +173,9 @@ class Adjoint:
         context.write(end + h * np.einsum("j,dej,je->d", weights, jacobians, solved))
         context.error[:] = 0.0
         context.length = 0.0
-        if self._slopes is not None:
+        if self._wanted:
             at = np.concatenate([solved.T, stages])
-            slopes = emit.numpy(self._system, self._slopes)(times, at, self._par)
+            slopes = emit.numpy(self._system, self._system.product("parameters"))(times, at, self._par)
             self._memory.found[:] += h * (slopes @ weights)
 
     @property

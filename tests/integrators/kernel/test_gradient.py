@@ -5,7 +5,7 @@ import pytest
 
 import problems
 from integrators import HBVM, IAS15, Gauss, gradient, integrate
-from integrators.dynamics.adjoint import Recorded
+from integrators.dynamics.recorded import Recorded
 from problems import Hamiltonian, InputError, Problem, VectorField
 from problems.analysis.wide import evaluate
 from tests.integrators.kernel.test_variations import SYSTEMS, flow, wide
@@ -100,8 +100,9 @@ def test_they_are_what_tangent_vectors_say(name, method):
 @pytest.mark.parametrize("method", [Gauss(s=4, h=0.02), HBVM(tol=1e-12)], ids=repr)
 def test_with_little_memory_steps_are_made_again_with_the_same_bits(method):
     problem = PROBLEMS[4]()
-    much = Recorded(problem, method, 30.0)
-    little = Recorded(problem, method, 30.0, memory=much.kept / 7)
+    program = method.compile(problem.system)
+    much = Recorded(program, problem, 30.0)
+    little = Recorded(program, problem, 30.0, memory=much.kept / 7)
     assert much.steps == little.steps > 20
     assert 0 < little.kept <= much.kept / 7
     ends = [each.pulled_back(np.ones(4), parameters=True) for each in (much, little)]
@@ -119,7 +120,8 @@ def test_backwards_in_time():
 
 def test_stiff_steps_that_newton_solves_have_them():
     problem = problems.load("stiff_chain")
-    recorded = Recorded(problem, Gauss(s=3, h=0.1), 1.05)
+    program = Gauss(s=3, h=0.1).compile(problem.system)
+    recorded = Recorded(program, problem, 1.05)
     assert "Newton" in recorded.solver
     dof, rng = problem.system.dof, np.random.default_rng(0)
     ends = rng.standard_normal((2, 2 * dof))
@@ -131,7 +133,6 @@ def test_stiff_steps_that_newton_solves_have_them():
     )  # symplectic; measured: 3e-16
     way, nudge = rng.standard_normal(2 * dof), 1e-6
     starts_beside = [problem.y0 + i * nudge * way for i in (1, -1)]
-    program = Gauss(s=3, h=0.1).compile(problem.system)
     moved = [program.start(y, problem.par).advance([1.05]).y[0] for y in starts_beside]
     slope = ends[0] @ (moved[0] - moved[1]) / (2 * nudge)
     assert abs(starts[0] @ way - slope) < 1e-7 * np.linalg.norm(starts[0])  # measured: 3e-11
