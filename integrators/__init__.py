@@ -8,12 +8,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from integrators import registry
+from integrators.ensemble import Solutions, load
 from integrators.protocol import MethodBase, Samples, Stats, Status
 from integrators.running.integrate import integrate
-from integrators.running.many import Solutions, integrate_many
+from integrators.running.many import integrate_many
 from integrators.running.run import Run, start
 from integrators.running.watch import Progress
-from integrators.solution import Solution, load
+from integrators.solution import Solution
 from problems import deprecated
 
 if TYPE_CHECKING:

@@ -110,7 +110,7 @@ def lost_invariants(
         What the method conserves, see `integrators.protocol.MethodBase.conserved`.
     starts : ndarray, shape (n, dim)
         Where they began.
-    times, states : ndarray, shapes (m,) and (n, m, dim)
+    times, states : ndarray, shapes (m,) or (n, m), and (n, m, dim)
         Where they came; NaN where a trajectory did not arrive. The last state, and some before it: two
         thousand in all.
     par : ndarray, shape (n, n_par)
@@ -122,9 +122,10 @@ def lost_invariants(
     promised = [name for name in conserved if not any(r.flags & T for r in system.invariants[name].roots)]
     if not promised or not times.size:
         return found
-    every = -(-times.size // max(1, LOOKED_AT // len(par)))
-    times, states = times[::-1][::every][::-1], states[:, ::-1][:, ::every][:, ::-1]
-    owner = np.repeat(np.arange(len(par)), times.size)
+    every = -(-states.shape[1] // max(1, LOOKED_AT // len(par)))
+    times = np.broadcast_to(times, states.shape[:2])[:, ::-1][:, ::every][:, ::-1].reshape(-1)
+    states = states[:, ::-1][:, ::every][:, ::-1]
+    owner = np.repeat(np.arange(len(par)), states.shape[1])
     before, after = starts[owner].T, states.reshape(owner.size, -1).T
 
     def values(function: Function, columns: Array, which: Any) -> list[DD]:
@@ -147,7 +148,7 @@ def lost_invariants(
                     size[lost] = np.fmax(size[lost], terms)
                 lost = lost[change[lost] > limit[lost] * size[lost]]
         for i in lost[::-1]:
-            loss = float(times[i % times.size]), float(change[i]), float(size[i])
+            loss = float(times[i]), float(change[i]), float(size[i])
             found[owner[i]][name] = loss
     return found
 

@@ -348,7 +348,7 @@ class Solution:
         problems.errors.MissingLibraryError
             If pandas is not installed.
         """
-        pandas = _library("pandas")
+        pandas = library("pandas")
         names = [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[1])]
         frame = pandas.DataFrame(self.y, index=pandas.Index(self.t, name="t"), columns=names)
         frame.attrs = self._about()
@@ -362,7 +362,7 @@ class Solution:
         problems.errors.MissingLibraryError
             If xarray is not installed.
         """
-        xarray = _library("xarray")
+        xarray = library("xarray")
         parts = {name: (("t", "i"), part) for name, part in self._parts().items()}
         return xarray.Dataset(parts, coords={"t": self.t}, attrs=self._about())
 
@@ -412,31 +412,13 @@ class Solution:
 _AS_THEY_ARE = ("reason", "t_stop", "compile_seconds", "from_cache")
 
 
-@checked_arguments
-def load(path: File, problem: Problem | None = None) -> Solution:
-    """Return the solution that `Solution.save` wrote to a file, bit for bit.
-
-    Parameters
-    ----------
-    path : str or path-like
-        The file.
-    problem : Problem, optional
-        For a field that is not traced, which no file holds: the problem that was integrated.
+def read_file(path: Any, problem: Any, readers: Mapping[str | None, Any]) -> Any:
+    """Return what a file holds, by the reader of its kind: ``reader(words, arrays, problem)``.
 
     Raises
     ------
     problems.errors.InputError
         For a file that is not there, is damaged, or is none of these.
-
-    Examples
-    --------
-    >>> import tempfile, problems
-    >>> from pathlib import Path
-    >>> from integrators import Gauss, integrate, load
-    >>> path = Path(tempfile.mkdtemp()) / "pendulum.npz"
-    >>> integrate(problems.load("pendulum"), Gauss(s=2, h=0.1), [0.0, 1.0]).save(path)
-    >>> load(path).method
-    Gauss(s=2, h=0.1)
     """
     if not isinstance(problem, Problem | None):
         raise InputError(f"problem={shown(problem)} of load must be the Problem that was integrated.")
@@ -452,23 +434,7 @@ def load(path: File, problem: Problem | None = None) -> Solution:
                 f"the field of the solution in {path} is code, which the file does not hold; "
                 "load it with problem=, the one that was integrated."
             )
-        dim, n = found.system.dim, np.size(arrays["t"])
-        return Solution(
-            t=doubles(arrays["t"], (n,), "t"),
-            y=doubles(arrays["y"], (n, dim), "y"),
-            status=Status(words["status"]),
-            stats=_stats(unpacked(words["stats"], arrays)),
-            problem=found,
-            method=unpacked_method(words["method"], arrays),
-            events={name: _occurrences(name, arrays, dim) for name in words["events"]},
-            variations=_variations(arrays, n, dim),
-            directions=_directions(arrays, dim, found.par.size),
-            error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
-            reason=_of(str, words["reason"]),
-            t_stop=_of(float, words["t_stop"]),
-            compile_seconds=_of(float, words["compile_seconds"]),
-            from_cache=None if words["from_cache"] is None else _of(bool, words["from_cache"]),
-        )
+        return readers[words.get("kind")](words, arrays, found)
     except (InputError, FileNotFoundError) as error:
         if isinstance(error, InputError):
             raise
@@ -481,7 +447,28 @@ def load(path: File, problem: Problem | None = None) -> Solution:
         ) from None
 
 
-def _of(kind: type[Any], value: Any) -> Any:
+def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Solution:
+    """Return the solution that words and arrays of a file tell of."""
+    dim, n = problem.system.dim, np.size(arrays["t"])
+    return Solution(
+        t=doubles(arrays["t"], (n,), "t"),
+        y=doubles(arrays["y"], (n, dim), "y"),
+        status=Status(words["status"]),
+        stats=_stats(unpacked(words["stats"], arrays)),
+        problem=problem,
+        method=unpacked_method(words["method"], arrays),
+        events={name: occurrences(name, arrays, dim) for name in words["events"]},
+        variations=_variations(arrays, n, dim),
+        directions=_directions(arrays, dim, problem.par.size),
+        error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
+        reason=of_type(str, words["reason"]),
+        t_stop=of_type(float, words["t_stop"]),
+        compile_seconds=of_type(float, words["compile_seconds"]),
+        from_cache=None if words["from_cache"] is None else of_type(bool, words["from_cache"]),
+    )
+
+
+def of_type(kind: type[Any], value: Any) -> Any:
     """Return a stored value of a type; whole numbers are numbers too."""
     if type(value) is not kind and not (kind is float and type(value) is int):
         raise TypeError(f"{shown(value)} is no {kind.__name__}")
@@ -491,24 +478,30 @@ def _of(kind: type[Any], value: Any) -> Any:
 def _stats(stored: Any) -> Stats:
     stats = Stats(**stored)
     counts = (stats.rejections, stats.evaluations, stats.iterations)
-    for count in (_of(int, stats.steps), *(n for n in counts if n is not None)):
-        _of(int, count)
+    for count in (of_type(int, stats.steps), *(n for n in counts if n is not None)):
+        of_type(int, count)
     if stats.solver is not None:
-        _of(str, stats.solver)
-    _of(dict, stats.extra)
-    for t, h in stats.extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
-        _of(float, t)
-        _of(float, h)
-    for t, change, size in _of(dict, stats.extra.get("lost", {})).values():
-        for number in (t, change, size):
-            _of(float, number)
-    _of(str, stats.extra.get("checkpoint", ""))
-    _of(int, stats.extra.get("implicit", {"steps": 0})["steps"])
+        of_type(str, stats.solver)
+    check_extra(stats.extra)
     return stats
 
 
-def _occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occurrences:
-    t, y, direction = (arrays[f"event_{key}:{_of(str, name)}"] for key in ("t", "y", "direction"))
+def check_extra(extra: Any) -> None:
+    """Refuse stored ``extra`` of a trajectory whose parts that warnings are made of have other types."""
+    of_type(dict, extra)
+    for t, h in extra.get("kinks", ()):  # which `Solution.warnings` reads, as it does the next
+        of_type(float, t)
+        of_type(float, h)
+    for t, change, size in of_type(dict, extra.get("lost", {})).values():
+        for number in (t, change, size):
+            of_type(float, number)
+    of_type(str, extra.get("checkpoint", ""))
+    of_type(int, extra.get("implicit", {"steps": 0})["steps"])
+
+
+def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occurrences:
+    """Return where an event happened, from the arrays of a file."""
+    t, y, direction = (arrays[f"event_{key}:{of_type(str, name)}"] for key in ("t", "y", "direction"))
     if direction.dtype.kind != "i" or direction.shape != t.shape:
         raise TypeError(f"the directions of {shown(name)} are not as many as its times")
     n = np.size(t)
@@ -551,7 +544,14 @@ def write_whole(path: Path, write: Any) -> None:
                 Path(temporary).unlink()
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
+    """Import an optional library that tables are made with.
+
+    Raises
+    ------
+    problems.errors.MissingLibraryError
+        If it is not installed.
+    """
     try:
         return import_module(name)
     except ImportError:

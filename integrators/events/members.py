@@ -25,7 +25,7 @@ def follow(
         What `finder.started_with_events` has returned.
     starts, par : ndarray, shapes (n, dim), (n, n_par)
         Starts and parameters.
-    times : ndarray, shape (m,)
+    times : ndarray, shape (m,) or (n, m)
         Times asked for.
     t0 : float
         Time of the starts.
@@ -40,7 +40,7 @@ def follow(
     stop = threading.Event()
 
     def one(i: int) -> Member:
-        return _one(start, starts[i], par[i], times, t0, stop)
+        return _one(start, starts[i], par[i], own_times(times, i), t0, stop)
 
     if threads == 1 or len(starts) == 1:
         return [one(i) for i in range(len(starts))]
@@ -50,6 +50,11 @@ def follow(
         except BaseException:
             stop.set()  # the others come back at once
             raise
+
+
+def own_times(times: Array, i: int) -> Array:
+    """Return the times of trajectory i, of those of all, (m,), or of each, (n, m), with NaN at an end."""
+    return times if times.ndim == 1 else times[i][~np.isnan(times[i])]
 
 
 def _one(

@@ -214,8 +214,8 @@ def integrate(
         status, reason = Status.INTERRUPTED, "Ctrl-C was pressed."
     if watch is not None:
         watch.write()
-    nothing = vectors is None and not any(part.size for part in t) and stepper.t != problem.t0
-    if nothing and status.failed and status is not Status.INTERRUPTED:
+    failed = status not in (Status.FINISHED, Status.INTERRUPTED) and status.failed
+    if failed and vectors is None and stepper.t != problem.t0 and not any(part.size for part in t):
         t, y = [np.array([stepper.t])], [stepper.y[np.newaxis]]  # the last state that was reached
 
     error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None

@@ -1,106 +1,51 @@
 """Integrate one problem from many starts, or with many values of its parameters."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
+from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from integrators import registry
-from integrators.caveats import lost_invariants, of_losses, warnings
+from integrators.ensemble import Solutions
 from integrators.events.event import Event, named
 from integrators.events.finder import started_with_events
 from integrators.events.members import follow
 from integrators.options import Count
 from integrators.protocol import (
+    SAMPLINGS,
     Array,
-    Batches,
     MethodBase,
     PieceSize,
     Program,
-    Status,
-    Threads,
     Trajectories,
-    UserError,
     check_problem,
     offers,
-    telling,
 )
+from integrators.reduce import Reducer, Reduction
 from integrators.refusals import as_numbers, check_batch, check_times
-from integrators.running.watch import SOON, Bar, Progress, Report
-from integrators.solution import Occurrences
-from problems.checks import NOTHING, Named, Word, checked_arguments
+from integrators.running.integrate import SECONDS
+from integrators.running.pieces import (
+    Gathered,
+    Remote,
+    digest,
+    in_batches,
+    integrate_piece,
+    integrate_with,
+    joined,
+)
+from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
+from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 from problems.systems.base import System
 
 FIRST = 64  # trajectories for each thread, of the first piece
-
-
-@dataclass(frozen=True, eq=False)
-class Solutions(Trajectories):
-    """Many trajectories of a problem; see `Trajectories` for ``t``, ``y``, ``status`` and the rest.
-
-    Attributes
-    ----------
-    starts : ndarray, shape (n, dim)
-        Where they start.
-    par : ndarray, shape (n, n_par)
-        Their parameters, as `System.unpack` takes them.
-    compile_seconds : float
-        Seconds spent compiling, before the first step.
-    from_cache : bool or None
-        Whether the compiled code came from a cache; ``None`` where nothing is compiled.
-    problem, method
-        What was integrated, and how.
-    warnings : list of tuple of str
-        What to know about each trajectory although it did not fail, as `Solution.warnings`.
-    events : list of dict of str to Occurrences
-        What happened in each trajectory, by the events' names: nothing in one that Ctrl-C has left out.
-        Empty where none were looked for.
-
-    Examples
-    --------
-    >>> import problems
-    >>> from integrators import Gauss, integrate_many
-    >>> pendulum, method = problems.load("pendulum"), Gauss(s=4, h=0.1)
-    >>> made = integrate_many(pendulum, method, starts=[[0, 1], [0, 1.5]], times=[5.0])
-    >>> made.y.shape, [str(status) for status in made.status]
-    ((2, 1, 2), ['finished', 'finished'])
-    """
-
-    starts: Array
-    par: Array
-    compile_seconds: float
-    from_cache: bool | None
-    problem: Problem
-    method: MethodBase
-    events: list[dict[str, Occurrences]] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return len(self.status)
-
-    @property
-    def warnings(self) -> list[tuple[str, ...]]:
-        """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
-        problem = self.problem
-        caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
-        lost = lost_invariants(problem.system, conserved, self.starts, self.t, self.y, self.par, self.steps)
-        return [
-            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses)
-            for i, (start, par, end, losses) in enumerate(
-                zip(self.starts, self.par, self.y[:, -1], lost, strict=True)
-            )
-        ]
-
-    @property
-    def arrived(self) -> Any:
-        """Which trajectories came to the last time: an array of n truth values."""
-        return np.array([status is Status.FINISHED for status in self.status])
+SHARES, MOST = 64, 4096  # pieces for an executor, and trajectories of one
+NUMBERS = 2**22  # of the states of a piece that is reduced
 
 
 @checked_arguments
@@ -115,8 +60,14 @@ def integrate_many(
     progress: bool | Report = False,
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     backend: Annotated[str | None, Word("backend", ["jax"])] = None,
+    sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
+    reduce: Named[Reduction] = NOTHING,
+    executor: Any = None,
+    piece: Annotated[int, at_least(1)] | None = None,
+    checkpoint: File | None = None,
+    resume: File | None = None,
 ) -> Solutions:
-    """Integrate ``problem`` from many starts, with parameters that may differ, to the same times.
+    """Integrate ``problem`` from many starts, with parameters that may differ.
 
     Trajectories of HBVM and Gauss with up to 16 stages go one in each lane of the vector unit; those
     of heyoka go through its batch integrator; all others one by one. What comes out for a
@@ -135,8 +86,10 @@ def integrate_many(
         States to start from: q then p for Hamiltonian problems. The problem's own by default.
     parameters : mapping of str to array_like, optional
         Values by name: n numbers, or one for all; of a parameter that is a list, n lists, or one.
-    times : array_like, shape (m,), optional
-        Strictly monotone times, from the problem's ``t0`` on (or back). The end of its span by default.
+    times : array_like, shape (m,) or (n, m), optional
+        Strictly monotone times, from the problem's ``t0`` on (or back), of all or of each: a row may end with
+        NaN where it has fewer. The end of its span by default. Trajectories with times of their own go
+        one by one, as `integrate` does, or one in each thread.
     threads : int
         Threads to share the work among. Other methods than HBVM and Gauss use one.
     progress : bool or callable
@@ -147,6 +100,25 @@ def integrate_many(
         terminal event ends its own: what of ``times`` comes later is NaN.
     backend : {"jax"}, optional
         Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
+    sample : {"side", "steps", "land", "dense"}, optional
+        As for `integrate`; trajectories then go one by one. With ``"steps"``, the ends of each one's own
+        steps up to the last time: ``t`` has the shape (n, m), and NaN after the last step of each.
+    reduce : mapping of str to Reduction, optional
+        What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
+        ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
+    executor : concurrent.futures.Executor, optional
+        Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
+        whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``.
+    piece : int, optional
+        Trajectories that are integrated together: with ``executor`` by default a 64th of all, between 1 and
+        4096; with ``reduce`` as many as have 2**22 numbers.
+    checkpoint : path, optional
+        A file that is written every minute and at the end, with all trajectories until then.
+    resume : path, optional
+        Go on from the checkpoint in this file, of the same ensemble, method and times: what is
+        ``INTERRUPTED`` in it is integrated now, the rest is as it was. If there is no such file and
+        ``checkpoint`` is the same path, begin at the beginning. Only give a file that you made: it is a
+        pickle.
 
     Returns
     -------
@@ -175,32 +147,106 @@ def integrate_many(
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system
     rows, par = members("integrate_many", problem, starts, parameters)
-    n, grid = len(rows), check_times([problem.t_end] if times is None else times, problem.t0)
-    check_batch(rows, par, grid, system)
-    program = _program(system, method, backend)
+    n, grid = len(rows), _times(problem, times, len(rows))
+    kept = min(grid.shape[-1], 1) if reduce else grid.shape[-1]
+    check_batch(rows, par, np.empty(kept), system)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
-    if looked_for and backend is not None:
-        raise InputError(f"events are not looked for with backend={backend!r}; leave it out.")
+    _check_together(method, backend, sample, reduce, executor, looked_for, grid)
+    program: Any = _program(system, method, backend)
     start = started_with_events(program, method, problem, looked_for) if looked_for else None
-    made = Solutions(
-        t=grid,
-        y=np.full((n, grid.size, system.dim), np.nan),
-        status=[Status.INTERRUPTED] * n,
-        reason=["Ctrl-C was pressed before it was at its end."] * n,
-        t_stop=np.full(n, problem.t0),
-        steps=np.zeros(n, dtype=np.int64),
-        starts=rows,
-        par=par,
-        compile_seconds=program.compile_seconds,
-        from_cache=program.from_cache,
-        problem=problem,
-        method=method,
-    )
+    reducer = Reducer(system, reduce) if reduce else None
+    belongs = identity(problem, method, grid, sample, looked_for) | {
+        "start": digest(rows), "parameters": digest(par),
+        "reduce": ", ".join(f"{name} {one.digest}" for name, one in reduce.items()),
+    }  # fmt: skip
+    gathered = Gathered(problem, method, rows, par, grid, sample, reducer)
+    path = None if checkpoint is None else Path(checkpoint)
+    earlier = None if resume is None else Path(resume)
+    if earlier is not None and (earlier != path or earlier.exists()):
+        gathered.restore(read(earlier, belongs))
+    watch = Watch(problem.t0, 1.0, None, path, SECONDS, belongs)
+    size = _fixed_size(piece, executor, reduce, n, grid.shape[-1] * system.dim)
+
+    def given(numbers: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+        return rows[numbers], par[numbers], grid if grid.ndim == 1 else grid[numbers]
+
+    def here(numbers: NDArray[np.int64]) -> tuple[Trajectories, Any]:
+        if start is None:
+            return integrate_with(program, *given(numbers), problem.t0, threads, sample), None
+        members = follow(start, *given(numbers), problem.t0, threads)
+        return joined([one for one, _ in members], grid), [happened for _, happened in members]
+
+    if executor is not None:
+        pieces = [
+            (numbers, (*given(numbers), problem.t0, threads, sample))
+            for numbers in gathered.missing(cast("int", size))
+        ]
+        made = Remote(executor, problem, method, integrate_piece).run(pieces)
+    else:
+        batches = start is None and in_batches(program, grid, sample)
+        few = program.piece if offers(program, PieceSize) else FIRST * threads
+        made = _local(here, gathered, few if batches else threads, size)
+    began = perf_counter()
     with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
-        _integrate(program, made, threads, report, start)
-    if start is not None:
-        made.events.extend({} for _ in range(n - len(made.events)))
-    return replace(made, compile_seconds=program.compile_seconds, from_cache=program.from_cache)
+        for numbers, found, happened in made:
+            gathered.take(numbers, found, happened)
+            if watch.keeps:
+                watch.keep(gathered.checkpoint())
+            if report is not None:
+                share, steps, seconds = gathered.share, gathered.steps, perf_counter() - began
+                left = seconds * (1.0 - share) / share if share else float("inf")
+                report(Progress(float(np.nanmax(grid)), share, steps, seconds, left))
+    watch.write()
+    return gathered.solutions(program.compile_seconds, program.from_cache, events=start is not None)
+
+
+def _check_together(
+    method: MethodBase, backend: str | None, sample: str | None, reduce: Any, executor: Any,
+    events: Mapping[str, Event], grid: Array,
+) -> None:  # fmt: skip
+    """Refuse what cannot be asked for together.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With the name of what to leave out.
+    """
+    for name, given in (("sample", sample), ("executor", executor)):
+        if given is not None and (backend is not None or events):
+            other = "backend" if backend is not None else "events"
+            raise InputError(f"{name}= and {other}= do not go together; leave one of them out.")
+    if events and backend is not None:
+        raise InputError(f"events are not looked for with backend={backend!r}; leave it out.")
+    if backend is not None and grid.ndim == 2:
+        raise InputError("backend='jax' takes times of shape (m,), the same for all.")
+    if reduce and (sample == "steps" or events or grid.ndim == 2):
+        raise InputError(
+            "reduce= needs times of shape (m,), the same for all; leave out events and sample='steps'."
+        )
+
+
+def _times(problem: Problem, times: ArrayLike | None, n: int) -> Array:
+    """Return the times of all, (m,), or those of each, (n, m), checked."""
+    given = as_numbers("times", [problem.t_end] if times is None else times)
+    if given.ndim != 2:
+        return check_times(given, problem.t0)
+    if len(given) != n:
+        raise InputError(f"times of shape {given.shape} are those of {len(given)} trajectories, not of {n}.")
+    for row in given:
+        there = ~np.isnan(row)
+        if not there.any() or not there[: int(there.sum())].all():
+            raise InputError("a row of times must be numbers, with NaN at its end only.")
+        check_times(row[there], problem.t0)
+    return given
+
+
+def _fixed_size(piece: int | None, executor: Any, reduce: Any, n: int, numbers: int) -> int | None:
+    """Return how many trajectories are integrated together; ``None`` where that may follow the clock."""
+    if piece is not None:
+        return piece
+    if executor is not None:
+        return max(1, min(-(-n // SHARES), MOST))
+    return max(1, NUMBERS // numbers) if reduce else None
 
 
 def members(who: str, problem: Problem, starts: ArrayLike | None, parameters: Any) -> tuple[Array, Array]:
@@ -236,54 +282,18 @@ def _program(system: System, method: MethodBase, backend: str | None) -> Program
     return cast("Program", JaxProgram(system, method))
 
 
-def _integrate(
-    program: Any, made: Solutions, threads: int, report: Report | None, start: Callable[..., Any] | None
-) -> None:
-    """Integrate piece by piece, each of which takes about `SOON`; ``start`` where events are looked for."""
-    batch: Any = program.batch if offers(program, Batches) else None
-    if start is not None:
-        batch = partial(_with_events, start, made)
-    options = {"times": made.t, "t0": made.problem.t0}
-    if offers(program, Threads) and program.threaded:
-        options["threads"] = threads
-    few = program.piece if offers(program, PieceSize) else FIRST * threads
-    size = 1 if batch is None else threads if start is not None else few
-    first, began, n = 0, perf_counter(), len(made)
-    while first < n:
+def _local(
+    integrate: Callable[..., tuple[Trajectories, Any]], gathered: Gathered, first: int, size: int | None
+) -> Iterator[tuple[NDArray[np.int64], Trajectories, Any]]:
+    """Integrate what is missing, ``size`` at a time, or, from ``first`` on, as many as take about `SOON`."""
+    (missing,) = gathered.missing(len(gathered)) or [np.empty(0, dtype=np.int64)]
+    count = first if size is None else size
+    while missing.size:
         before = perf_counter()
-        here = slice(first, first + size)
-        starts, par = made.starts[here], made.par[here]
-        piece = (
-            _one(program, starts[0], par[0], **options) if batch is None else batch(starts, par, **options)
-        )
-        for name in ("y", "status", "reason", "t_stop", "steps"):
-            getattr(made, name)[here] = getattr(piece, name)
-        made.extra.update({first + i: extra for i, extra in piece.extra.items() if extra})
-        first = min(first + size, n)
-        now = perf_counter()
-        if batch is not None and now - before < SOON / 2.0:
-            size *= 2
-        if report is not None:
-            steps, seconds = int(made.steps.sum()), now - began
-            report(Progress(float(made.t[-1]), first / n, steps, seconds, seconds * (n - first) / first))
-
-
-def _with_events(
-    start: Callable[..., Any], made: Solutions, starts: Array, par: Array, **options: Any
-) -> Trajectories:
-    """Integrate some trajectories, and add what has happened in them to ``made``."""
-    members = follow(start, starts, par, **options)
-    made.events.extend(happened for _, happened in members)
-    pieces = [piece for piece, _ in members]
-    return Trajectories(
-        t=made.t,
-        y=np.concatenate([piece.y for piece in pieces]),
-        status=[piece.status[0] for piece in pieces],
-        reason=[piece.reason[0] for piece in pieces],
-        t_stop=np.concatenate([piece.t_stop for piece in pieces]),
-        steps=np.concatenate([piece.steps for piece in pieces]),
-        extra={i: extra for i, piece in enumerate(pieces) for extra in piece.extra.values()},
-    )
+        numbers, missing = missing[:count], missing[count:]
+        yield (numbers, *integrate(numbers))
+        if size is None and perf_counter() - before < SOON / 2.0:
+            count *= 2
 
 
 def _values(system: System, parameters: Any) -> dict[str, Array]:
@@ -313,19 +323,3 @@ def _number(who: str, starts: ArrayLike | None, values: dict[str, Array]) -> tup
         raise InputError(f"{who} needs starts=, an array (n, dim), or parameters= with n values.")
     name = max(counts, key=lambda name: (values[name].ndim, counts[name]))
     return f"parameter {name!r}", counts[name]
-
-
-def _one(program: Program, start: Array, par: Array, times: Array, t0: float) -> Trajectories:
-    """Integrate one trajectory, by a method that has no better way."""
-    y, steps = np.full((1, times.size, start.size), np.nan), np.zeros(1, dtype=np.int64)
-    try:
-        stepper = program.start(start, par, t0)
-    except UserError as raised:
-        reason = f"{raised} at the start, t = {t0!r}."
-        return Trajectories(times, y, [Status.USER_ERROR], [reason], np.array([t0]), steps)
-    samples = stepper.advance(times)
-    y[0, : samples.t.size], steps[0] = samples.y, stepper.stats.steps
-    stop = times[-1] if samples.status is Status.FINISHED else stepper.t
-    made = Trajectories(times, y, [samples.status], [samples.reason], np.array([stop]), steps)
-    made.extra[0] = telling(stepper.stats)
-    return made

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from integrators import solution
+from integrators import ensemble, solution
 from integrators.running import watch
 
 PAGE = (Path(__file__).parents[2] / "docs" / "reference" / "public.md").read_text(encoding="utf-8")
@@ -22,10 +22,11 @@ def test_the_page_lists_what_a_module_says_is_public(module):
 
 
 def test_the_page_lists_every_module_with_public_names():
-    assert len(LISTED) == 11
+    assert len(LISTED) == 12
     assert {"problems", "integrators", "integrators.protocol", "integrators.stepping"} <= {*LISTED}
 
 
 def test_the_page_tells_the_formats_of_files():
-    formats = dict(re.findall(r"^\| (solution|checkpoint) \| [^|]+ \| (\d+)", PAGE, flags=re.MULTILINE))
-    assert formats == {"solution": str(solution.FORMAT), "checkpoint": str(watch.VERSION)}
+    row = r"^\| (solution|ensemble|checkpoint) \| [^|]+ \| (\d+)"
+    written = {"solution": solution.FORMAT, "ensemble": ensemble.FORMAT, "checkpoint": watch.VERSION}
+    assert dict(re.findall(row, PAGE, flags=re.MULTILINE)) == {name: str(n) for name, n in written.items()}

@@ -1,0 +1,417 @@
+"""Many trajectories of one problem, and each of them as a solution of its own."""
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators import solution
+from integrators.caveats import LOOKED_AT, lost_invariants, of_losses, warnings
+from integrators.plain import (
+    doubles,
+    packed,
+    packed_method,
+    packed_problem,
+    unpacked,
+    unpacked_method,
+)
+from integrators.protocol import Array, MethodBase, Stats, Status, Trajectories
+from integrators.solution import Occurrences, Solution, library, of_type, write_whole
+from problems.analysis import invariants
+from problems.checks import File, checked_arguments, readable
+from problems.errors import printable, shown
+from problems.problem import Problem
+
+KIND = "ensemble"
+FORMAT = 1  # of files
+
+
+@readable
+@dataclass(frozen=True, eq=False, repr=False)
+class Solutions(Trajectories):
+    """Many trajectories of a problem; see `Trajectories` for ``t``, ``y``, ``status`` and the rest.
+
+    ``solutions[i]`` is trajectory i as a `Solution`, and they can be gone through in a loop. A slice, truth
+    values or a list of numbers choose some of them: ``solutions[solutions.arrived]``.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,) or (n, m)
+        Times; each trajectory's where they differ, with NaN after the last one of a shorter row.
+    starts : ndarray, shape (n, dim)
+        Where they start.
+    par : ndarray, shape (n, n_par)
+        Their parameters, as `System.unpack` takes them.
+    compile_seconds : float
+        Seconds spent compiling, before the first step.
+    from_cache : bool or None
+        Whether the compiled code came from a cache; ``None`` where nothing is compiled.
+    problem, method
+        What was integrated, and how.
+    warnings : list of tuple of str
+        What to know about each trajectory although it did not fail, as `Solution.warnings`.
+    events : list of dict of str to Occurrences
+        What happened in each trajectory, by the events' names: nothing in one that Ctrl-C has left out.
+        Empty where none were looked for.
+    reduced : dict of str to ndarray
+        What the reductions of `integrators.reduce` amount to, by name.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Gauss, integrate_many
+    >>> pendulum, method = problems.load("pendulum"), Gauss(s=4, h=0.1)
+    >>> made = integrate_many(pendulum, method, starts=[[0, 1], [0, 1.5]], times=[5.0])
+    >>> made.y.shape, [str(status) for status in made.status]
+    ((2, 1, 2), ['finished', 'finished'])
+    >>> bool(made[1].errors()["energy"].max() < 1e-9), made.q.shape
+    (True, (2, 1, 1))
+    """
+
+    starts: Array
+    par: Array
+    compile_seconds: float
+    from_cache: bool | None
+    problem: Problem
+    method: MethodBase
+    events: list[dict[str, Occurrences]] = field(default_factory=list)
+    reduced: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __iter__(self) -> Iterator[Solution]:
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, which: Any) -> Any:
+        """Return a trajectory as a `Solution`, or some of them as `Solutions`.
+
+        Raises
+        ------
+        IndexError
+            For a number that none of them has.
+        """
+        numbers = np.arange(len(self))[which]
+        return self._one(int(numbers)) if np.ndim(numbers) == 0 else self._some(numbers)
+
+    def _one(self, i: int) -> Solution:
+        times, system = self._times[i], self.problem.system
+        there = np.isfinite(times) & ~np.isnan(self.y[i]).any(axis=1)
+        asked = times[np.isfinite(times)]
+        parameters: dict[str, Any] = {**system.unpack(self.par[i])}
+        end = float(asked[-1]) if asked.size and asked[-1] != self.problem.t0 else self.problem.t_end
+        return Solution(
+            t=times[there],
+            y=self.y[i][there],
+            status=self.status[i],
+            reason=self.reason[i],
+            t_stop=float(self.t_stop[i]),
+            stats=Stats(steps=int(self.steps[i]), extra=dict(self.extra.get(i, {}))),
+            compile_seconds=self.compile_seconds,
+            from_cache=self.from_cache,
+            problem=Problem(
+                system,
+                y0=self.starts[i],
+                parameters=parameters,
+                t0=self.problem.t0,
+                t_end=end,
+            ),
+            method=self.method,
+            events=self.events[i] if self.events else {},
+        )
+
+    def _some(self, numbers: NDArray[np.int64]) -> "Solutions":
+        chosen = numbers.tolist()
+        return Solutions(
+            t=self.t if self.t.ndim == 1 else self.t[numbers],
+            y=self.y[numbers],
+            status=[self.status[i] for i in chosen],
+            reason=[self.reason[i] for i in chosen],
+            t_stop=self.t_stop[numbers],
+            steps=self.steps[numbers],
+            starts=self.starts[numbers],
+            par=self.par[numbers],
+            compile_seconds=self.compile_seconds,
+            from_cache=self.from_cache,
+            problem=self.problem,
+            method=self.method,
+            events=[self.events[i] for i in chosen] if self.events else [],
+            extra={new: self.extra[i] for new, i in enumerate(chosen) if i in self.extra},
+        )
+
+    @property
+    def _times(self) -> Array:
+        return np.broadcast_to(self.t, self.y.shape[:2])
+
+    @property
+    def q(self) -> Array | None:
+        """Positions (n, m, dof), a view of ``y``; ``None`` for systems that have no positions and momenta."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[:, :, :dof]
+
+    @property
+    def p(self) -> Array | None:
+        """Momenta (n, m, dof), a view of ``y``; ``None`` as for ``q``."""
+        dof = self.problem.system.dof
+        return None if dof is None else self.y[:, :, dof:]
+
+    @property
+    def arrived(self) -> Any:
+        """Which trajectories came to the last time: an array of n truth values."""
+        return np.array([status is Status.FINISHED for status in self.status])
+
+    @property
+    def warnings(self) -> list[tuple[str, ...]]:
+        """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
+        problem = self.problem
+        caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
+        lost = lost_invariants(
+            problem.system, conserved, self.starts, self._times, self.y, self.par, self.steps
+        )
+        return [
+            warnings(problem, start, par, end, caveat, self.extra.get(i, {})) + of_losses(losses)
+            for i, (start, par, end, losses) in enumerate(
+                zip(self.starts, self.par, self.y[:, -1], lost, strict=True)
+            )
+        ]
+
+    def invariants(self) -> dict[str, Array]:
+        """Return the invariants, shape (n, m), or (n, m, k) of a vector, by name."""
+        return self._gathered(
+            [
+                invariants.invariants(self.problem.system, par, y, t)
+                for par, y, t in zip(self.par, self.y, self._times, strict=True)
+            ]
+        )
+
+    def errors(self) -> dict[str, Array]:
+        """Return how far each invariant is from its value at its trajectory's start, shape (n, m), by name.
+
+        As `problems.Problem.errors`; NaN where a trajectory did not arrive.
+        """
+        return self._gathered(
+            [
+                invariants.errors(self.problem.system, par, y, t, start=(self.problem.t0, start))
+                for par, y, t, start in zip(self.par, self.y, self._times, self.starts, strict=True)
+            ]
+        )
+
+    def _gathered(self, members: list[dict[str, Array]]) -> dict[str, Array]:
+        return {name: np.stack([one[name] for one in members]) for name in members[0]}
+
+    def __repr__(self) -> str:
+        return printable(
+            f"Solutions({self.problem!s}, {self.method!r}, {len(self)} trajectories, "
+            f"{int(self.arrived.sum())} finished)"
+        )
+
+    def __str__(self) -> str:
+        counts = Counter(map(str, self.status))
+        ended = ", ".join(f"{n} {status}" for status, n in counts.most_common())
+        stops, m = self.t_stop, self.y.shape[1]
+        where = f"t = {stops.max():g}" if np.ptp(stops) == 0.0 else f"t = {stops.min():g} to {stops.max():g}"
+        lines = [
+            str(self.problem),
+            repr(self.method),
+            f"{len(self)} trajectories to {where}, {m} {'state' if m == 1 else 'states'} of each: {ended}",
+        ]
+        failed = [i for i, status in enumerate(self.status) if status.failed]
+        if failed:
+            i = failed[0]
+            lines.append(f"the first that failed, number {i}, at t = {self.t_stop[i]!r}: {self.reason[i]}")
+        cached = ", from a cache" if self.from_cache else ""
+        low, middle, most = np.percentile(self.steps, [0, 50, 100]).astype(int)
+        lines.append(
+            f"{self.steps.sum():,} steps ({low} to {most}, half of them up to {middle}); "
+            f"compiled in {self.compile_seconds:.2g} s{cached}"
+        )
+        lines += self._largest()
+        if self.events:
+            found = Counter({name: len(hits) for one in self.events for name, hits in one.items()})
+            for one in self.events[1:]:
+                found.update(dict.fromkeys(one, 0))
+            totals = {name: sum(len(one[name]) for one in self.events if name in one) for name in found}
+            lines.append("events found: " + ", ".join(f"{name} {n}" for name, n in totals.items()))
+        if self.reduced:
+            lines.append("reduced: " + ", ".join(f"{k} {np.shape(v)}" for k, v in self.reduced.items()))
+        told = [(i, said) for i, said in enumerate(self.warnings) if said]
+        if told:
+            lines.append(
+                f"warnings of {len(told)} trajectories; of the first, number {told[0][0]}: {told[0][1][0]}"
+            )
+        return printable("\n".join(lines))
+
+    def _largest(self) -> list[str]:
+        """Return the largest errors of the invariants at the last states, of some trajectories."""
+        some = self[:: -(-len(self) // LOOKED_AT)]
+        last = Solutions(**{**vars(some), "t": some._times[:, -1:], "y": some.y[:, -1:]})
+        largest = {name: error for name, error in last.errors().items() if not np.isnan(error).all()}
+        told = ", ".join(f"{name} {float(np.nanmax(error)):.1e}" for name, error in largest.items())
+        where = "" if len(some) == len(self) else f" of {len(some)} of them"
+        return [f"largest errors at the end{where}: {told}"] if told else []
+
+    def to_pandas(self) -> Any:
+        """Return a ``pandas.DataFrame``: a row for each trajectory and time that was reached.
+
+        Its index is (trajectory, t), its columns are q0, q1 ... p0 ... (or y0 ...).
+
+        Raises
+        ------
+        problems.errors.MissingLibraryError
+            If pandas is not installed.
+        """
+        pandas = library("pandas")
+        there = ~np.isnan(self.y).any(axis=2)
+        number = np.broadcast_to(np.arange(len(self))[:, np.newaxis], there.shape)
+        index = pandas.MultiIndex.from_arrays([number[there], self._times[there]], names=["trajectory", "t"])
+        names = [f"{x}{i}" for x, part in self._parts().items() for i in range(part.shape[2])]
+        frame = pandas.DataFrame(self.y[there], index=index, columns=names)
+        frame.attrs = self._about()
+        return frame
+
+    def to_xarray(self) -> Any:
+        """Return an ``xarray.Dataset``: q and p (or y) along ``trajectory``, ``time`` and ``i``.
+
+        Raises
+        ------
+        problems.errors.MissingLibraryError
+            If xarray is not installed.
+        """
+        xarray = library("xarray")
+        parts: dict[str, Any] = {x: (("trajectory", "time", "i"), y) for x, y in self._parts().items()}
+        parts["status"] = ("trajectory", [str(status) for status in self.status])
+        along = ("time",) if self.t.ndim == 1 else ("trajectory", "time")
+        return xarray.Dataset(parts, coords={"t": (along, self.t)}, attrs=self._about())
+
+    def _parts(self) -> dict[str, Array]:
+        return {"y": self.y} if self.q is None or self.p is None else {"q": self.q, "p": self.p}
+
+    def _about(self) -> dict[str, str]:
+        return {"problem": repr(self.problem), "method": repr(self.method)}
+
+    @checked_arguments
+    def save(self, path: File) -> None:
+        """Write all to a file that `integrators.load` reads: arrays and JSON in NumPy's npz format.
+
+        As `Solution.save`: formulas are in it as they were traced, code is not.
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a method that is not registered, or a file that cannot be written.
+        """
+        arrays: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in _ARRAYS}
+        names = sorted({name for one in self.events for name in one})
+        for name in names:
+            found = [one.get(name) for one in self.events]
+            lengths = np.array([0 if hits is None else len(hits) for hits in found], dtype=np.int64)
+            arrays[f"event_counts:{name}"] = lengths
+            for key in ("t", "y", "direction"):
+                parts = [getattr(hits, key) for hits in found if hits is not None]
+                arrays[f"event_{key}:{name}"] = np.concatenate(parts)
+        arrays |= {f"reduced:{name}": np.asarray(values) for name, values in self.reduced.items()}
+        words = {
+            "kind": KIND,
+            "format": FORMAT,
+            "problem": packed_problem(self.problem, arrays),
+            "method": packed_method(self.method, arrays),
+            "status": list(map(str, self.status)),
+            "reason": self.reason,
+            "extra": packed({str(i): extra for i, extra in self.extra.items()}, arrays),
+            "events": names if self.events else None,
+            "reduced": list(self.reduced),
+            "compile_seconds": self.compile_seconds,
+            "from_cache": self.from_cache,
+        }
+        arrays["words"] = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        write_whole(Path(path), lambda file: np.savez(file, **arrays))  # pyright: ignore[reportArgumentType]
+
+
+_ARRAYS = ("t", "y", "starts", "par", "t_stop", "steps")
+
+
+@checked_arguments
+def load(path: File, problem: Problem | None = None) -> Any:
+    """Return the `Solution` or `Solutions` that ``save`` wrote to a file, bit for bit.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The file.
+    problem : Problem, optional
+        For a field that is not traced, which no file holds: the problem that was integrated.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a file that is not there, is damaged, or is none of these.
+
+    Examples
+    --------
+    >>> import tempfile, problems
+    >>> from pathlib import Path
+    >>> from integrators import Gauss, integrate, load
+    >>> path = Path(tempfile.mkdtemp()) / "pendulum.npz"
+    >>> integrate(problems.load("pendulum"), Gauss(s=2, h=0.1), [0.0, 1.0]).save(path)
+    >>> load(path).method
+    Gauss(s=2, h=0.1)
+    """
+    return solution.read_file(path, problem, {None: solution.from_file, KIND: _from_file})
+
+
+def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], problem: Problem) -> Solutions:
+    n, m, dim = np.shape(arrays["y"])
+    t = arrays["t"]
+    status = [Status(word) for word in words["status"]]
+    reasons = [of_type(str, word) for word in words["reason"]]
+    if len(status) != n or len(reasons) != n or dim != problem.system.dim:
+        raise TypeError("its parts belong to other numbers of trajectories")
+    steps = doubles(arrays["steps"], (n,), "steps")
+    extra = {int(i): of_type(dict, value) for i, value in unpacked(words["extra"], arrays).items()}
+    for one in extra.values():
+        solution.check_extra(one)
+    return Solutions(
+        t=doubles(t, (m,) if np.ndim(t) == 1 else (n, m), "t"),
+        y=doubles(arrays["y"], (n, m, dim), "y"),
+        status=status,
+        reason=reasons,
+        t_stop=doubles(arrays["t_stop"], (n,), "t_stop"),
+        steps=steps.astype(np.int64),
+        starts=doubles(arrays["starts"], (n, dim), "starts"),
+        par=doubles(arrays["par"], (n, problem.system.n_par), "par"),
+        compile_seconds=of_type(float, words["compile_seconds"]),
+        from_cache=None if words["from_cache"] is None else of_type(bool, words["from_cache"]),
+        problem=problem,
+        method=unpacked_method(words["method"], arrays),
+        events=[] if words["events"] is None else _events(words["events"], arrays, n, dim),
+        reduced={name: _numbers(arrays[f"reduced:{of_type(str, name)}"]) for name in words["reduced"]},
+        extra=extra,
+    )
+
+
+def _numbers(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype.kind not in "fiu":
+        raise TypeError("a reduction is no array of numbers")
+    return values
+
+
+def _events(
+    names: list[str], arrays: Mapping[str, NDArray[Any]], n: int, dim: int
+) -> list[dict[str, Occurrences]]:
+    found: list[dict[str, Occurrences]] = [{} for _ in range(n)]
+    for name in names:
+        counts = arrays[f"event_counts:{name}"]
+        if counts.dtype.kind != "i" or counts.shape != (n,) or counts.min(initial=0) < 0:
+            raise TypeError(f"the counts of {shown(name)} are not as many as the trajectories")
+        whole = solution.occurrences(name, arrays, dim)
+        if counts.sum() != len(whole):
+            raise TypeError(f"the times of {shown(name)} are not as many as its counts")
+        ends = np.cumsum(counts)
+        for i, (low, high) in enumerate(zip(ends - counts, ends, strict=True)):
+            found[i][name] = Occurrences(whole.t[low:high], whole.y[low:high], whole.direction[low:high])
+    return found

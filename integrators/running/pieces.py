@@ -1,0 +1,356 @@
+"""The pieces of an ensemble: who integrates them, what is gathered of them, and what is kept in a file."""
+
+import hashlib
+import pickle
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.ensemble import Solutions
+from integrators.events.members import own_times
+from integrators.protocol import (
+    Array,
+    Batches,
+    Destination,
+    Interruptible,
+    MethodBase,
+    Program,
+    Status,
+    Threads,
+    Trajectories,
+    UserError,
+    offers,
+    telling,
+)
+from integrators.reduce import Reducer
+from integrators.running.integrate import prepared
+from integrators.solution import Occurrences
+from problems.errors import InputError, shown
+from problems.problem import Problem
+
+TRIES = 2  # of a piece whose worker has died
+WINDOW = 64  # pieces that an executor has at a time
+
+Numbers = NDArray[np.int64]
+
+
+def alone(
+    program: Program, starts: Array, par: Array, times: Array, t0: float, threads: int, sample: str | None
+) -> Trajectories:
+    """Integrate trajectories one by one as `integrate` does, or as many at once as there are threads.
+
+    Parameters
+    ----------
+    program : Program
+        The compiled method.
+    starts, par : ndarray, shapes (n, dim), (n, n_par)
+        Starts and parameters.
+    times : ndarray, shape (m,) or (n, m)
+        Times asked for.
+    t0 : float
+        Time of the starts.
+    threads : int
+        How many.
+    sample : str or None
+        As for `integrate`; with ``"steps"`` the times are those of each trajectory's steps.
+
+    Returns
+    -------
+    Trajectories
+        Rows that are shorter than others end with NaN.
+    """
+    stop = threading.Event()
+
+    def one(i: int) -> Trajectories:
+        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop)
+
+    if threads == 1 or len(starts) == 1:
+        members = [one(i) for i in range(len(starts))]
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            try:
+                members = list(pool.map(one, range(len(starts))))
+            except BaseException:
+                stop.set()  # the others come back at once
+                raise
+    return joined(members, times)
+
+
+def joined(members: list[Trajectories], times: Array) -> Trajectories:
+    """Return batches of one trajectory as one; rows that are shorter than others end with NaN."""
+    width = max(one.y.shape[1] for one in members)
+    t, y = (
+        np.full((len(members), width), np.nan),
+        np.full((len(members), width, members[0].y.shape[2]), np.nan),
+    )
+    for i, one in enumerate(members):
+        t[i, : one.t.size], y[i, : one.y.shape[1]] = one.t, one.y[0]
+    shared = np.ndim(times) == 1 and all(one.t is times for one in members)
+    return Trajectories(
+        times if shared else t,
+        y,
+        [one.status[0] for one in members],
+        [one.reason[0] for one in members],
+        np.concatenate([one.t_stop for one in members]),
+        np.concatenate([one.steps for one in members]),
+        extra={i: extra for i, one in enumerate(members) for extra in one.extra.values()},
+    )
+
+
+def _one(
+    program: Program,
+    y0: Array,
+    par: Array,
+    times: Array,
+    t0: float,
+    sample: str | None,
+    stop: threading.Event,
+) -> Trajectories:
+    try:
+        stepper: Any = program.start(y0, par, t0)
+    except UserError as raised:
+        reason = f"{raised} at the start, t = {t0!r}."
+        nothing = np.full((1, times.size, y0.size), np.nan)
+        none = np.zeros(1, dtype=np.int64)
+        return Trajectories(times, nothing, [Status.USER_ERROR], [reason], np.array([t0]), none)
+    if offers(stepper, Interruptible):
+        stepper.stop = stop
+    if offers(stepper, Destination):
+        stepper.destination = float(times[-1])
+    if sample == "steps":
+        samples = stepper.advance(np.array([t0, times[-1]]) if times[0] == t0 else times[-1:], sample=sample)
+        t, y = samples.t, samples.y[np.newaxis]
+    else:
+        samples = stepper.advance(times, sample=sample)
+        t, y = times, np.full((1, times.size, y0.size), np.nan)
+        y[0, : samples.t.size] = samples.y
+    end = times[-1] if samples.status is Status.FINISHED else stepper.t
+    steps = np.array([stepper.stats.steps])
+    made = Trajectories(t, y, [samples.status], [samples.reason], np.array([end]), steps)
+    made.extra[0] = telling(stepper.stats)
+    return made
+
+
+def in_batches(program: Program, times: Array, sample: str | None) -> bool:
+    """Whether a program integrates such trajectories together."""
+    return sample is None and times.ndim == 1 and offers(program, Batches)
+
+
+def integrate_with(
+    program: Any, starts: Array, par: Array, times: Array, t0: float, threads: int, sample: str | None
+) -> Trajectories:
+    """Integrate some trajectories: in lanes where the program can and the times are those of all."""
+    if not in_batches(program, times, sample):
+        return alone(program, starts, par, times, t0, threads, sample)
+    options = {"threads": threads} if offers(program, Threads) and program.threaded else {}
+    return program.batch(starts, par, times=times, t0=t0, **options)
+
+
+def integrate_piece(problem: Problem, method: MethodBase, *piece: Any) -> Trajectories:
+    """Integrate some trajectories in a worker: `integrate_with` its own program."""
+    return integrate_with(prepared(method, problem.system)[0], *piece)
+
+
+class Gathered:
+    """What is known of the trajectories of an ensemble.
+
+    Parameters
+    ----------
+    problem, method
+        What is integrated, and how.
+    starts, par : ndarray, shapes (n, dim), (n, n_par)
+        Starts and parameters.
+    times : ndarray, shape (m,) or (n, m)
+        Times asked for.
+    sample : str or None
+        With ``"steps"`` each trajectory has times of its own.
+    reducer : Reducer or None
+        What goes through the states, of which only the last ones are kept then.
+    """
+
+    def __init__(
+        self, problem: Problem, method: MethodBase, starts: Array, par: Array, times: Array,
+        sample: str | None, reducer: Reducer | None,
+    ):  # fmt: skip
+        n = len(starts)
+        self._problem, self._method, self._starts, self._par = problem, method, starts, par
+        self._times, self._reducer = times, reducer
+        width = 0 if sample == "steps" else times.shape[-1] if reducer is None else 1
+        nothing: tuple[Array, Array] = np.empty(0), np.empty((0, starts.shape[1]))
+        self._rows = [nothing] * n if sample == "steps" else None
+        self._y = np.full((n, width, starts.shape[1]), np.nan)
+        self._status = [Status.INTERRUPTED] * n
+        self._reason = ["Ctrl-C was pressed before it was at its end."] * n
+        self._stop, self._steps = np.full(n, problem.t0), np.zeros(n, dtype=np.int64)
+        self._extra: dict[int, dict[str, Any]] = {}
+        self._events: dict[int, dict[str, Occurrences]] = {}
+
+    def missing(self, size: int) -> list[Numbers]:
+        """Return the numbers of what is not integrated, in pieces."""
+        numbers = np.flatnonzero([status is Status.INTERRUPTED for status in self._status])
+        return [numbers[i : i + size] for i in range(0, len(numbers), size)]
+
+    def __len__(self) -> int:
+        return len(self._status)
+
+    @property
+    def share(self) -> float:
+        """The part that is integrated."""
+        return 1.0 - self._status.count(Status.INTERRUPTED) / len(self._status)
+
+    @property
+    def steps(self) -> int:
+        """Steps of all."""
+        return int(self._steps.sum())
+
+    def take(self, numbers: Numbers, found: Any, events: list[dict[str, Occurrences]] | None = None) -> None:
+        """Take the trajectories of these numbers, or a text on why there are none."""
+        if isinstance(found, str):
+            for i in numbers.tolist():
+                self._reason[i] = f"its worker ended ({found}); resume it from a checkpoint, or run it again."
+            return
+        chosen = numbers.tolist()
+        if self._reducer is not None:
+            self._reducer.take(numbers, found.t, found.y, self._par[numbers])
+            self._y[numbers] = found.y[:, -1:]
+        elif self._rows is not None:
+            for i, t, y in zip(chosen, np.broadcast_to(found.t, found.y.shape[:2]), found.y, strict=True):
+                there = ~np.isnan(t)
+                self._rows[i] = t[there], y[there]
+        else:
+            self._y[numbers, : found.y.shape[1]] = found.y
+        for i, status, reason in zip(chosen, found.status, found.reason, strict=True):
+            self._status[i], self._reason[i] = status, reason
+        self._stop[numbers], self._steps[numbers] = found.t_stop, found.steps
+        self._extra.update({chosen[i]: extra for i, extra in found.extra.items() if extra})
+        self._events.update(zip(chosen, events or (), strict=False))
+
+    _kept = ("_rows", "_y", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Return all that is known, for `restore`."""
+        known = {name: getattr(self, name) for name in self._kept}
+        if self._reducer is not None:
+            known["reduced"] = self._reducer.gathered, self._reducer.numbers
+        return known
+
+    def restore(self, known: dict[str, Any]) -> None:
+        """Know what `checkpoint` has returned."""
+        for name in self._kept:
+            setattr(self, name, known[name])
+        if self._reducer is not None:
+            self._reducer.gathered, self._reducer.numbers = known["reduced"]
+
+    def solutions(self, compile_seconds: float, from_cache: bool | None, *, events: bool) -> Solutions:
+        """Return what is known."""
+        t, y, n = self._times, self._y, len(self._status)
+        if self._rows is not None:
+            width = max(row.size for row, _ in self._rows)
+            t, y = np.full((n, width), np.nan), np.full((n, width, self._starts.shape[1]), np.nan)
+            for i, (row, states) in enumerate(self._rows):
+                t[i, : row.size], y[i, : row.size] = row, states
+        elif self._reducer is not None:
+            t = t[..., -1:]
+        return Solutions(
+            t=t, y=y, status=self._status, reason=self._reason, t_stop=self._stop, steps=self._steps,
+            starts=self._starts, par=self._par, compile_seconds=compile_seconds, from_cache=from_cache,
+            problem=self._problem, method=self._method, extra=self._extra,
+            events=[self._events.get(i, {}) for i in range(n)] if events else [],
+            reduced={} if self._reducer is None else self._reducer.results(n),
+        )  # fmt: skip
+
+
+class Remote:
+    """Pieces that an executor integrates.
+
+    Parameters
+    ----------
+    executor : Executor
+        Any of `concurrent.futures`.
+    problem, method
+        What is integrated, and how; they are sent to the workers.
+    task : callable
+        ``task(problem, method, *piece)`` returns the trajectories of a piece; importable by the workers.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For what is no executor, and a problem that cannot be sent.
+    """
+
+    def __init__(self, executor: Executor, problem: Problem, method: MethodBase, task: Callable[..., Any]):
+        if not callable(getattr(executor, "submit", None)):
+            raise InputError(
+                f"executor={shown(executor)} is none; give one as concurrent.futures has, such as "
+                "ProcessPoolExecutor(4) or a dask Client's get_executor()."
+            )
+        self._executor, self._task = executor, task
+        try:
+            self._sent = pickle.dumps((problem, method))
+        except Exception as error:
+            raise InputError(f"{problem!s} cannot be sent to workers: {shown(str(error))}.") from None
+
+    def run(self, pieces: list[tuple[Numbers, tuple[Any, ...]]]) -> Iterator[tuple[Numbers, Any, None]]:
+        """Yield of each piece its numbers and trajectories, in order; or a text on why there are none.
+
+        A piece whose worker dies is sent again, once. After an executor is broken nothing is sent.
+        """
+        waiting: deque[tuple[Numbers, tuple[Any, ...], Any]] = deque()
+        todo = iter(pieces)
+        try:
+            while True:
+                while len(waiting) < WINDOW and (following := next(todo, None)) is not None:
+                    waiting.append((*following, self._submit(following[1])))
+                if not waiting:
+                    return
+                numbers, piece, future = waiting.popleft()
+                yield numbers, self._result(piece, future), None
+        finally:
+            for *_, future in waiting:
+                if isinstance(future, Future) or hasattr(future, "cancel"):
+                    future.cancel()
+
+    def _submit(self, piece: tuple[Any, ...]) -> Any:
+        try:
+            return self._executor.submit(_at_worker, self._task, self._sent, piece)
+        except (BrokenExecutor, RuntimeError) as error:
+            return f"{type(error).__name__}: {error}"
+
+    def _result(self, piece: tuple[Any, ...], future: Any) -> Any:
+        why = future if isinstance(future, str) else ""
+        for attempt in range(TRIES):
+            if isinstance(future, str):
+                return why or future
+            try:
+                return future.result()
+            except InputError:
+                raise
+            except Exception as error:  # whatever an executor raises where a worker has died
+                why = f"{type(error).__name__}: {error}"
+            if attempt + 1 < TRIES:
+                future = self._submit(piece)
+        return why
+
+
+def _at_worker(task: Callable[..., Any], sent: bytes, piece: tuple[Any, ...]) -> Any:
+    return task(*_received(sent), *piece)
+
+
+@lru_cache(maxsize=4)
+def _received(sent: bytes) -> tuple[Problem, MethodBase]:
+    """Return what was sent: the same objects for every piece, so that a program is prepared once."""
+    return pickle.loads(sent)
+
+
+def digest(*arrays: Array) -> str:
+    """Return a text that tells arrays from others."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
