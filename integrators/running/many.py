@@ -101,8 +101,8 @@ def integrate_many(
     backend : {"jax"}, optional
         Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
     sample : {"side", "steps", "land", "dense"}, optional
-        As for `integrate`; trajectories then go one by one. With ``"steps"``, the ends of each one's own
-        steps up to the last time: ``t`` has the shape (n, m), and NaN after the last step of each.
+        As for `integrate`; trajectories then go one by one. With ``"steps"``, the ends of the steps of
+        each, up to the last time: ``t`` has the shape (n, m), and NaN after the last step of each.
     reduce : mapping of str to Reduction, optional
         What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
         ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
