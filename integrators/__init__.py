@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from integrators.coefficients.order import stability as stability
     from integrators.dynamics import gradient as gradient
     from integrators.dynamics import lyapunov as lyapunov
+    from integrators.dynamics import periodic as periodic
     from integrators.events import Event as Event
     from integrators.methods.advice import advise as advise
     from integrators.methods.gauss import Gauss as Gauss
@@ -71,6 +72,7 @@ __all__ = [
     "load",
     "lyapunov",
     "order_of",
+    "periodic",
     "registry",
     "section",
     "stability",
@@ -83,6 +85,7 @@ _LATER = {  # imported when first used
     "gradient": "integrators.dynamics",
     "lyapunov": "integrators.dynamics",
     "order_of": "integrators.coefficients.order",
+    "periodic": "integrators.dynamics",
     "section": "integrators.running.poincare",
     "stability": "integrators.coefficients.order",
 }

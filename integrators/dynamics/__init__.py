@@ -1,19 +1,23 @@
-"""What a trajectory depends on: Lyapunov exponents, indicators of chaos, gradients."""
+"""What a trajectory depends on: Lyapunov exponents, indicators of chaos, gradients, periodic orbits."""
 
 from integrators.dynamics.adjoint import gradient
 from integrators.dynamics.indicators import Indicator, finite_time_exponent, gali, megno, sali
 from integrators.dynamics.lyapunov import Exponents, lyapunov
 from integrators.dynamics.maps import IndicatorMap, indicator_map
+from integrators.dynamics.orbits import PeriodicOrbit, continued, periodic
 
 __all__ = [
     "Exponents",
     "Indicator",
     "IndicatorMap",
+    "PeriodicOrbit",
+    "continued",
     "finite_time_exponent",
     "gali",
     "gradient",
     "indicator_map",
     "lyapunov",
     "megno",
+    "periodic",
     "sali",
 ]

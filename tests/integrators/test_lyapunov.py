@@ -42,31 +42,30 @@ def test_intervals_cover_the_known_exponent_of_lorenz_as_often_as_they_say():
     system = VectorField(lorenz, dim=3, parameters={"s": 10.0, "r": 28.0, "b": 8.0 / 3.0})
     starts = np.random.default_rng(1).uniform((-10.0, -10.0, 15.0), (10.0, 10.0, 35.0), (100, 3))
     found = [
-        lyapunov(Problem(system, y0=y0, t_end=420.0), Gauss(s=6, h=0.02), count=1, skip=20.0).intervals[0]
+        lyapunov(Problem(system, y0=y0, t_end=220.0), Gauss(s=5, h=0.025), count=1, skip=20.0).intervals[0]
         for y0 in starts
     ]
     covered = sum(low < 0.90563 < high for low, high in found)
-    # 95 of 100, with a standard deviation of 2.2; measured: MEASURED
-    assert 88 <= covered <= 100
+    # Fluctuations at the ends of blocks make the intervals too long here.
+    assert covered >= 90  # measured: 100
 
 
 @pytest.mark.slow
 def test_intervals_of_another_mixing_system_cover_the_mean_of_all():
-    """Lorenz's model of the atmosphere with five sites, forced so that it is chaotic."""
+    """Lorenz's model of the atmosphere with eight sites, forced so that it is chaotic."""
 
     def ring(y, par):
-        return [(y[(i + 1) % 5] - y[i - 2]) * y[i - 1] - y[i] + par.F for i in range(5)]
+        return [(y[(i + 1) % 8] - y[i - 2]) * y[i - 1] - y[i] + par.F for i in range(8)]
 
-    system = VectorField(ring, dim=5, parameters={"F": 10.0})
-    starts = 10.0 + np.random.default_rng(2).standard_normal((100, 5))
+    system = VectorField(ring, dim=8, parameters={"F": 10.0})
+    starts = 10.0 + np.random.default_rng(2).standard_normal((100, 8))
     found = [
-        lyapunov(Problem(system, y0=y0, t_end=320.0), Gauss(s=6, h=0.025), count=1, skip=20.0)
-        for y0 in starts
+        lyapunov(Problem(system, y0=y0, t_end=130.0), Gauss(s=5, h=0.04), count=1, skip=20.0) for y0 in starts
     ]
     mean = np.mean([each.exponents[0] for each in found])  # a tenth as uncertain as one of them
     covered = sum(each.intervals[0, 0] < mean < each.intervals[0, 1] for each in found)
-    assert mean > 0.1
-    assert 88 <= covered <= 100  # measured: MEASURED
+    assert 2.0 < mean < 2.3  # measured: 2.148
+    assert 88 <= covered <= 100  # 95 with a standard deviation of 2.2; measured: 98
 
 
 def test_too_many_exponents_are_refused():
