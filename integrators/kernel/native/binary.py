@@ -241,6 +241,11 @@ def features() -> str:
     return llvm.get_host_cpu_features().flatten() if given is None else given
 
 
+def many_registers() -> bool:
+    """Whether the processor has 32 registers of eight doubles, and not 16 of four or 32 of two."""
+    return "+avx512f" in features().split(",")
+
+
 def load(code: bytes) -> int:
     """Put an object file into this process; return the address of its `ENTRY`."""
     with lock:

@@ -2,9 +2,10 @@
 
 In a small system a sweep waits for its own results: the stages are stored and loaded
 by the field, its values are stored and loaded by the product. Compiled together, one
-after another, sweeps keep stages and values in registers. The operations and their order are those
-of `sweep.evaluate`, `sweep.product8` and `sweep.product16`, hence the bits
-are (``tests/integrators/kernel/step/test_fused.py``).
+after another, sweeps keep stages and values in registers, as far as there are enough: the sums of three
+rows of sixteen stages would take 48 registers of AVX2, which has 16, and are made one after another. The
+operations and the order of each sum are those of `sweep.evaluate`, `sweep.product8` and `sweep.product16`,
+hence the bits are (``tests/integrators/kernel/step/test_fused.py``).
 """
 
 from typing import Any
@@ -54,19 +55,24 @@ def compile_sweeps(system: System, what: emit.What, lanes: int, rows: int) -> bi
     """
     source = emit.source(system, what, "numba")
     modules = binary.sources(*field.SOURCES, "context", "step/fused")
-    name = store.key("sweeps", source.text, str(lanes), str(rows), modules)
+    by_columns = lanes == WIDTH or binary.many_registers()
+    name = store.key("sweeps", source.text, str(lanes), str(rows), str(by_columns), modules)
 
     def make() -> tuple[str, bytes]:
         function, arguments = field.on_lanes(emit.numba(system, what).py_func, lanes)
         return field.ON_LANES, binary.build(
-            function, arguments, around=lambda inner: sweeps(inner, lanes, rows)
+            function, arguments, around=lambda inner: sweeps(inner, lanes, rows, by_columns)
         )
 
     return binary.obtain(name, make)
 
 
-def sweeps(inner: str, lanes: int, rows: int) -> str:
-    """Return LLVM's text of what `compile_sweeps` promises, around the compiled field ``inner``."""
+def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
+    """Return LLVM's text of what `compile_sweeps` promises, around the compiled field ``inner``.
+
+    ``by_columns``: products go through the matrix once, with the sums of all rows in registers; else eight
+    stages of a row after another, with their values in memory.
+    """
     module = ir.Module()
     pointer = DOUBLE.as_pointer()
     whole, eight = vector(lanes), vector(WIDTH)
@@ -79,14 +85,17 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())
 
+    def number(value: int) -> Any:
+        return ir.Constant(INTEGER, value)
+
     def word(slot: Slot) -> Any:
-        return b.gep(words, [ir.Constant(INTEGER, slot.place)])
+        return b.gep(words, [number(slot.place)])
 
     def array(slot: Slot) -> Any:
         return b.inttoptr(b.load(word(slot)), pointer)
 
     def place(base: Any, index: int, kind: Any) -> Any:
-        return b.bitcast(b.gep(base, [ir.Constant(INTEGER, index)]), kind.as_pointer())
+        return b.bitcast(b.gep(base, [number(index)]), kind.as_pointer())
 
     def get(base: Any, index: int, kind: Any) -> Any:
         return b.load(place(base, index, kind), align=None if kind == DOUBLE else ALIGNMENT)
@@ -115,8 +124,8 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     starts = [[get(base, lanes * d + WIDTH * part, eight) for part in parts] for d in range(rows)]
     states = [splat(b, get(state, d, DOUBLE), WIDTH) for d in range(rows)]
     first = [get(q, lanes * d, whole) for d in range(rows)]
-    zero, one = ir.Constant(INTEGER, 0), ir.Constant(INTEGER, 1)
-    evaluates = b.icmp_signed("==", after, ir.Constant(INTEGER, EVALUATE))
+    zero, one = number(0), number(1)
+    evaluates = b.icmp_signed("==", after, number(EVALUATE))
     entry, loop, product, end, evaluated = (
         b.block,
         *(sweep.append_basic_block(name) for name in ("loop", "product", "end", "evaluated")),
@@ -134,16 +143,43 @@ def sweeps(inner: str, lanes: int, rows: int) -> str:
     b.cbranch(b.icmp_signed(">", left, zero), product, evaluated)
 
     b.position_at_end(product)
-    # Column by column, for few of them to be in registers at a time; loaded anew by every sweep.
     matrix = b.inttoptr(b.load_atomic(word(Context.matrix), "monotonic", 8), pointer)
-    sums = {(d, part): Chains(b, lanes, starts[d][part]) for d in range(rows) for part in parts}
-    for j in range(lanes):
-        columns = [get(matrix, lanes * WIDTH * part + WIDTH * j, eight) for part in parts]
-        for d in range(rows):
-            factor = lane(found[d], j)
-            for part in parts:
-                sums[d, part].add(columns[part], factor)
-    new = [joined([b.fadd(states[d], sums[d, part].total()) for part in parts]) for d in range(rows)]
+
+    def all_at_once() -> list[Any]:
+        """Return the stages, column by column, for few of these to be in registers at a time."""
+        sums = {(d, part): Chains(b, lanes, starts[d][part]) for d in range(rows) for part in parts}
+        for j in range(lanes):
+            columns = [get(matrix, lanes * WIDTH * part + WIDTH * j, eight) for part in parts]
+            for d in range(rows):
+                factor = lane(found[d], j)
+                for part in parts:
+                    sums[d, part].add(columns[part], factor)
+        return [joined([b.fadd(states[d], sums[d, part].total()) for part in parts]) for d in range(rows)]
+
+    def eight_by_eight() -> list[Any]:
+        """Return the stages, made in a loop that has nothing but their sum in registers."""
+        inside, done = (sweep.append_basic_block(name) for name in ("eight", "done"))
+        before = b.block
+        b.branch(inside)
+        b.position_at_end(inside)
+        i = b.phi(INTEGER)
+        i.add_incoming(zero, before)
+        d, part = b.udiv(i, number(len(parts))), b.urem(i, number(len(parts)))
+        columns = b.gep(matrix, [b.mul(part, number(lanes * WIDTH))])
+        factors = b.gep(at_values, [b.mul(d, number(lanes))])
+        start = b.mul(i, number(WIDTH))
+        total = Chains(b, lanes, get(b.gep(base, [start]), 0, eight))
+        for j in range(lanes):
+            total.add(get(columns, WIDTH * j, eight), splat(b, get(factors, j, DOUBLE), WIDTH))
+        level = splat(b, b.load(b.gep(state, [d])), WIDTH)
+        put(b.fadd(level, total.total()), b.gep(at_stages, [start]), 0)
+        after_it = b.add(i, one)
+        i.add_incoming(after_it, b.block)
+        b.cbranch(b.icmp_unsigned("<", after_it, number(rows * len(parts))), inside, done)
+        b.position_at_end(done)
+        return [get(at_stages, lanes * d, whole) for d in range(rows)]
+
+    new = all_at_once() if by_columns else eight_by_eight()
     fewer = b.sub(left, one)
     left.add_incoming(count, entry)
     left.add_incoming(fewer, b.block)
