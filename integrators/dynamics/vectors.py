@@ -71,7 +71,7 @@ class Course:
 
     @property
     def steps(self) -> int:
-        """Own steps until now."""
+        """Steps until now."""
         return self._stepper.stats.steps
 
     def through(self, times: Array) -> Iterator[Chunk]:
