@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from integrators.peers.rebound.whfast512 import WHFast512 as WHFast512
     from integrators.peers.scipy import DOP853 as DOP853
     from integrators.peers.scipy import Radau as Radau
+    from integrators.plugins.rebound.convert import from_rebound as from_rebound
+    from integrators.plugins.rebound.convert import to_rebound as to_rebound
     from integrators.running.poincare import section as section
 
 __all__ = [
@@ -66,6 +68,7 @@ __all__ = [
     "WHFast",
     "WHFast512",
     "advise",
+    "from_rebound",
     "gradient",
     "integrate",
     "integrate_many",
@@ -77,9 +80,12 @@ __all__ = [
     "section",
     "stability",
     "start",
+    "to_rebound",
 ]
 
 _LATER = {  # imported when first used
+    "from_rebound": "integrators.plugins.rebound.convert",
+    "to_rebound": "integrators.plugins.rebound.convert",
     "Event": "integrators.events",
     "advise": "integrators.methods.advice",
     "gradient": "integrators.dynamics",

@@ -1,8 +1,10 @@
 """Hamiltonian and other systems, written down once and given to every engine alike."""
 
+from problems.bodies import nbody
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 from problems.problem import Problem
 from problems.registry import load, names
+from problems.symbolic import from_sympy
 from problems.systems.base import Bodies, System
 from problems.systems.hamiltonian import Hamiltonian
 from problems.systems.lagrangian import Lagrangian
@@ -22,6 +24,8 @@ __all__ = [
     "System",
     "UnknownNameError",
     "VectorField",
+    "from_sympy",
     "load",
     "names",
+    "nbody",
 ]

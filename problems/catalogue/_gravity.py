@@ -22,7 +22,9 @@ def hamiltonian(
     dimension: int = 3,
     softening: float | None = None,
     linear_momentum: bool = True,
+    angular_momentum: bool = True,
     guards: Mapping[str, Callable[..., Any]] | None = None,
+    more: Sequence[Callable[..., Any]] = (),
 ) -> Hamiltonian:
     """Return the system of N gravitating bodies.
 
@@ -43,8 +45,12 @@ def hamiltonian(
         Whether to list the linear momentum among the invariants. Leave it out
         where it starts from the rounding errors of a zero: a relative error
         would mean nothing.
+    angular_momentum : bool
+        The same for the angular momentum.
     guards : mapping of str to callable, optional
         As for `Hamiltonian`.
+    more : sequence of callable
+        Further terms of the energy, each a function of q, p, the masses, the constant of gravitation and m.
 
     Returns
     -------
@@ -67,12 +73,15 @@ def hamiltonian(
             return par.m[i] * par.m[j] / m.sqrt(squared)
 
         potential = m.sum(attraction, pairs)
-        return m.sum(kinetic, range(n)) - (potential if G is None else par.G * potential)
+        found = m.sum(kinetic, range(n)) - (potential if G is None else par.G * potential)
+        for term in more:
+            found = found + term(q, p, par.m, 1.0 if G is None else par.G, m)
+        return found
 
     def momentum(p, m):
         return [m.sum(lambda i, c=c: p[dimension * i + c], range(n)) for c in axes]
 
-    def angular_momentum(q, p, m):
+    def rotation(q, p, m):
         def total(a: int, b: int) -> Any:
             return m.sum(
                 lambda i: (
@@ -94,11 +103,13 @@ def hamiltonian(
         parameters=parameters,
         invariants={
             **({"linear_momentum": momentum} if linear_momentum else {}),
-            "angular_momentum": angular_momentum,
+            **({"angular_momentum": rotation} if angular_momentum else {}),
         },
         guards=guards or {},
         # REBOUND's softening is the same formula, but only bodies without it are handed over.
-        bodies=None if softening else Bodies(masses="m", G=1.0 if G is None else "G", dimension=dimension),
+        bodies=None
+        if softening or more
+        else Bodies(masses="m", G=1.0 if G is None else "G", dimension=dimension),
         name=name,
     )
 

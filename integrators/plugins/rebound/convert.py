@@ -1,0 +1,143 @@
+"""Problems from REBOUND's simulations, and states back into them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from integrators.refusals import check_state
+from problems import emit
+from problems.bodies import nbody
+from problems.checks import checked_arguments
+from problems.errors import InputError, shown
+from problems.problem import Problem
+
+SET = (
+    ("gravity", ("basic",), "its gravity is {!r}, not 'basic'"),
+    ("collision", ("none",), "it looks for collisions ({!r})"),
+    ("boundary", ("none",), "it has a boundary ({!r})"),
+    ("testparticle_type", (0,), "its test particles pull the others (testparticle_type={!r})"),
+    ("N_var", (0,), "it has variational particles"),
+)
+"""What of a simulation no problem has: its attribute, the values that are taken, and how others are told."""
+
+
+@checked_arguments
+def from_rebound(simulation: Any, *, t_end: float, forces: Sequence[Any] = ()) -> Problem:
+    """Return the bodies of a simulation as a problem, at its time.
+
+    Parameters
+    ----------
+    simulation : rebound.Simulation
+        With its own gravity. Bodies without mass, or beyond ``N_active``, must be the last ones.
+    t_end : float
+        The end of the integration, in the simulation's units, as everything is.
+    forces : sequence
+        What else acts, as for `problems.nbody`: REBOUND's additional forces are code, and are not taken over.
+
+    Returns
+    -------
+    Problem
+        As `problems.nbody` makes it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a simulation with collisions, boundaries, another gravity, or massless bodies between others.
+
+    Examples
+    --------
+    >>> import rebound
+    >>> from integrators import HBVM, from_rebound, integrate, to_rebound
+    >>> simulation = rebound.Simulation()
+    >>> for x in ({"m": 1.0}, {"m": 1e-3, "a": 1.0}, {"a": 2.0}):
+    ...     simulation.add(**x)
+    >>> problem = from_rebound(simulation, t_end=10.0)
+    >>> solution = integrate(problem, HBVM(), [10.0])
+    >>> round(to_rebound(problem, solution.y[-1], t=10.0, simulation=simulation).particles[2].a, 2)
+    2.0
+    """
+    if not hasattr(simulation, "particles") or not hasattr(simulation, "N_active"):
+        raise InputError(f"{shown(simulation)} is no rebound.Simulation.")
+    for name, taken, told in SET:
+        value = getattr(simulation, name)
+        if value not in taken:
+            raise InputError(f"the simulation cannot be taken over: {told.format(value)}.")
+    simulation.synchronize()
+    particles = [simulation.particles[i] for i in range(simulation.N)]
+    active = simulation.N if simulation.N_active < 0 else simulation.N_active
+    masses = [particle.m if i < active else 0.0 for i, particle in enumerate(particles)]
+    n = sum(mass != 0.0 for mass in masses)
+    if any(mass == 0.0 for mass in masses[:n]):
+        raise InputError(
+            "bodies without mass must be the last ones; add them to the simulation after the others."
+        )
+    return nbody(
+        masses[:n],
+        [[one.x, one.y, one.z] for one in particles],
+        [[one.vx, one.vy, one.vz] for one in particles],
+        massless=len(particles) - n, forces=forces, G=simulation.G,
+        softening=simulation.softening or None, t0=simulation.t, t_end=t_end,
+    )  # fmt: skip
+
+
+@checked_arguments
+def to_rebound(
+    problem: Problem, y: ArrayLike | None = None, *, t: float | None = None, simulation: Any = None
+) -> Any:
+    """Return a simulation with the bodies of a problem in a state.
+
+    Parameters
+    ----------
+    problem : Problem
+        From `problems.nbody` or `from_rebound`, or any with bodies in space.
+    y : array_like, shape (dim,), optional
+        The state: a row of ``solution.y``; by default the problem's start.
+    t : float, optional
+        Its time; by default the problem's ``t0``.
+    simulation : rebound.Simulation, optional
+        One of the same bodies, in their order, that the state is written into: its names, units, radii and
+        integrator remain. By default a new one, with the masses and the constant of gravitation.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For a problem without bodies, and a simulation with another number of them.
+    problems.errors.MissingLibraryError
+        If REBOUND is not installed.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import to_rebound
+    >>> to_rebound(problems.load("outer_solar_system")).N
+    6
+    """
+    from integrators.peers import load
+
+    system = problem.system
+    state = problem.y0 if y is None else check_state(y, system.dim)
+    values = system.unpack(problem.par)
+    n = system.dim // 6
+    masses = np.atleast_1d(values.get("m", []))
+    if system.dim % 6 or not 0 < masses.size <= n or (system.dof is not None and masses.size != n):
+        raise InputError(f"{problem!s} has no bodies in space; make it with problems.nbody.")
+    time = problem.t0 if t is None else t
+    x = state[: 3 * n].reshape(n, 3)
+    moving = state if system.dof is None else emit.numpy(system, "field")(time, state, problem.par)
+    v = (moving[3 * n :] if system.dof is None else moving[: 3 * n]).reshape(n, 3)
+    if simulation is None:
+        simulation = load("rebound").Simulation()
+        simulation.G, simulation.softening = values.get("G", 1.0), values.get("eps", 0.0)
+        for mass in [*masses.tolist(), *[0.0] * (n - masses.size)]:
+            simulation.add(m=mass)
+        simulation.N_active = masses.size
+    elif n != simulation.N:
+        raise InputError(f"the simulation has {simulation.N} bodies, and {problem!s} {n}.")
+    simulation.t = time
+    for i in range(n):
+        one = simulation.particles[i]
+        one.x, one.y, one.z = x[i].tolist()
+        one.vx, one.vy, one.vz = v[i].tolist()
+    return simulation

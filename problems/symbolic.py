@@ -1,0 +1,181 @@
+"""Systems from SymPy's expressions: a Hamiltonian, or the equations of `sympy.physics.mechanics`."""
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+from problems.checks import checked_arguments
+from problems.errors import InputError, MissingLibraryError, shown
+from problems.systems.base import System
+from problems.systems.hamiltonian import Hamiltonian
+from problems.systems.vector_field import VectorField
+
+FUNCTIONS = {
+    "sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "Abs": "abs", "sinh": "sinh",
+    "cosh": "cosh", "tanh": "tanh", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
+    "erf": "erf", "erfc": "erfc",
+}  # fmt: skip
+"""SymPy's names of functions, and what a formula calls them."""
+
+
+@checked_arguments
+def from_sympy(
+    what: Any,
+    q: Sequence[Any] = (),
+    p: Sequence[Any] = (),
+    *,
+    parameters: Mapping[Any, Any] | None = None,
+    t: Any = None,
+    name: str = "from_sympy",
+) -> System:
+    """Return a system from expressions of SymPy.
+
+    Parameters
+    ----------
+    what : sympy.Expr, or a LagrangesMethod or KanesMethod
+        A Hamiltonian in the symbols ``q`` and ``p``; or a system of `sympy.physics.mechanics` whose equations
+        have been formed. Their mass matrix is inverted symbolically, by ``rhs()``.
+    q, p : sequence of sympy.Symbol
+        Positions and momenta, for a Hamiltonian.
+    parameters : mapping of Symbol to float, optional
+        All other symbols, with their default values; their names are those of the system's parameters.
+    t : sympy.Symbol, optional
+        The time; by default the symbol ``t``, as in `sympy.physics.mechanics`.
+    name : str
+        What the system is called.
+
+    Returns
+    -------
+    Hamiltonian or VectorField
+        A `VectorField` of q and their velocities (the generalised speeds) for the second kind.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For symbols that are nothing of these, and functions that no formula may call.
+    problems.errors.MissingLibraryError
+        If SymPy is not installed.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> from problems import Problem, from_sympy
+    >>> q, p, g = sympy.symbols("q p g")
+    >>> pendulum = from_sympy(p**2 / 2 - g * sympy.cos(q), [q], [p], parameters={g: 9.81})
+    >>> Problem(pendulum, q0=[0.0], p0=[1.9], t_end=10.0).par.tolist()
+    [9.81]
+    """
+    try:
+        sympy = import_module("sympy")
+    except ImportError:
+        raise MissingLibraryError("sympy is not installed; install it with: pip install sympy.") from None
+    values = dict(parameters or {})
+    names = {symbol: str(symbol) for symbol in values}
+    for text in names.values():
+        if not text.isidentifier():
+            raise InputError(f"the parameter {text!r} must be named as a variable is; rename the symbol.")
+    times = {sympy.Symbol("t") if t is None else t}
+    defaults = {text: float(values[symbol]) for symbol, text in names.items()}
+    if hasattr(what, "rhs") and hasattr(what, "u"):
+        state = [*what.q, *what.u]
+        right = [sympy.sympify(component) for component in what.rhs()]
+        places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
+        formulas = [_Formula(sympy, e, places, names, times) for e in right]
+        return VectorField(
+            lambda t, y, par, m: [f({"t": t, "y": y, "par": par, "m": m}) for f in formulas],
+            dim=len(state), parameters=defaults, name=name,
+        )  # fmt: skip
+    if not isinstance(what, sympy.Expr) or not q or len(q) != len(p):
+        raise InputError(
+            f"{shown(what)} needs as many q as p, and must be an expression of SymPy; or give a "
+            "LagrangesMethod or KanesMethod whose equations have been formed."
+        )
+    places = {x: _component(which, i) for which, listed in (("q", q), ("p", p)) for i, x in enumerate(listed)}
+    energy = _Formula(sympy, what, places, names, times)
+
+    def H(t, q, p, par, m):
+        return energy({"t": t, "q": q, "p": p, "par": par, "m": m})
+
+    def at_rest(q, p, par, m):
+        return energy({"q": q, "p": p, "par": par, "m": m})
+
+    timeless = not any(time in what.free_symbols for time in times)
+    return Hamiltonian(at_rest if timeless else H, dof=len(q), parameters=defaults, name=name)
+
+
+def _component(vector: str, i: int) -> Callable[..., Any]:
+    return lambda given: given[vector][i]
+
+
+class _Formula:
+    """An expression, evaluated with whatever numbers or symbols it is given; common parts once."""
+
+    def __init__(self, sympy: Any, expression: Any, places: Any, names: Any, times: Any):
+        self._sympy, self._places, self._names, self._times = sympy, places, names, times
+        self._expression = expression
+        known = {*places, *names, *times}
+        bound = expression.subs({x: sympy.Dummy() for x in places})
+        unknown = sorted(str(x) for x in bound.free_symbols - known if not isinstance(x, sympy.Dummy))
+        if unknown:
+            raise InputError(
+                f"the symbol {unknown[0]!r} has no value; give parameters={{{unknown[0]}: ...}}."
+            )
+
+    def __call__(self, given: Mapping[str, Any]) -> Any:
+        """Return its value."""
+        found: dict[Any, Any] = {}
+
+        def value(e: Any) -> Any:
+            if e not in found:
+                found[e] = self._evaluated(e, value, given)
+            return found[e]
+
+        return value(self._expression)
+
+    def _evaluated(self, e: Any, value: Callable[[Any], Any], given: Mapping[str, Any]) -> Any:
+        sympy, m = self._sympy, given["m"]
+        if e in self._places:
+            return self._places[e](given)
+        if e in self._names:
+            return getattr(given["par"], self._names[e])
+        if e in self._times:
+            return given["t"]
+        if e.is_Integer:
+            return int(e)
+        if e.is_Rational:
+            return int(e.p) / int(e.q)
+        if e.is_number:
+            return float(e)
+        if e.is_Add:
+            total = value(e.args[0])
+            for term in e.args[1:]:
+                total = total + value(term)
+            return total
+        if e.is_Mul:
+            above, below = e.as_numer_denom()
+            if below != 1:
+                return value(above) / value(below)
+            product = value(e.args[0])
+            for factor in e.args[1:]:
+                product = product * value(factor)
+            return product
+        if e.is_Pow:
+            return self._power(e, value, m)
+        if e.func == sympy.exp:
+            return m.exp(value(e.args[0]))
+        called = FUNCTIONS.get(type(e).__name__)
+        if called is None:
+            raise InputError(f"no formula may call {shown(e)}: known are {', '.join(FUNCTIONS)}.")
+        return getattr(m, called)(*map(value, e.args))
+
+    def _power(self, e: Any, value: Callable[[Any], Any], m: Any) -> Any:
+        base, exponent = e.args
+        if exponent.is_number and not exponent.is_positive:
+            return 1.0 / value(base ** (-exponent))
+        if exponent.is_Integer:
+            return value(base) ** int(exponent)
+        if exponent.is_Rational and exponent.q == 2:
+            root = m.sqrt(value(base))
+            whole = int(exponent - self._sympy.Rational(1, 2))
+            return root if whole == 0 else value(base) ** whole * root
+        return m.exp(value(exponent) * m.log(value(base)))
