@@ -11,6 +11,8 @@ from hbvm_bench.campaign.file import load, shipped
 from hbvm_bench.commands import app, listing
 from hbvm_bench.measure.metrics import METRICS
 
+REPORT = re.compile(r"^## \[(.+)\]\((\S+)\)$")
+THUMBNAIL = re.compile(r'^<a href="[^"]*"><img src="([^"]*)".*$')
 PROBLEM = re.compile(r"^## (\w+)\n\n!\[([^]]*)\]\(problems/\w+\.svg\)\n\n([^\n]+)$", re.MULTILINE)
 
 
@@ -43,6 +45,22 @@ def citations() -> str:
     return "\n\n".join(["```bibtex", *listing.citations(()), "```", ""])
 
 
+def reports() -> str:
+    """Return the list of reports in `reports/README.md`, with links from a page of the site's root."""
+    text = (Path(__file__).parents[2] / "reports" / "README.md").read_text(encoding="utf-8")
+    made, title, place = [], "", ""
+    for line in text.splitlines():
+        if found := REPORT.match(line):
+            title, place = found[1], f"../reports/{found[2]}"
+            made.append(f"## [{title}]({place})")
+        elif found := THUMBNAIL.match(line):
+            picture = f":width: 360px\n:alt: {title}\n:target: ../reports/{place.split('/')[2]}/index.html"
+            made.append(f"```{{image}} ../reports/{found[1]}\n{picture}\n```")
+        elif title:  # what is before the first report says how the list itself is made
+            made.append(re.sub(r"\[text\]\(\S+\)( · )?", "", line))
+    return "\n".join(line for line in made if not line.startswith("This list:")) + "\n"
+
+
 def gallery() -> str:
     """Return a card for each problem, with its picture and its first sentence, as `problems.md` has them."""
     page = (Path(__file__).parents[1] / "problems.md").read_text(encoding="utf-8")
@@ -57,7 +75,7 @@ def gallery() -> str:
 def _write(app: Sphinx) -> None:
     made = Path(app.srcdir) / "reference" / "made"
     made.mkdir(parents=True, exist_ok=True)
-    for make in (commands, metrics, campaigns, citations, gallery):
+    for make in (commands, metrics, campaigns, citations, reports, gallery):
         path, text = made / f"{make.__name__}.md", make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:  # else Sphinx reads it again
             path.write_text(text, encoding="utf-8")

@@ -11,6 +11,12 @@ from sphinx.application import Sphinx
 from sphinx.transforms.post_transforms import SphinxPostTransform
 from sphinx.util.osutil import relative_uri
 
+BRAND = '<span class="brand">hbvm-bench</span>'
+WAYS = """<a class="brand" href="../../index.html">hbvm-bench</a>
+<nav aria-label="Site">
+<a href="../../reports.html">All reports</a>
+<a href="../../howto/reading_a_report.html">How to read a report</a>
+</nav>"""
 LINK = re.compile(r'href="([\w./-]+)"')
 
 
@@ -32,18 +38,22 @@ class Reports(SphinxPostTransform):
             here = self.app.builder.get_target_uri(self.env.docname)
             link = nodes.reference("", "", *node.children, refuri=relative_uri(here, address.as_posix()))
             node.replace_self(link)
-            target = Path(self.app.outdir) / address
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(page, target)
-            _copy_what_it_links_to(page, target.parent)
+            _copy(page, (Path(self.app.outdir) / address).parent, set())
 
 
-def _copy_what_it_links_to(page: Path, folder: Path) -> None:
-    """Put the files beside a report that its page links to, such as its results, beside the page's copy."""
-    for name in set(LINK.findall(page.read_text(encoding="utf-8"))):
+def _copy(page: Path, folder: Path, done: set[Path]) -> None:
+    """Put a report's page, with links to the site, into a folder, and the files beside it that it uses."""
+    done.add(page)
+    folder.mkdir(parents=True, exist_ok=True)
+    text = page.read_text(encoding="utf-8")
+    (folder / page.name).write_text(text.replace(BRAND, WAYS, 1), encoding="utf-8")
+    for name in set(LINK.findall(text)):
         source = (page.parent / name).resolve()
-        if page.parent in source.parents and source.is_file() and source != page:
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if source.parent != page.parent or not source.is_file() or source in done:
+            continue
+        if source.suffix == ".html":
+            _copy(source, folder, done)
+        else:
             shutil.copyfile(source, folder / name)
 
 

@@ -108,6 +108,13 @@ class Files:
 
 
 @dataclass(frozen=True)
+class Links:
+    """Links to the pages of a long document: the title of each, its code, and where it lies."""
+
+    links: Sequence[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
 class Failed:
     """A part that could not be made, and why."""
 
@@ -138,7 +145,7 @@ class Section:
 
 Block = (
     str | Note | Notice | Items | Commands | Claims | Results | Files | Failed | Details | Section
-    | Table | Picture
+    | Table | Picture | Links
 )  # fmt: skip
 
 

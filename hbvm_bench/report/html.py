@@ -1,4 +1,4 @@
-"""A document as one self-contained page: no request leaves it."""
+"""A document as self-contained pages: no request leaves them."""
 
 import base64
 import hashlib
@@ -14,13 +14,24 @@ from markupsafe import Markup, escape
 
 from hbvm_bench.measure.metrics import Metric
 from hbvm_bench.report import pack
-from hbvm_bench.report.document import VERDICTS, Block, Document, Section, is_call, pieces
+from hbvm_bench.report.archived import PLACE
+from hbvm_bench.report.document import (
+    VERDICTS,
+    Block,
+    Document,
+    Links,
+    Results,
+    Section,
+    is_call,
+    pieces,
+)
 from hbvm_bench.report.figures.canvas import Picture, inline_svg
 from hbvm_bench.report.figures.style import DARK_NEUTRALS, NEUTRALS, Look
 from hbvm_bench.summaries.rows import Cell, Row, seconds
 
 HERE = "hbvm_bench.report"
 SCRIPTS = ("script.js", "table.js", "motion.js", "figures.js")
+TOGETHER, ONE_PAGE = 4, 100  # problems and rows; with more of both each problem has a page of its own
 INLINE = 150_000  # characters of drawings in the text of a page; a script unpacks the others
 # By matplotlib's name of a marker: its drawing in a box of 12 by 12 as the figures have it.
 MARKERS = {
@@ -64,8 +75,53 @@ class Place:
         return replace(self, level=self.level + 1)
 
 
-def page(document: Document) -> str:
-    """Return a document as HTML that asks nothing of the network and runs no script but its own."""
+def pages(document: Document) -> dict[str, str]:
+    """Return the pages of a document by name: ``index.html``, and one for each problem of a long one."""
+    sections = [one for one in document.blocks if isinstance(one, Section) and one.key.startswith(PLACE)]
+    table = next((block for block in document.walk() if isinstance(block, Results)), None)
+    if table is None or len(sections) <= TOGETHER or sum(map(len, _rows_by_problem(table))) <= ONE_PAGE:
+        return {"index.html": page(document)}
+    names = {one.key: f"{one.key}.html" for one in sections}
+    contents = Section(
+        "Problems",
+        [Links([(one.title, one.code, names[one.key]) for one in sections])],
+        "problems",
+        nav="Problems",
+    )
+    kept = [contents if block is sections[0] else block for block in document.blocks]
+    first = [_without(block, table) for block in kept if block not in sections]
+    made = {"index.html": page(replace(document, blocks=first))}
+    for number, one in enumerate(sections):
+        near = {"Previous problem": number - 1, "Next problem": number + 1}
+        ways = {title: names[sections[i].key] for title, i in near.items() if 0 <= i < len(sections)}
+        rows = replace(table, problems=[table.problems[number]])
+        cases = Section("Cases", [rows], "results", nav="Cases")
+        alone = replace(
+            document,
+            title=one.title[:1].upper() + one.title[1:],
+            lead=[f"`{one.code}`"] if one.code else [],
+            blocks=[cases, *one.blocks],
+        )
+        made[names[one.key]] = page(alone, {document.title: "index.html", **ways})
+    return made
+
+
+def _rows_by_problem(table: Results) -> list[list[Row]]:
+    return [[row for _, rows in problem.groups for row in rows] for problem in table.problems]
+
+
+def _without(block: Block, left_out: Block) -> Block:
+    """Return a block without another one that it holds."""
+    if not isinstance(block, Section):
+        return block
+    return replace(block, blocks=[_without(one, left_out) for one in block.blocks if one is not left_out])
+
+
+def page(document: Document, ways: Mapping[str, str] | None = None) -> str:
+    """Return a document as HTML that asks nothing of the network and runs no script but its own.
+
+    ``ways`` are links to other pages, by their titles.
+    """
     looks = document.looks
     script = "".join(text(name) for name in SCRIPTS)
     light = {f"--m{look.number}": look.light for look in looks}
@@ -82,7 +138,7 @@ def page(document: Document) -> str:
         "dark": variables(DARK_NEUTRALS | {f"--m{look.number}": look.dark for look in looks}),
         "symbols": symbols(looks),
     }
-    return templates().get_template("base.html.j2").render(document=document, **made)
+    return templates().get_template("base.html.j2").render(document=document, ways=ways or {}, **made)
 
 
 def printed(blocks: Sequence[Block], at: Place) -> Markup:

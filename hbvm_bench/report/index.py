@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from hbvm_bench.report.html import page
+from hbvm_bench.report.html import pages
 from hbvm_bench.report.markdown import plain
 from hbvm_bench.report.page import document
 from hbvm_bench.store import archive
@@ -34,7 +34,8 @@ def write_pages(directory: Path) -> Iterator[Path]:
     for folder in sorted(path for path in directory.iterdir() if path.is_dir()):
         if (folder / archive.NAME).is_file():
             path = folder / "index.html"
-            write_all({path: page(document(archive.read(folder / archive.NAME))).encode()})
+            made = pages(document(archive.read(folder / archive.NAME)))
+            write_all({folder / name: text.encode() for name, text in made.items()})
             yield path
 
 

@@ -43,6 +43,9 @@ def printed(block: Block, level: int = 2, shown: Collection[str] = ()) -> str:
         case blocks.Files():
             links = ", ".join(f"[{path.rpartition('/')[2]}]({path})" for path in block.files)
             return f"{words(block.text)}: {links}."
+        case blocks.Links():
+            listed = (f"- [{words(title)}]({place}) {words(text)}" for title, text, place in block.links)
+            return "\n".join(listed)
         case blocks.Failed():
             return f"**Not made: {words(block.title)}** ({words(block.reason)})"
         case blocks.Details():

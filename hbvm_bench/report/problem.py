@@ -24,7 +24,7 @@ from hbvm_bench.report.figures.over_time import Drawn, OverTime
 from hbvm_bench.report.figures.style import Look
 from hbvm_bench.report.figures.work_precision import work_precision
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries.points import family_of
+from hbvm_bench.summaries.points import family_of, short_name
 from hbvm_bench.summaries.points import number as number_of
 from hbvm_bench.summaries.rows import at_once, grouped, reached, rows
 from problems.problem import Problem
@@ -88,8 +88,12 @@ def part(
         *(drawings or _figures(problem, drawn, known, number, brief=brief)),
         Section("Shortcomings of HBVM and Gauss", wrong, f"wrong-{number}"),
     ]
-    section = Section(title, blocks, f"problem-{number}", code=repr(problem), nav="Figures" * (number == 1))
-    return ProblemPart(problem, Ranked(title, repr(problem), grouped(rows(records))), summary, section)
+    section = Section(
+        title, blocks, f"problem-{number}", code=short_name(repr(problem)), nav="Figures" * (number == 1)
+    )
+    return ProblemPart(
+        problem, Ranked(title, short_name(repr(problem)), grouped(rows(records))), summary, section
+    )
 
 
 def _figures(

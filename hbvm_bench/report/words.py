@@ -7,7 +7,7 @@ from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.outcomes import disturbed
-from hbvm_bench.summaries.points import accurate, number
+from hbvm_bench.summaries.points import accurate, number, short_name
 from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reached, reason_of, seconds, status_of
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
@@ -152,7 +152,7 @@ def shortcomings(records: Sequence[Record]) -> list[str]:
 def excluded(records: Sequence[Record]) -> list[str]:
     """Return which cases take no part in any ranking, and why."""
     return [
-        f"{record.case.method} on {record.case.problem}: {reason_of(record)}".rstrip(". ") + "."
+        f"{record.case.method} on {short_name(record.case.problem)}: {reason_of(record)}".rstrip(". ") + "."
         for record in records
         if not reached(record)
     ]

@@ -4,14 +4,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from hbvm_bench.report.document import Document
-from hbvm_bench.report.html import page
+from hbvm_bench.report.html import pages
 from hbvm_bench.report.markdown import markdown
 from hbvm_bench.store.files import write_all
 
 
 def rendered(document: Document) -> dict[str, bytes]:
     """Return all files of a document by their path in its directory."""
-    made = {document.name: markdown(document).encode(), "index.html": page(document).encode()}
+    made = {document.name: markdown(document).encode()}
+    made |= {name: text.encode() for name, text in pages(document).items()}
     return {picture.file: picture.svg.encode() for picture in document.shown} | made
 
 

@@ -1,8 +1,11 @@
 """HBVM that chooses everything itself against heyoka's Taylor method: no setting on our side."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+
+import numpy as np
 
 from hbvm_bench.campaign.file import Campaign, load
 from hbvm_bench.campaign.shorter import chosen, with_rounds
@@ -10,6 +13,9 @@ from hbvm_bench.measure import machine
 from hbvm_bench.measure.measured import POSITION
 from hbvm_bench.measure.timing import Spread
 from hbvm_bench.report.document import Block, Note, Section, attempt
+from hbvm_bench.report.figures.canvas import Picture, new, picture, styled
+from hbvm_bench.report.figures.plots import Axis, Panel, Plot, Trace
+from hbvm_bench.report.figures.style import INK, MUTED, PAPER, base
 from hbvm_bench.report.page import Results, block
 from hbvm_bench.store.kept import Kept
 from hbvm_bench.store.records import Record
@@ -108,9 +114,10 @@ def errors_are(results: Results) -> Note:
 
 
 @block
-def ratios_by_kind(results: Results) -> Table:
-    """Return the ratios, one column for each kind of processor."""
-    return ratios(results.by_processor)
+def ratios_by_kind(results: Results) -> list[Block]:
+    """Return the ratios as a figure and as a table, one column for each kind of processor."""
+    drawn = attempt(("the ratios", partial(ratios_drawn, results.by_processor)))
+    return [*drawn, ratios(results.by_processor)]
 
 
 @block
@@ -158,6 +165,54 @@ def ratios(results: Mapping[str, Sequence[Kept]]) -> Table:
         "The median of the ratio within each round, and whether it reaches the goal declared before; less "
         "accurate: one of our errors is larger than the Taylor method's. " + machine.COLUMNS,
         words=(0, 1),
+    )
+
+
+@styled
+def ratios_drawn(results: Mapping[str, Sequence[Kept]]) -> Picture:
+    """Draw the ratios, a line for each problem, with the goals."""
+    found = {kind: [duel for run in runs for duel in duels(run)] for kind, runs in results.items()}
+    problems = list(dict.fromkeys(duel.problem for members in found.values() for duel in members))
+    height = {problem: len(problems) - i for i, problem in enumerate(problems)}
+    figure = new(8.6, 0.9 + 0.36 * len(problems))
+    axes = figure.add_axes((0.36, 0.6 / figure.get_figheight(), 0.6, 1 - 0.95 / figure.get_figheight()))
+    axes.set_xscale("log")
+    traces, said = [], []
+    for number, (kind, members) in enumerate(found.items(), 1):
+        shade, marker = base("HBVM")[0], "os^D"[(number - 1) % 4]
+        known = [duel for duel in members if duel.ratio is not None]
+        x = np.array([duel.ratio.median for duel in known if duel.ratio is not None])
+        y = np.array([float(height[duel.problem]) for duel in known])
+        for duel, at, up in zip(known, x, y, strict=True):
+            face = PAPER if duel.words == "less accurate" else shade
+            axes.plot([at], [up], marker, color=shade, markerfacecolor=face, markersize=6)
+            said.append(f"{duel.problem}, {kind}: {at:.2f}")
+        axes.plot([], [], marker, color=shade, label=kind, linestyle="")
+        traces.append(Trace(number, kind, x, y))
+        for duel in members:
+            goal = duel.verdict.goal.ratio if duel.verdict is not None else None
+            if goal is not None:
+                axes.plot([goal], [height[duel.problem]], "|", color=INK, markersize=13)
+    axes.plot([], [], "|", color=INK, label="goal", linestyle="")
+    axes.axvline(1.0, color=MUTED, linewidth=0.9)
+    ticks = [value for value in (0.5, 1.0, 2.0, 4.0, 8.0, 16.0) if value <= 2 * axes.get_xlim()[1]]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    named = ["\n".join(textwrap.wrap(problem, 44, break_on_hyphens=False)) for problem in problems]
+    axes.set_yticks([height[problem] for problem in problems], named)
+    axes.set_ylim(0.4, len(problems) + 0.6)
+    horizontal = Axis("time of the Taylor method relative to HBVM()", log=True)
+    axes.set_xlabel(horizontal.label)
+    figure.legend(loc="upper right", ncols=len(found) + 1, fontsize=7)
+    return picture(
+        figure,
+        "ratios",
+        "Time of the Taylor method relative to HBVM()",
+        "To the right of the line at 1 HBVM() is faster. A filled marker compares runs in which HBVM() is no "
+        "less accurate in energy and position, an open one runs in which it is in one of them. A vertical "
+        "bar is the goal that was declared before.",
+        "; ".join(said) + ".",
+        Plot([Panel("", horizontal, Axis("problem, from below"), traces)], "points"),
     )
 
 

@@ -6,7 +6,7 @@ from statistics import median
 from typing import Literal, NamedTuple
 
 from hbvm_bench.store.records import Load, Record, TimingRound
-from hbvm_bench.summaries.points import by_family, by_problem, family_of, singles
+from hbvm_bench.summaries.points import by_family, by_problem, family_of, short_name, singles
 from hbvm_bench.summaries.rows import group_of, reached, reason_of
 from hbvm_bench.summaries.table import Table
 
@@ -48,7 +48,7 @@ def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
     if len(found) < 2:
         return None
     reasons = [
-        f"{problem}, {family}: {reason}"
+        f"{short_name(problem)}, {family}: {reason}"
         for problem, row in found.items()
         for family, one in row.items()
         for reason in one.reasons
@@ -57,7 +57,7 @@ def table(records: Sequence[Record]) -> tuple[Table, list[str]] | None:
     made = Table(
         "Which integrator on which problem",
         ("problem", *families),
-        [(problem, *map(_sign, row.values())) for problem, row in found.items()],
+        [(short_name(problem), *map(_sign, row.values())) for problem, row in found.items()],
         "● reached the end on its trajectory; ◑ with a large position error; ◎ without a reference "
         "solution; ◐ lost the symmetry or the energy; ○ did not reach the end; – refused. Numbers: how "
         "many of its settings reached the end, where not all did.",

@@ -1,6 +1,7 @@
 """What every summary reads off the cases: families, problems, numbers, and which settings nothing beats."""
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
@@ -12,6 +13,11 @@ T = TypeVar("T")
 
 WORKS = ("warm_seconds", "evaluations")
 """What an integration costs: the first that a run has is shown by default."""
+
+
+def short_name(problem: str) -> str:
+    """Return a problem as readers know it: of one in a campaign's Python file, without that file."""
+    return re.sub(r"^[^:()]*\.py(@\w+)?:", "", problem)
 
 
 def family_of(record: Record) -> str:

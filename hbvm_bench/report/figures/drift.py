@@ -33,8 +33,9 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
     laws = {key: law for key, (_, _, law) in found.items()}
     said = {key: text(law) for key, law in laws.items()}
     curves = {key: _windows(t, rows) for key, (t, rows, _) in found.items()}
-    label = "error of energy, rms"
-    figure, grid = family_panels(shown, label)
+    label = "energy error, rms"
+    notes = {key: words.replace(" to ", "–") for key, words in said.items()}
+    figure, grid = family_panels(shown, label, notes)
     low, high = power_range([y for _, y in curves.values()], *POWERS)
     times = np.concatenate([t for t, _ in curves.values()])
     traces: list[Trace] = []
@@ -50,7 +51,6 @@ def drift_figure(cases: Sequence[Drawn]) -> Picture | None:
             axes.plot(t, error, look.marker, color=look.light, markersize=2.4, linestyle="")
             axes.plot(at, fitted, color=look.light, linewidth=1.1, dashes=look.dash)
             traces += [trace(case, t, error), trace(case, at, fitted, role="law", note=said[key])]
-        notes = {case.record.id: said[case.record.id].replace(" to ", "–") for case in members}
         panel_legend(axes, members, markers=True, notes=notes)
     starts = max(law.starts for law in laws.values())
     over = (

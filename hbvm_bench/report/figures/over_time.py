@@ -1,6 +1,7 @@
 """Errors over time, and what the figures of cases share: their panels and legends."""
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -118,12 +119,17 @@ def _finite(case: Drawn, what: OverTime) -> tuple[Array, Array]:
     return t[finite], np.abs(values[finite])
 
 
-def family_panels(cases: Sequence[Drawn], label: str) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
-    """Return a figure with a panel for each of `style.panels`, of one size, with room for legends."""
+def family_panels(
+    cases: Sequence[Drawn], label: str, notes: Mapping[str, str] | None = None
+) -> tuple[Figure, list[tuple[Axes, list[Drawn]]]]:
+    """Return a figure with a panel for each of `style.panels`, of one size, with room for `panel_legend`."""
     by_id = {case.record.id: case for case in cases}
     groups = [(name, [by_id[r.id] for r in members]) for name, members in panels([c.record for c in cases])]
     rows = [groups[start : start + COLUMNS] for start in range(0, len(groups), COLUMNS)]
-    heights = [TOP + HEIGHT + BOTTOM + LEGEND_LINE * max(len(members) for _, members in row) for row in rows]
+    heights = [
+        TOP + HEIGHT + BOTTOM + LEGEND_LINE * max(_lines(members, notes) for _, members in row)
+        for row in rows
+    ]
     figure = new(WIDTH, sum(heights))
     panel = (WIDTH - LEFT - RIGHT - GAP * (COLUMNS - 1)) / COLUMNS
     made: list[tuple[Axes, list[Drawn]]] = []
@@ -153,11 +159,8 @@ def panel_legend(
     notes: Mapping[str, str] | None = None,
 ) -> None:
     """Put the legend under its panel, where it covers no data; ``notes`` are added by case id."""
-    notes = notes or {}
-    named = len({family_of(case.record) for case in cases}) > 1
     handles = []
-    for case in cases:
-        label = shortened(case.legend(named=named), notes.get(case.record.id, ""))
+    for case, label in zip(cases, _labels(cases, notes or {}), strict=True):
         look, marker = case.look, case.look.marker if markers else ""
         handles.append(Line2D([], [], color=look.light, dashes=look.dash, marker=marker, ms=4, label=label))
     size = 6.8 if notes else 7.5
@@ -166,11 +169,23 @@ def panel_legend(
     )
 
 
-def shortened(name: str, note: str) -> str:
-    """Return a name and its note in one line of a legend under its panel; the name gives way."""
-    room = max(48 - len(note) - 3, 8) if note else 42  # with notes the letters are smaller
-    name = cut(name, room, room - 1)
-    return f"{name}   {note}" if note else name
+def _labels(cases: Sequence[Drawn], notes: Mapping[str, str]) -> list[str]:
+    named = len({family_of(case.record) for case in cases}) > 1
+    return [entry(case.legend(named=named), notes.get(case.record.id, "")) for case in cases]
+
+
+def _lines(cases: Sequence[Drawn], notes: Mapping[str, str] | None) -> int:
+    """Return how many lines the legend of a panel has."""
+    return sum(label.count("\n") + 1 for label in _labels(cases, notes or {}))
+
+
+def entry(name: str, note: str) -> str:
+    """Return a name and its note as a legend's entry, in as many lines as fit under its panel."""
+    room = 48 if note else 42  # with notes the letters are smaller
+    if note and len(name) + len(note) + 3 <= room:
+        return f"{name}   {note}"
+    lines = textwrap.wrap(name, room, subsequent_indent="   ", break_on_hyphens=False)
+    return "\n".join([*lines, *([f"   {note}"] if note else [])])
 
 
 def cut(text: str, room: int, kept: int = 0) -> str:
@@ -179,7 +194,7 @@ def cut(text: str, room: int, kept: int = 0) -> str:
 
 
 def envelope(t: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
-    """Return the largest value in each of ``bins`` equal spans of time, at the place where it is."""
+    """Return the largest value in each of ``bins`` equal time intervals, at the place where it is."""
     if t.size <= bins:
         return t, values
     edges = np.linspace(t[0], t[-1], bins + 1)

@@ -54,8 +54,8 @@ def profiles(records: Sequence[Record], numbers: Mapping[str, int]) -> Picture |
         axes.set_ylim(-0.02, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.set_title(one.words, color=INK, fontsize=8)
-        axes.set_xlabel("factor behind the fastest")
-        behind, share = Axis("factor behind the best", log=True), Axis("share of problems")
+        behind, share = Axis(f"{label}, relative to the best family", log=True), Axis("share of problems")
+        axes.set_xlabel(behind.label)
         panels.append(Panel(one.words, behind, share, traces))
     figure.legend(handles.values(), handles.keys(), loc="center left", bbox_to_anchor=(0.87, 0.5))
     said = " ".join(

@@ -48,7 +48,7 @@
     details.addEventListener("toggle", () => {
       if (!details.open || details.querySelector("table")) return;
       const made = make("table", "");
-      made.append(make("caption", `Numbers of: ${figure.querySelector("h3").textContent}`, { class: "sr" }));
+      made.append(make("caption", `Numbers of: ${figure.querySelector(".figure-head > :first-child").textContent}`, { class: "sr" }));
       const head = made.createTHead().insertRow();
       table.head.forEach((text, i) => head.append(make("th", text, { scope: "col", ...(i >= table.words || i === 0 ? { class: "num" } : {}) })));
       const body = made.createTBody();
@@ -56,7 +56,7 @@
         const line = body.insertRow();
         row.forEach((text, i) => line.append(make(i === 1 ? "th" : "td", text, { ...(i === 1 ? { scope: "row" } : {}), ...(i >= table.words || i === 0 ? { class: "num" } : {}) })));
       }
-      const scroll = make("div", "", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Numbers" });
+      const scroll = make("div", "", { class: "scroll", tabindex: "0", role: "group", "aria-label": "Numbers" });
       scroll.append(made);
       details.append(scroll);
     });

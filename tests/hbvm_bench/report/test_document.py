@@ -23,6 +23,7 @@ from hbvm_bench.report.document import (
     Failed,
     Files,
     Items,
+    Links,
     Note,
     Notice,
     Results,
@@ -93,6 +94,7 @@ def examples(text: str, ranked: Results) -> list[Block]:
         Claims([(text, "there", [Claim(text, text, text, "partly")])]),
         ranked,
         Files(text, ["kept.json"]),
+        Links([(text, text, "other.html")]),
         Failed(text, text),
         Details(text, [text]),
         Section(text, [text], "here", code="kepler()"),
@@ -208,3 +210,15 @@ def test_looks_tell_settings_apart_and_are_numbered():
     made = looks(["HBVM(k=2, s=2)", "HBVM(k=4, s=2)", "Taylor()", "HBVM(k=2, s=2)"])
     assert [look.number for look in made.values()] == [1, 2, 3]
     assert len({look.light for look in made.values()}) == 3
+
+
+def test_a_long_report_has_a_page_for_each_problem_that_links_back():
+    made = html.pages(document(opened([REPORTS / "drift"])))
+    problems = sorted(name for name in made if name != "index.html")
+    assert len(problems) == 26
+    assert all(f'href="{name}"' in made["index.html"] for name in problems)
+    assert all('<a href="index.html">' in made[name] for name in problems)
+    # 82,000 pixels high as one page; 1.07 MB. Rows stand on the problem's page alone.
+    assert 'class="results"' not in made["index.html"]
+    assert all(made[name].count('<table class="results">') == 1 for name in problems)
+    assert [*html.pages(document(opened([REPORTS / "sitnikov"])))] == ["index.html"]
