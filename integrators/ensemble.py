@@ -123,6 +123,7 @@ class Solutions(Trajectories):
             ),
             method=self.method,
             events=self.events[i] if self.events else {},
+            variations=None if self.variations is None else self.variations[i][there],
         )
 
     def _some(self, numbers: NDArray[np.int64]) -> "Solutions":
@@ -137,6 +138,7 @@ class Solutions(Trajectories):
             starts=self.starts[numbers],
             par=self.par[numbers],
             compile_seconds=self.compile_seconds,
+            variations=None if self.variations is None else self.variations[numbers],
             from_cache=self.from_cache,
             problem=self.problem,
             method=self.method,
@@ -314,6 +316,8 @@ class Solutions(Trajectories):
             for key in ("t", "y", "direction"):
                 parts = [getattr(hits, key) for hits in found if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
+        if self.variations is not None:
+            arrays["variations"] = self.variations
         arrays |= {f"reduced:{name}": np.asarray(values) for name, values in self.reduced.items()}
         words = {
             "kind": KIND,
@@ -391,6 +395,7 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
         events=[] if words["events"] is None else _events(words["events"], arrays, n, dim),
         reduced={name: _numbers(arrays[f"reduced:{of_type(str, name)}"]) for name in words["reduced"]},
         extra=extra,
+        variations=_numbers(arrays["variations"]) if "variations" in arrays else None,
     )
 
 

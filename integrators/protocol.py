@@ -238,6 +238,8 @@ class Trajectories:
         Steps; accepted ones where lengths vary.
     extra : dict of int to dict
         By a trajectory's number, what of its `Stats.extra` warnings may follow from; see `telling`.
+    variations : ndarray, shape (n, m, dim, k), or None
+        Tangent vectors at the times, where they were asked for.
     """
 
     t: Array
@@ -247,6 +249,7 @@ class Trajectories:
     t_stop: Array
     steps: NDArray[np.int64]
     extra: dict[int, dict[str, Any]] = field(default_factory=dict, kw_only=True)
+    variations: Array | None = field(default=None, kw_only=True)
 
 
 def telling(stats: Stats) -> dict[str, Any]:

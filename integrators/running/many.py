@@ -37,6 +37,7 @@ from integrators.running.pieces import (
     integrate_with,
     joined,
 )
+from integrators.running.variations import follow as follow_vectors
 from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
@@ -62,6 +63,7 @@ def integrate_many(
     backend: Annotated[str | None, Word("backend", ["jax"])] = None,
     sample: Annotated[str | None, Word("sampling", SAMPLINGS)] = None,
     reduce: Named[Reduction] = NOTHING,
+    variations: Any = None,
     executor: Any = None,
     piece: Annotated[int, at_least(1)] | None = None,
     checkpoint: File | None = None,
@@ -106,6 +108,9 @@ def integrate_many(
     reduce : mapping of str to Reduction, optional
         What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
         ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
+    variations : array_like, shape (dim, k), or str, or sequence of str, optional
+        As for `integrate`, at the start of each trajectory: ``variations`` of the result has the shape
+        (n, m, dim, k). Trajectories then go one by one, or one in each thread.
     executor : concurrent.futures.Executor, optional
         Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
         whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``.
@@ -152,10 +157,18 @@ def integrate_many(
     check_batch(rows, par, np.empty(kept), system)
     looked_for = named(events) if not isinstance(events, Sequence) or events else {}
     _check_together(method, backend, sample, reduce, executor, looked_for, grid)
+    if variations is not None and (backend is not None or looked_for or reduce or sample == "steps"):
+        raise InputError(
+            "variations= needs integrate's own way; leave out backend, events, reduce and 'steps'."
+        )
     program: Any = _program(system, method, backend)
+    if variations is not None:  # what cannot be is said before anything is integrated
+        follow_vectors(
+            program.start(problem.y0, problem.par, problem.t0), method, problem, variations, sample
+        )
     start = started_with_events(program, method, problem, looked_for) if looked_for else None
     reducer = Reducer(system, reduce) if reduce else None
-    belongs = identity(problem, method, grid, sample, looked_for) | {
+    belongs = identity(problem, method, grid, sample, looked_for, variations) | {
         "start": digest(rows), "parameters": digest(par),
         "reduce": ", ".join(f"{name} {one.digest}" for name, one in reduce.items()),
     }  # fmt: skip
@@ -172,18 +185,18 @@ def integrate_many(
 
     def here(numbers: NDArray[np.int64]) -> tuple[Trajectories, Any]:
         if start is None:
-            return integrate_with(program, *given(numbers), problem.t0, threads, sample), None
+            return integrate_with(program, *given(numbers), problem.t0, threads, sample, variations), None
         members = follow(start, *given(numbers), problem.t0, threads)
         return joined([one for one, _ in members], grid), [happened for _, happened in members]
 
     if executor is not None:
         pieces = [
-            (numbers, (*given(numbers), problem.t0, threads, sample))
+            (numbers, (*given(numbers), problem.t0, threads, sample, variations))
             for numbers in gathered.missing(cast("int", size))
         ]
         made = Remote(executor, problem, method, integrate_piece).run(pieces)
     else:
-        batches = start is None and in_batches(program, grid, sample)
+        batches = start is None and variations is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         made = _local(here, gathered, few if batches else threads, size)
     began = perf_counter()

@@ -30,6 +30,7 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer
 from integrators.running.integrate import prepared
+from integrators.running.variations import directions
 from integrators.solution import Occurrences
 from problems.errors import InputError, shown
 from problems.problem import Problem
@@ -41,7 +42,14 @@ Numbers = NDArray[np.int64]
 
 
 def alone(
-    program: Program, starts: Array, par: Array, times: Array, t0: float, threads: int, sample: str | None
+    program: Program,
+    starts: Array,
+    par: Array,
+    times: Array,
+    t0: float,
+    threads: int,
+    sample: str | None,
+    variations: Any = None,
 ) -> Trajectories:
     """Integrate trajectories one by one as `integrate` does, or as many at once as there are threads.
 
@@ -59,6 +67,8 @@ def alone(
         How many.
     sample : str or None
         As for `integrate`; with ``"steps"`` the times are those of each trajectory's steps.
+    variations : array_like, or str, or sequence of str, optional
+        As for `integrate`, at the start of each trajectory.
 
     Returns
     -------
@@ -68,7 +78,7 @@ def alone(
     stop = threading.Event()
 
     def one(i: int) -> Trajectories:
-        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop)
+        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop, variations)
 
     if threads == 1 or len(starts) == 1:
         members = [one(i) for i in range(len(starts))]
@@ -100,17 +110,31 @@ def joined(members: list[Trajectories], times: Array) -> Trajectories:
         np.concatenate([one.t_stop for one in members]),
         np.concatenate([one.steps for one in members]),
         extra={i: extra for i, one in enumerate(members) for extra in one.extra.values()},
+        variations=_joined_variations(members, y),
     )
 
 
+def _joined_variations(members: list[Trajectories], y: Array) -> Array | None:
+    """Return the variations of batches of one as those of one batch, where they have any."""
+    count = max((one.variations.shape[-1] for one in members if one.variations is not None), default=0)
+    if not count:
+        return None
+    vectors = np.full((*y.shape, count), np.nan)
+    for i, one in enumerate(members):
+        if one.variations is not None:
+            vectors[i, : one.variations.shape[1]] = one.variations[0]
+    return vectors
+
+
 def _one(
-    program: Program,
+    program: Any,
     y0: Array,
     par: Array,
     times: Array,
     t0: float,
     sample: str | None,
     stop: threading.Event,
+    variations: Any = None,
 ) -> Trajectories:
     try:
         stepper: Any = program.start(y0, par, t0)
@@ -123,6 +147,11 @@ def _one(
         stepper.stop = stop
     if offers(stepper, Destination):
         stepper.destination = float(times[-1])
+    if variations is not None:
+        parameters: Any = program.system.unpack(par)
+        end = float(times[-1]) if times[-1] != t0 else t0 + 1.0
+        member = Problem(program.system, y0=y0, parameters=parameters, t0=t0, t_end=end)
+        stepper.follow(*directions(member, variations))
     if sample == "steps":
         samples = stepper.advance(np.array([t0, times[-1]]) if times[0] == t0 else times[-1:], sample=sample)
         t, y = samples.t, samples.y[np.newaxis]
@@ -132,7 +161,8 @@ def _one(
         y[0, : samples.t.size] = samples.y
     end = times[-1] if samples.status is Status.FINISHED else stepper.t
     steps = np.array([stepper.stats.steps])
-    made = Trajectories(t, y, [samples.status], [samples.reason], np.array([end]), steps)
+    vectors = None if variations is None else stepper.variations[np.newaxis]
+    made = Trajectories(t, y, [samples.status], [samples.reason], np.array([end]), steps, variations=vectors)
     made.extra[0] = telling(stepper.stats)
     return made
 
@@ -143,11 +173,18 @@ def in_batches(program: Program, times: Array, sample: str | None) -> bool:
 
 
 def integrate_with(
-    program: Any, starts: Array, par: Array, times: Array, t0: float, threads: int, sample: str | None
+    program: Any,
+    starts: Array,
+    par: Array,
+    times: Array,
+    t0: float,
+    threads: int,
+    sample: str | None,
+    variations: Any = None,
 ) -> Trajectories:
     """Integrate some trajectories: in lanes where the program can and the times are those of all."""
-    if not in_batches(program, times, sample):
-        return alone(program, starts, par, times, t0, threads, sample)
+    if variations is not None or not in_batches(program, times, sample):
+        return alone(program, starts, par, times, t0, threads, sample, variations)
     options = {"threads": threads} if offers(program, Threads) and program.threaded else {}
     return program.batch(starts, par, times=times, t0=t0, **options)
 
@@ -185,6 +222,7 @@ class Gathered:
         nothing: tuple[Array, Array] = np.empty(0), np.empty((0, starts.shape[1]))
         self._rows = [nothing] * n if sample == "steps" else None
         self._y = np.full((n, width, starts.shape[1]), np.nan)
+        self._variations: Array | None = None
         self._status = [Status.INTERRUPTED] * n
         self._reason = ["Ctrl-C was pressed before it was at its end."] * n
         self._stop, self._steps = np.full(n, problem.t0), np.zeros(n, dtype=np.int64)
@@ -225,13 +263,18 @@ class Gathered:
                 self._rows[i] = t[there], y[there]
         else:
             self._y[numbers, : found.y.shape[1]] = found.y
+        if found.variations is not None:
+            count = found.variations.shape[-1]
+            if self._variations is None:
+                self._variations = np.full((*self._y.shape, count), np.nan)
+            self._variations[numbers, : found.variations.shape[1]] = found.variations
         for i, status, reason in zip(chosen, found.status, found.reason, strict=True):
             self._status[i], self._reason[i] = status, reason
         self._stop[numbers], self._steps[numbers] = found.t_stop, found.steps
         self._extra.update({chosen[i]: extra for i, extra in found.extra.items() if extra})
         self._events.update(zip(chosen, events or (), strict=False))
 
-    _kept = ("_rows", "_y", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
+    _kept = ("_rows", "_y", "_variations", "_status", "_reason", "_stop", "_steps", "_extra", "_events")
 
     def checkpoint(self) -> dict[str, Any]:
         """Return all that is known, for `restore`."""
@@ -263,6 +306,7 @@ class Gathered:
             problem=self._problem, method=self._method, extra=self._extra,
             events=[self._events.get(i, {}) for i in range(n)] if events else [],
             reduced={} if self._reducer is None else self._reducer.results(n),
+            variations=self._variations,
         )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import problems
-from integrators import HBVM, Gauss, Status, integrate, load
+from integrators import HBVM, Gauss, Status, integrate, integrate_many, load
 from integrators.coefficients.legendre import tables
 from problems import Hamiltonian, InputError, Lagrangian, Poisson, Problem, VectorField
 from problems.analysis.wide import evaluate
@@ -293,6 +293,24 @@ def test_a_checkpoint_without_them_is_refused():
     stepper.follow(np.eye(2), np.zeros((0, 2)))
     with pytest.raises(InputError, match="no tangent vectors"):
         stepper.restore(before)
+
+
+def test_an_ensemble_has_those_of_each_trajectory(tmp_path):
+    problem, method = SYSTEMS["masses"](), HBVM(tol=1e-12)
+    starts = problem.y0 * np.array([[0.9], [1.0], [1.2]])
+    asked = {"starts": starts, "parameters": {"k": [1.0, 1.5, 2.0]}, "times": [1.0, 2.5]}
+    for threads in (1, 2):
+        made = integrate_many(problem, method, **asked, variations=["t0", "k"], threads=threads)
+        assert made.variations.shape == (3, 2, 4, 2)
+    one = Problem(problem.system, y0=starts[2], parameters={"m": [1.0, 2.5], "k": 2.0}, t_end=10.0)
+    alone = integrate(one, method, [1.0, 2.5], variations=["t0", "k"])
+    assert np.array_equal(made.variations[2], alone.variations)
+    assert np.array_equal(made[2].variations, alone.variations)
+    assert np.array_equal(made[1:].variations, made.variations[1:])
+    with pytest.raises(InputError, match="leave out backend"):
+        integrate_many(problem, method, **asked, variations="y0", sample="steps")
+    with pytest.raises(InputError, match="unknown variation"):
+        integrate_many(problem, method, **asked, variations="y1")
 
 
 @pytest.mark.parametrize(
