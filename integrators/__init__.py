@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from integrators.peers.diffrax.methods import SemiImplicitEuler as SemiImplicitEuler
     from integrators.peers.heyoka.taylor import Taylor as Taylor
     from integrators.peers.rebound.fixed import Leapfrog as Leapfrog
-    from integrators.peers.rebound.fixed import WHFast as WHFast
     from integrators.peers.rebound.ias15 import IAS15 as IAS15
+    from integrators.peers.rebound.whfast import WHFast as WHFast
     from integrators.peers.rebound.whfast512 import WHFast512 as WHFast512
     from integrators.peers.scipy import DOP853 as DOP853
     from integrators.peers.scipy import Radau as Radau

@@ -10,8 +10,9 @@ from functools import cache
 from typing import Any, Literal
 
 from integrators.peers import load
-from integrators.peers.rebound.fixed import WHFAST, FixedMethod, ReboundStepper, WHFast
+from integrators.peers.rebound.fixed import FixedMethod, ReboundStepper
 from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, calls, choose
+from integrators.peers.rebound.whfast import WHFAST, WHFast
 from integrators.protocol import Array
 from problems.problem import Problem, System
 

@@ -11,9 +11,10 @@ import problems
 from integrators import Status, integrate
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast, WHFast512
-from integrators.peers.rebound.fixed import EVALUATIONS, Coordinates, Corrector, Kernel
+from integrators.peers.rebound.fixed import EVALUATIONS
 from integrators.peers.rebound.ias15 import Mode
 from integrators.peers.rebound.program import Layout
+from integrators.peers.rebound.whfast import Coordinates, Corrector, Kernel
 from problems import Bodies, Hamiltonian, Problem
 
 
