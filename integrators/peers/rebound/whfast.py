@@ -1,0 +1,185 @@
+"""REBOUND's WHFast, and what its methods for bodies about a dominant one share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from integrators.peers.rebound.fixed import FixedMethod
+from integrators.peers.rebound.program import REBOUND, Layout, choose
+from integrators.protocol import Array
+from problems.checks import refusal, whole
+from problems.errors import InputError
+from problems.problem import Problem, System
+
+Coordinates = Literal["jacobi", "democraticheliocentric", "whds", "barycentric"]
+Kernel = Literal["default", "modifiedkick", "composition", "lazy"]
+Corrector = Literal[0, 3, 5, 7, 11, 17]
+
+DOMINANCE = 10.0
+"""A body dominates if it has this many times the mass of all others together."""
+
+RADIAL = 1e-6
+"""Sine of the angle between position and velocity below which an orbit counts as radial."""
+
+WHFAST = """\
+@article{ReinTamayo2015,
+  author = {Rein, Hanno and Tamayo, Daniel},
+  title = {{WHFAST}: a fast and unbiased implementation of a symplectic {Wisdom-Holman} integrator for
+           long-term gravitational simulations},
+  journal = {Monthly Notices of the Royal Astronomical Society},
+  volume = {452},
+  number = {1},
+  pages = {376--388},
+  year = {2015},
+  doi = {10.1093/mnras/stv1257}
+}
+@article{ReinTamayoBrown2019,
+  author = {Rein, Hanno and Tamayo, Daniel and Brown, Garett},
+  title = {High-order symplectic integrators for planetary dynamics and their implementation in {REBOUND}},
+  journal = {Monthly Notices of the Royal Astronomical Society},
+  volume = {489},
+  number = {4},
+  pages = {4632--4640},
+  year = {2019},
+  doi = {10.1093/mnras/stz2503}
+}
+@article{WisdomHolman1991,
+  author = {Wisdom, Jack and Holman, Matthew},
+  title = {Symplectic maps for the {N}-body problem},
+  journal = {The Astronomical Journal},
+  volume = {102},
+  pages = {1528--1538},
+  year = {1991},
+  doi = {10.1086/115978}
+}
+"""
+
+
+class _Permutation:
+    def checked(self, owner: str, name: str, value: Any) -> tuple[int, ...]:
+        places = [whole(i) for i in value] if isinstance(value, Sequence | np.ndarray) else []
+        found = tuple(i for i in places if i is not None)
+        if not found or sorted(found) != list(range(len(places))):
+            raise refusal(owner, name, value, "a list that names each body from 0 once, as in (2, 0, 1)")
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WHFast(FixedMethod):
+    """REBOUND's WHFast: the symplectic Wisdom-Holman splitting into Kepler orbits and a perturbation.
+
+    Made for planets about one dominant body; `caveat` says where a problem is not that.
+
+    Parameters
+    ----------
+    h : float
+        Length of a step, > 0.
+    coordinates : {"jacobi", "democraticheliocentric", "whds", "barycentric"}
+        In which the Hamiltonian is split.
+    corrector : {0, 3, 5, 7, 11, 17}
+        Order of the first symplectic corrector; Jacobi or barycentric coordinates only.
+    corrector2 : bool
+        The second symplectic corrector; Jacobi coordinates only.
+    kernel : {"default", "modifiedkick", "composition", "lazy"}
+        The kick; other than the default in Jacobi coordinates only.
+    body_order : tuple of int, optional
+        Which body comes first, second, ...: the first is the centre. The problem's
+        own order by default; states are always in that.
+
+    Notes
+    -----
+    REBOUND's safe mode is off, as its authors advise: half steps are joined, and a
+    sample is a synchronised copy from which the integration does not go on
+    (``keep_unsynchronized``), so that samples do not change the trajectory.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import WHFast, integrate
+    >>> planets = problems.load("outer_solar_system", t_end=100.0)
+    >>> bool(integrate(planets, WHFast(h=0.3, corrector=17), [0.0, 100.0]).errors()["energy"].max() < 1e-8)
+    True
+    """
+
+    coordinates: Coordinates = "jacobi"
+    corrector: Corrector = 0
+    corrector2: bool = False
+    kernel: Kernel = "default"
+    body_order: Annotated[tuple[int, ...], _Permutation()] | None = None
+
+    order = 2  # in h, at a fixed perturbation
+    citation = REBOUND + WHFAST
+    family = "wisdom-holman"
+    to_end = "land"
+    unsynchronized = True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        jacobi = self.coordinates == "jacobi"
+        if self.kernel != "default" and not jacobi:
+            raise InputError(f'WHFast has kernel={self.kernel!r} in coordinates="jacobi" only.')
+        if self.corrector and self.coordinates not in ("jacobi", "barycentric"):
+            raise InputError(
+                f'WHFast has corrector={self.corrector} in coordinates="jacobi" or "barycentric" only.'
+            )
+        if self.corrector2 and not jacobi:
+            raise InputError('WHFast has corrector2=True in coordinates="jacobi" only.')
+
+    def refuses(self, system: System, par: Array) -> str | None:
+        """Return why not: it needs gravitating bodies, as many as ``body_order`` has."""
+        if system.bodies is None:
+            return "it needs gravitating bodies, and the system declares none."
+        n = system.dim // 2 // system.bodies.dimension
+        if n < 2:
+            return "it needs at least two bodies."
+        if self.body_order is not None and len(self.body_order) != n:
+            return f"body_order has {len(self.body_order)} bodies, the problem {n}."
+        return super().refuses(system, par)
+
+    def order_of_bodies(self, n: int) -> list[int]:
+        """Return which body is REBOUND's first, second, ..."""
+        return list(range(n)) if self.body_order is None else list(self.body_order)
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Say why a problem is outside what WHFast was made for, although it runs."""
+        system = problem.system
+        if system.bodies is None or self.accepts(problem) is not None:
+            return None
+        layout = Layout(system, problem.par, self)
+        m = layout.masses
+        said = []
+        if np.max(m) < DOMINANCE * (np.sum(m) - np.max(m)):
+            said.append(
+                f"no body dominates (the largest has {np.max(m) / np.sum(m):.2g} of the mass), "
+                "so the perturbation of the Kepler orbits is as large as they are"
+            )
+        elif int(np.argmax(m)) != 0:
+            said.append("the dominant body is not the first, about which the orbits are")
+        radial = _radial(layout, problem.y0) if self.coordinates == "jacobi" else []
+        if radial:
+            said.append(
+                f"the Jacobi orbit of body {radial[0]} is radial: it goes through the barycentre of those "
+                "before it, where the Kepler orbit is singular"
+            )
+        return "; ".join(said) + "." if said else None
+
+    def set_up(self, simulation: Any) -> None:
+        """Choose WHFast and its options."""
+        chosen = choose(simulation, "whfast")
+        chosen.coordinates, chosen.kernel = self.coordinates, self.kernel
+        chosen.corrector, chosen.corrector2 = self.corrector, int(self.corrector2)
+        chosen.safe_mode, chosen.keep_unsynchronized = 0, 1
+
+
+def _radial(layout: Layout, y: Array) -> list[int]:
+    """Return the bodies, in the problem's order, whose Jacobi orbits are radial."""
+    x, v = layout.vectors(y)
+    m, found = layout.masses, []
+    for i in range(1, layout.n):
+        share = m[:i, None] / np.sum(m[:i])
+        r, u = x[i] - np.sum(share * x[:i], axis=0), v[i] - np.sum(share * v[:i], axis=0)
+        if np.linalg.norm(np.cross(r, u)) <= RADIAL * np.linalg.norm(r) * np.linalg.norm(u):
+            found.append(int(np.flatnonzero(layout.place == i)[0]))
+    return found
