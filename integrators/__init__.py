@@ -33,10 +33,16 @@ if TYPE_CHECKING:
     from integrators.peers.diffrax.methods import ReversibleHeun as ReversibleHeun
     from integrators.peers.diffrax.methods import SemiImplicitEuler as SemiImplicitEuler
     from integrators.peers.heyoka.taylor import Taylor as Taylor
-    from integrators.peers.rebound.fixed import Leapfrog as Leapfrog
-    from integrators.peers.rebound.ias15 import IAS15 as IAS15
-    from integrators.peers.rebound.whfast import WHFast as WHFast
-    from integrators.peers.rebound.whfast512 import WHFast512 as WHFast512
+    from integrators.peers.rebound import BS as BS
+    from integrators.peers.rebound import EOS as EOS
+    from integrators.peers.rebound import IAS15 as IAS15
+    from integrators.peers.rebound import JANUS as JANUS
+    from integrators.peers.rebound import MERCURIUS as MERCURIUS
+    from integrators.peers.rebound import SABA as SABA
+    from integrators.peers.rebound import TRACE as TRACE
+    from integrators.peers.rebound import Leapfrog as Leapfrog
+    from integrators.peers.rebound import WHFast as WHFast
+    from integrators.peers.rebound import WHFast512 as WHFast512
     from integrators.peers.scipy import DOP853 as DOP853
     from integrators.peers.scipy import Radau as Radau
     from integrators.plugins.rebound.convert import from_rebound as from_rebound
@@ -44,9 +50,15 @@ if TYPE_CHECKING:
     from integrators.running.poincare import section as section
 
 __all__ = [
+    "BS",
     "DOP853",
+    "EOS",
     "HBVM",
     "IAS15",
+    "JANUS",
+    "MERCURIUS",
+    "SABA",
+    "TRACE",
     "Dopri8",
     "Event",
     "Gauss",

@@ -18,7 +18,9 @@ BUILT_IN = {
     "integrators.methods.gauss": ("Gauss",),
     "integrators.methods.line_integral": ("LineIntegral",),
     "integrators.peers.heyoka.taylor": ("Taylor",),
-    "integrators.peers.rebound": ("IAS15", "Leapfrog", "WHFast", "WHFast512"),
+    "integrators.peers.rebound": (
+        "BS", "EOS", "IAS15", "JANUS", "Leapfrog", "MERCURIUS", "SABA", "TRACE", "WHFast", "WHFast512",
+    ),
     "integrators.peers.diffrax.methods": (
         "Dopri8", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler",
     ),

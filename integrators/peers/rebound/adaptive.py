@@ -9,7 +9,7 @@ import numpy as np
 from integrators.peers.rebound.program import Layout, ReboundMethod, ReboundProgram, calls
 from integrators.protocol import Array, Status
 from integrators.running.watchdog import CRAWL_STEPS
-from integrators.stepping import RestorableStepper
+from integrators.stepping import StepperBase
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -30,7 +30,7 @@ class AdaptiveMethod(ReboundMethod):
         return AdaptiveStepper(program, layout, self, y, t)
 
 
-class AdaptiveStepper(RestorableStepper):
+class AdaptiveStepper(StepperBase):
     """A trajectory with adaptive steps: ``"land"`` (default) or ``"steps"``."""
 
     samplings = ("land", "steps")
@@ -102,20 +102,16 @@ class AdaptiveStepper(RestorableStepper):
         sign = self._towards(end)
         with calls(self._stats):
             while sign * (simulation.t + simulation.dt - end) <= 0.0 and self._run(simulation.steps, 1, end):
-                times.append(float(simulation.t))
-                states.append(self._program.state(self._layout, simulation))
+                if simulation.t != times[-1]:  # else the step was rejected
+                    times.append(float(simulation.t))
+                    states.append(self._program.state(self._layout, simulation))
         return np.array(times[1:]), np.array(states)[1:]
 
     def _one(self) -> tuple[float, Array] | None:
         simulation = self._simulation
         self._towards(math.copysign(math.inf, simulation.dt))
         with calls(self._stats):
-            if not self._run(simulation.steps, 1, math.inf):
-                return None
+            while simulation.t == self._t:  # a rejected step leaves the time
+                if not self._run(simulation.steps, 1, math.inf):
+                    return None
         return float(simulation.t), self._program.state(self._layout, simulation)
-
-    def _save(self) -> bytes:
-        return self._program.archive(self._simulation)
-
-    def _load(self, inner: bytes) -> None:
-        self._use(self._program.rebound.Simulation(inner))

@@ -28,6 +28,7 @@ class FixedMethod(ReboundMethod):
     h: Step
 
     unsynchronized: ClassVar[bool] = False  # whether a sample is a synchronised copy
+    counted: ClassVar[bool] = True  # whether REBOUND tells of each evaluation of the forces
 
     def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "ReboundStepper":
         """Return a trajectory."""
@@ -87,7 +88,11 @@ class ReboundStepper(FixedStepper):
         with calls(self._stats):
             self._simulation.t = self._time()
             self._simulation.steps(count)
-        self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
+        self._count()
+
+    def _count(self) -> None:
+        if self._program.method.counted:
+            self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
 
     def _state(self) -> Array:
         return self._program.state(self._layout, self._simulation)
@@ -106,7 +111,7 @@ class ReboundStepper(FixedStepper):
         simulation.dt = self._h
         if self._program.method.unsynchronized:
             simulation.integrator.keep_unsynchronized = 1
-        self._stats.evaluations = int(self._block.values[self._program.hooks.EVALUATIONS])
+        self._count()
 
     def _part(self, simulation: Any, part: float) -> None:
         """Synchronise a simulation and take one step of length ``part``."""

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.options import NotNegative, Step
-from integrators.peers.rebound.adaptive import AdaptiveMethod
-from integrators.peers.rebound.program import REBOUND, choose
+from integrators.peers.rebound.adaptive import AdaptiveMethod, AdaptiveStepper
+from integrators.peers.rebound.program import REBOUND, Layout, ReboundProgram, choose
+from integrators.protocol import Array
+from integrators.stepping import RestorableStepper
 from problems.errors import InputError
 from problems.problem import Problem
 
@@ -117,3 +119,17 @@ class IAS15(AdaptiveMethod):
     def counts(self, simulation: Any) -> dict[str, int]:
         """Return how often the iteration of a step did not converge."""
         return {"iterations_max_exceeded": int(simulation.integrator.iterations_max_exceeded)}
+
+    def stepper(self, program: ReboundProgram, layout: Layout, y: Array, t: float) -> "IAS15Stepper":
+        """Return a trajectory."""
+        return IAS15Stepper(program, layout, self, y, t)
+
+
+class IAS15Stepper(AdaptiveStepper, RestorableStepper):
+    """A trajectory that REBOUND's files continue bit for bit."""
+
+    def _save(self) -> bytes:
+        return self._program.archive(self._simulation)
+
+    def _load(self, inner: bytes) -> None:
+        self._use(self._program.rebound.Simulation(inner))

@@ -67,7 +67,46 @@ class _Permutation:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class WHFast(FixedMethod):
+class CentralMethod(FixedMethod):
+    """What REBOUND's methods for bodies about a dominant one share."""
+
+    def refuses(self, system: System, par: Array) -> str | None:
+        """Return why not: it needs at least two gravitating bodies."""
+        if system.bodies is None:
+            return "it needs gravitating bodies, and the system declares none."
+        if system.dim // 2 // system.bodies.dimension < 2:
+            return "it needs at least two bodies."
+        return super().refuses(system, par)
+
+    def caveat(self, problem: Problem) -> str | None:
+        """Say why a problem is outside what the method was made for, although it runs."""
+        if self.accepts(problem) is not None:
+            return None
+        said = self.doubts(Layout(problem.system, problem.par, self), problem.y0)
+        return "; ".join(said) + "." if said else None
+
+    def doubts(self, layout: Layout, y0: Array) -> list[str]:
+        """Return what speaks against the method, of masses and of the start."""
+        m = layout.masses
+        if np.max(m) < DOMINANCE * (np.sum(m) - np.max(m)):
+            return [
+                f"no body dominates (the largest has {np.max(m) / np.sum(m):.2g} of the mass), "
+                "so the perturbation of the Kepler orbits is as large as they are"
+            ]
+        return ["the dominant body is not the first, about which the orbits are"] if np.argmax(m) else []
+
+    def radial(self, layout: Layout, y0: Array) -> list[str]:
+        """Return what is wrong with a Jacobi orbit that is radial."""
+        found = _radial(layout, y0)
+        return [
+            f"the Jacobi orbit of body {i} is radial: it goes through the barycentre of those "
+            "before it, where the Kepler orbit is singular"
+            for i in found[:1]
+        ]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class WHFast(CentralMethod):
     """REBOUND's WHFast: the symplectic Wisdom-Holman splitting into Kepler orbits and a perturbation.
 
     Made for planets about one dominant body; `caveat` says where a problem is not that.
@@ -129,41 +168,21 @@ class WHFast(FixedMethod):
 
     def refuses(self, system: System, par: Array) -> str | None:
         """Return why not: it needs gravitating bodies, as many as ``body_order`` has."""
-        if system.bodies is None:
-            return "it needs gravitating bodies, and the system declares none."
-        n = system.dim // 2 // system.bodies.dimension
-        if n < 2:
-            return "it needs at least two bodies."
+        if reason := super().refuses(system, par):
+            return reason
+        n = system.dim // 2 // system.bodies.dimension if system.bodies else 0
         if self.body_order is not None and len(self.body_order) != n:
             return f"body_order has {len(self.body_order)} bodies, the problem {n}."
-        return super().refuses(system, par)
+        return None
 
     def order_of_bodies(self, n: int) -> list[int]:
         """Return which body is REBOUND's first, second, ..."""
         return list(range(n)) if self.body_order is None else list(self.body_order)
 
-    def caveat(self, problem: Problem) -> str | None:
-        """Say why a problem is outside what WHFast was made for, although it runs."""
-        system = problem.system
-        if system.bodies is None or self.accepts(problem) is not None:
-            return None
-        layout = Layout(system, problem.par, self)
-        m = layout.masses
-        said = []
-        if np.max(m) < DOMINANCE * (np.sum(m) - np.max(m)):
-            said.append(
-                f"no body dominates (the largest has {np.max(m) / np.sum(m):.2g} of the mass), "
-                "so the perturbation of the Kepler orbits is as large as they are"
-            )
-        elif int(np.argmax(m)) != 0:
-            said.append("the dominant body is not the first, about which the orbits are")
-        radial = _radial(layout, problem.y0) if self.coordinates == "jacobi" else []
-        if radial:
-            said.append(
-                f"the Jacobi orbit of body {radial[0]} is radial: it goes through the barycentre of those "
-                "before it, where the Kepler orbit is singular"
-            )
-        return "; ".join(said) + "." if said else None
+    def doubts(self, layout: Layout, y0: Array) -> list[str]:
+        """Return what speaks against the method, of masses and of the start."""
+        said = super().doubts(layout, y0)
+        return said + self.radial(layout, y0) if self.coordinates == "jacobi" else said
 
     def set_up(self, simulation: Any) -> None:
         """Choose WHFast and its options."""
