@@ -1,166 +1,37 @@
-"""SciPy's DOP853 and Radau, with compiled vector fields."""
+"""Programs and trajectories of SciPy's solvers."""
 
 import copy
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from time import perf_counter
 from types import FunctionType
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from integrators.options import NotNegative, Share
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.running.watchdog import Crawl, crawl
 from integrators.stepping import ProgramBase, RestorableStepper
-from problems.errors import InputError
 from problems.problem import System
 
-RTOL_FLOOR = 100 * float(np.finfo(np.float64).eps)
-"""SciPy silently raises a smaller rtol to this (`scipy.integrate._ivp.common.validate_tol`)."""
-
 DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
-
-SCIPY = """\
-@article{Virtanen2020,
-  author = {Virtanen, Pauli and Gommers, Ralf and Oliphant, Travis E. and others},
-  title = {{SciPy} 1.0: fundamental algorithms for scientific computing in {Python}},
-  journal = {Nature Methods},
-  volume = {17},
-  pages = {261--272},
-  year = {2020},
-  doi = {10.1038/s41592-019-0686-2}
-}
-"""
-
-HAIRER_I = """\
-@book{HairerNorsettWanner1993,
-  author = {Hairer, Ernst and N{\\o}rsett, Syvert P. and Wanner, Gerhard},
-  title = {Solving Ordinary Differential Equations {I}: Nonstiff Problems},
-  edition = {Second},
-  publisher = {Springer},
-  year = {1993}
-}
-"""
-
-HAIRER_II = """\
-@book{HairerWanner1996,
-  author = {Hairer, Ernst and Wanner, Gerhard},
-  title = {Solving Ordinary Differential Equations {II}: Stiff and Differential-Algebraic Problems},
-  edition = {Second},
-  publisher = {Springer},
-  year = {1996}
-}
-"""
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class _SciPyMethod(MethodBase):
-    """What SciPy's methods share; see `SciPyStepper` for the sampling.
-
-    The tolerances hold for the local error: ``atol + rtol |y|`` in each component.
-    """
-
-    rtol: Share
-    atol: NotNegative
-
-    solver: ClassVar[str]
-    library = "scipy"
-    to_end = "land"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.rtol < RTOL_FLOOR:
-            raise InputError(
-                f"rtol={self.rtol!r} is below what SciPy attains (100 times the double's epsilon); "
-                f"the least is rtol={RTOL_FLOOR!r}."
-            )
-
-    def compile(self, system: System) -> "SciPyProgram":
-        """Compile the vector field of ``system``."""
-        return SciPyProgram(system, self)
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class DOP853(_SciPyMethod):
-    """SciPy's explicit Runge-Kutta method of order 8(5,3) of Dormand and Prince, adaptive.
-
-    Parameters
-    ----------
-    rtol : float
-        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
-    atol : float
-        Absolute tolerance, >= 0.
-
-    Notes
-    -----
-    The step loop is SciPy's and runs in Python: 12 evaluations of the compiled
-    field a step at about 3 microseconds each, most of it not the field.
-
-    Examples
-    --------
-    >>> import problems
-    >>> from integrators import DOP853, integrate
-    >>> solution = integrate(problems.load("pendulum"), DOP853(rtol=1e-12, atol=1e-14), [0.0, 10.0])
-    >>> bool(solution.errors()["energy"].max() < 1e-10)
-    True
-    """
-
-    solver = "DOP853"
-    citation = SCIPY + HAIRER_I
-    family = "runge-kutta"
-
-    order = 8
-
-
-@dataclass(frozen=True, kw_only=True, repr=False)
-class Radau(_SciPyMethod):
-    """SciPy's implicit Radau IIA method of order 5, adaptive, for stiff systems.
-
-    Parameters
-    ----------
-    rtol : float
-        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
-    atol : float
-        Absolute tolerance, >= 0.
-
-    Notes
-    -----
-    The Jacobian is the traced system's own (`problems.System.jacobian`), as our implicit methods have
-    it; SciPy's finite differences where there is none. It is L-stable, so it damps oscillations:
-    no method for conserving energy.
-
-    Examples
-    --------
-    >>> import problems
-    >>> from integrators import Radau, integrate
-    >>> integrate(problems.load("pendulum"), Radau(rtol=1e-6, atol=1e-8), [0.0, 10.0]).status
-    <Status.FINISHED: 'finished'>
-    """
-
-    solver = "Radau"
-    citation = SCIPY + HAIRER_II
-    family = "runge-kutta"
-
-    order = 5
 
 
 class SciPyProgram(ProgramBase):
     """A vector field compiled for SciPy's solvers."""
 
-    def __init__(self, system: System, method: _SciPyMethod):
+    def __init__(self, system: System, method: MethodBase):
         super().__init__(system, method)
         integrate = load("scipy", "scipy.integrate")
         from problems import emit
 
         started = perf_counter()
-        self.method, self.solver = method, getattr(integrate, method.solver)
+        self.solver = getattr(integrate, self.method.solver)
         self.field = emit.numba(system, "field")
         # The first call compiles for these types.
         self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
-        self.jacobian = system.jacobian() if method.solver == "Radau" else None
+        self.jacobian = system.jacobian() if self.method.solver == "Radau" else None
         if self.jacobian is not None:
             self.entries = emit.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
