@@ -43,19 +43,23 @@ if TYPE_CHECKING:
     from integrators.peers.rebound import Leapfrog as Leapfrog
     from integrators.peers.rebound import WHFast as WHFast
     from integrators.peers.rebound import WHFast512 as WHFast512
+    from integrators.peers.scipy import BDF as BDF
     from integrators.peers.scipy import DOP853 as DOP853
+    from integrators.peers.scipy import LSODA as LSODA
     from integrators.peers.scipy import Radau as Radau
     from integrators.plugins.rebound.convert import from_rebound as from_rebound
     from integrators.plugins.rebound.convert import to_rebound as to_rebound
     from integrators.running.poincare import section as section
 
 __all__ = [
+    "BDF",
     "BS",
     "DOP853",
     "EOS",
     "HBVM",
     "IAS15",
     "JANUS",
+    "LSODA",
     "MERCURIUS",
     "SABA",
     "TRACE",

@@ -24,7 +24,7 @@ BUILT_IN = {
     "integrators.peers.diffrax.methods": (
         "Dopri8", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler",
     ),
-    "integrators.peers.scipy": ("DOP853", "Radau"),
+    "integrators.peers.scipy": ("BDF", "DOP853", "LSODA", "Radau"),
 }  # fmt: skip
 """Modules and the methods in them; written down here, because looking into a module would import it."""
 

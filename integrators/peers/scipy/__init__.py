@@ -1,5 +1,5 @@
 """SciPy's initial value solvers, with compiled vector fields."""
 
-from integrators.peers.scipy.methods import DOP853, Radau
+from integrators.peers.scipy.methods import BDF, DOP853, LSODA, RTOL_FLOOR, Radau
 
-__all__ = ["DOP853", "Radau"]
+__all__ = ["BDF", "DOP853", "LSODA", "RTOL_FLOOR", "Radau"]

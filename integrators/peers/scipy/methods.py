@@ -1,4 +1,4 @@
-"""SciPy's DOP853 and Radau, with compiled vector fields."""
+"""SciPy's DOP853, Radau, BDF and LSODA, with compiled vector fields."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -47,6 +47,32 @@ HAIRER_II = """\
 """
 
 
+SHAMPINE = """\
+@article{ShampineReichelt1997,
+  author = {Shampine, Lawrence F. and Reichelt, Mark W.},
+  title = {The {MATLAB} {ODE} suite},
+  journal = {SIAM Journal on Scientific Computing},
+  volume = {18},
+  number = {1},
+  pages = {1--22},
+  year = {1997}
+}
+"""
+
+PETZOLD = """\
+@article{Petzold1983,
+  author = {Petzold, Linda},
+  title = {Automatic selection of methods for solving stiff and nonstiff systems of ordinary differential
+           equations},
+  journal = {SIAM Journal on Scientific and Statistical Computing},
+  volume = {4},
+  number = {1},
+  pages = {136--148},
+  year = {1983}
+}
+"""
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SciPyMethod(MethodBase):
     """What SciPy's methods share; see `SciPyStepper` for the sampling.
@@ -58,6 +84,8 @@ class SciPyMethod(MethodBase):
     atol: NotNegative
 
     solver: ClassVar[str]
+    implicit: ClassVar[bool] = False  # whether it takes a Jacobian
+    multistep: ClassVar[bool] = False
     library = "scipy"
     to_end = "land"
 
@@ -132,7 +160,67 @@ class Radau(SciPyMethod):
     """
 
     solver = "Radau"
+    implicit = True
     citation = SCIPY + HAIRER_II
     family = "runge-kutta"
 
     order = 5
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class BDF(SciPyMethod):
+    """SciPy's backward differentiation formulas of order 1 to 5, in quasi-constant steps, for stiff systems.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
+    atol : float
+        Absolute tolerance, >= 0.
+
+    Notes
+    -----
+    The Jacobian is the traced system's own, as for `Radau`. It damps oscillations: no method for conserving
+    energy.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import BDF, integrate
+    >>> integrate(problems.load("pendulum"), BDF(rtol=1e-6, atol=1e-8), [0.0, 10.0]).status
+    <Status.FINISHED: 'finished'>
+    """
+
+    solver = "BDF"
+    implicit = multistep = True
+    citation = SCIPY + SHAMPINE
+    family = "multistep"
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LSODA(SciPyMethod):
+    """ODEPACK's LSODA in SciPy: Adams' and backward differentiation formulas, changed over where stiff.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative tolerance, at least 100 times the double's epsilon (2.2e-14).
+    atol : float
+        Absolute tolerance, >= 0.
+
+    Notes
+    -----
+    The Jacobian is the traced system's own, as a full matrix. There are no checkpoints.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import LSODA, integrate
+    >>> integrate(problems.load("pendulum"), LSODA(rtol=1e-9, atol=1e-11), [0.0, 10.0]).status
+    <Status.FINISHED: 'finished'>
+    """
+
+    solver = "LSODA"
+    implicit = multistep = True
+    citation = SCIPY + PETZOLD
+    family = "multistep"

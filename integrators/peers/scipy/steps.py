@@ -12,7 +12,7 @@ import numpy as np
 from integrators.peers import load
 from integrators.protocol import Array, MethodBase, Status, UserError
 from integrators.running.watchdog import Crawl, crawl
-from integrators.stepping import ProgramBase, RestorableStepper
+from integrators.stepping import ProgramBase, RestorableStepper, StepperBase
 from problems.problem import System
 
 DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
@@ -31,7 +31,7 @@ class SciPyProgram(ProgramBase):
         self.field = emit.numba(system, "field")
         # The first call compiles for these types.
         self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
-        self.jacobian = system.jacobian() if self.method.solver == "Radau" else None
+        self.jacobian = system.jacobian() if self.method.implicit else None
         if self.jacobian is not None:
             self.entries = emit.numba(system, self.jacobian)
             self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
@@ -40,7 +40,7 @@ class SciPyProgram(ProgramBase):
 
     def stepper(self, y: Array, par: Array, t: float) -> "SciPyStepper":
         """Return a trajectory."""
-        return SciPyStepper(self, y, par, t)
+        return (LSODAStepper if self.method.solver == "LSODA" else RestorableSciPyStepper)(self, y, par, t)
 
 
 class _Factored:
@@ -63,22 +63,24 @@ def _factored(matrix: Any) -> _Factored:
     return _Factored(matrix, splu(matrix))
 
 
-class SciPyStepper(RestorableStepper):
+class SciPyStepper(StepperBase):
     """A trajectory of one of SciPy's solvers.
 
     ``"side"`` (default)
         The steps of the solver are untouched. A time between two of them is reached
         by a separate solver from the earlier one, with the same tolerances; its
-        evaluations are counted apart, in ``stats.extra["side_evaluations"]``.
+        evaluations are counted apart, in ``stats.extra["side_evaluations"]``. The polynomial of a
+        multistep method gives it, which is of the method's order.
     ``"steps"``
         The steps of the solver, up to the last time.
     ``"land"``
         The last step before each time is shortened onto it, as `solve_ivp` does at its end.
 
-    SciPy's own interpolants are not offered: they are of lower order than the method.
+    The interpolants of the Runge-Kutta methods are not offered: they are of lower order than the method.
     """
 
     samplings = ("side", "steps", "land")
+    _sparse = True  # whether the solver takes sparse Jacobians
 
     def __init__(self, program: SciPyProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
@@ -112,7 +114,7 @@ class SciPyStepper(RestorableStepper):
         values = np.empty(found.rows.size)
         self._program.entries(t, y, self._par, values)
         shape = (found.size, found.size)
-        if found.size > DENSE and found.density < SPARSE:
+        if self._sparse and found.size > DENSE and found.density < SPARSE:
             return csc_matrix((values, (found.rows, found.columns)), shape=shape)
         matrix = np.zeros(shape)
         matrix[found.rows, found.columns] = values
@@ -138,6 +140,10 @@ class SciPyStepper(RestorableStepper):
         self._note("jacobians", solver.njev)
         return solver
 
+    def _bound(self, t: float) -> None:
+        """Have no step pass ``t``."""
+        self._solver.t_bound = t
+
     def _note(self, name: str, count: int) -> None:
         if count:
             self._stats.extra[name] = self._stats.extra.get(name, 0) + count
@@ -147,7 +153,7 @@ class SciPyStepper(RestorableStepper):
         states = np.empty((grid.size, self._y.size))
         watch = crawl(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
-            self._solver.t_bound = t if how == "land" else sign * math.inf
+            self._bound(t if how == "land" else sign * math.inf)
             while sign * (self._solver.t - t) < 0.0:
                 if not self._step(watch):
                     return grid[:i], states[:i]
@@ -163,7 +169,7 @@ class SciPyStepper(RestorableStepper):
 
     def _own_steps(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
-        self._solver.t_bound = sign * math.inf
+        self._bound(sign * math.inf)
         watch = crawl(self, self._solver.t, end)
         times, states = [self._t], [self._y]
         while self._solver.t != times[-1] or self._step(watch):
@@ -174,7 +180,7 @@ class SciPyStepper(RestorableStepper):
         return np.array(times[1:]), np.array(states)[1:]
 
     def _one(self) -> tuple[float, Array] | None:
-        self._solver.t_bound = self._solver.direction * math.inf
+        self._bound(self._solver.direction * math.inf)
         if self._solver.t == self._t and not self._step(Crawl(self._t, self._t)):
             return None
         return float(self._solver.t), self._solver.y
@@ -212,13 +218,19 @@ class SciPyStepper(RestorableStepper):
         self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
 
     def _aside(self, t: float) -> Array:
-        """Return the state at ``t``, within the last step, from a separate solver."""
+        """Return the state at ``t``, within the last step."""
+        if self._program.method.multistep:
+            return self._solver.dense_output()(t)
         start = float(self._solver.t_old)
         aside = self._make(self._evaluate_aside, start, self._solver.y_old, t, abs(t - start))
         with np.errstate(all="ignore"):
             while aside.status == "running":
                 aside.step()
         return aside.y if aside.status == "finished" else np.full(self._y.size, np.nan)
+
+
+class RestorableSciPyStepper(SciPyStepper, RestorableStepper):
+    """A trajectory whose solver is written in Python, and can be kept."""
 
     def _save(self) -> Any:
         # A solver's functions are bound to it, and K, K_extended hold nothing from step to step.
@@ -227,3 +239,13 @@ class SciPyStepper(RestorableStepper):
 
     def _load(self, inner: Any) -> None:
         vars(self._solver).update(copy.deepcopy(inner))
+
+
+class LSODAStepper(SciPyStepper):
+    """A trajectory of ODEPACK's LSODA, whose state SciPy does not give away: there are no checkpoints."""
+
+    _sparse = False
+
+    def _bound(self, t: float) -> None:
+        super()._bound(t)
+        self._solver._lsoda_solver._integrator.rwork[0] = t  # SciPy hands it over at the start only

@@ -16,7 +16,7 @@ from integrators.peers.rebound import (
     WHFast,
     WHFast512,
 )
-from integrators.peers.scipy import DOP853, Radau
+from integrators.peers.scipy import BDF, DOP853, LSODA, Radau
 
 AVX512 = pytest.mark.skipif(not rebound.avx512_available, reason="this processor has no AVX-512")
 
@@ -48,6 +48,8 @@ CASES = [
     (Dopri8(rtol=1e-9, atol=1e-11), testing.pendulum),
     (DOP853(rtol=1e-9, atol=1e-12), testing.two_bodies),
     (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),
+    (BDF(rtol=1e-7, atol=1e-9), testing.pendulum),
+    (LSODA(rtol=1e-9, atol=1e-11), testing.two_bodies),
 ]
 
 
