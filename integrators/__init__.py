@@ -29,9 +29,11 @@ if TYPE_CHECKING:
     from integrators.methods.hbvm import HBVM as HBVM
     from integrators.methods.line_integral import LineIntegral as LineIntegral
     from integrators.peers.diffrax.methods import Dopri8 as Dopri8
+    from integrators.peers.diffrax.methods import Kvaerno5 as Kvaerno5
     from integrators.peers.diffrax.methods import LeapfrogMidpoint as LeapfrogMidpoint
     from integrators.peers.diffrax.methods import ReversibleHeun as ReversibleHeun
     from integrators.peers.diffrax.methods import SemiImplicitEuler as SemiImplicitEuler
+    from integrators.peers.diffrax.methods import Tsit5 as Tsit5
     from integrators.peers.heyoka.taylor import Taylor as Taylor
     from integrators.peers.rebound import BS as BS
     from integrators.peers.rebound import EOS as EOS
@@ -66,6 +68,7 @@ __all__ = [
     "Dopri8",
     "Event",
     "Gauss",
+    "Kvaerno5",
     "Leapfrog",
     "LeapfrogMidpoint",
     "LineIntegral",
@@ -81,6 +84,7 @@ __all__ = [
     "Stats",
     "Status",
     "Taylor",
+    "Tsit5",
     "WHFast",
     "WHFast512",
     "advise",

@@ -22,7 +22,7 @@ BUILT_IN = {
         "BS", "EOS", "IAS15", "JANUS", "Leapfrog", "MERCURIUS", "SABA", "TRACE", "WHFast", "WHFast512",
     ),
     "integrators.peers.diffrax.methods": (
-        "Dopri8", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler",
+        "Dopri8", "Kvaerno5", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler", "Tsit5",
     ),
     "integrators.peers.scipy": ("BDF", "DOP853", "LSODA", "Radau"),
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""diffrax's symplectic and reversible solvers, and Dopri8, on the CPU in double precision."""
+"""diffrax's symplectic and reversible solvers, Dopri8, Tsit5 and Kvaerno5, on the CPU in double precision."""
 
 import os
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class DiffraxMethod(MethodBase):
     when it is first asked for; whoever times it runs it once before.
     """
 
-    evaluations: ClassVar[int]
+    evaluations: ClassVar[int | None]  # of a step; None: not known
     library = "diffrax"
     to_end = "end"
     citation = KIDGER
@@ -166,7 +166,28 @@ class ReversibleHeun(_FixedMethod):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Dopri8(DiffraxMethod):
+class _EitherMethod(DiffraxMethod):
+    """An explicit Runge-Kutta method at a fixed step size or an adaptive one."""
+
+    h: Step | None = None
+    rtol: Share | None = None
+    atol: NotNegative | None = None
+
+    family = "runge-kutta"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        name = type(self).__name__
+        tolerances = self.rtol is not None or self.atol is not None
+        if (self.h is None) != tolerances or (tolerances and (self.rtol is None or self.atol is None)):
+            raise InputError(
+                f"{name} needs either h, as in {name}(h=0.1), or both tolerances, as in "
+                f"{name}(rtol=1e-9, atol=1e-12), not h={self.h!r}, rtol={self.rtol!r}, atol={self.atol!r}."
+            )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Dopri8(_EitherMethod):
     """diffrax's Runge-Kutta method of order 8(7) of Prince and Dormand, at a fixed step or adaptive.
 
     Give either ``h`` or both tolerances.
@@ -193,13 +214,8 @@ class Dopri8(DiffraxMethod):
     True
     """
 
-    h: Step | None = None
-    rtol: Share | None = None
-    atol: NotNegative | None = None
-
     order = 8
     evaluations = 13
-    family = "runge-kutta"
     citation = (
         KIDGER
         + """\
@@ -215,11 +231,90 @@ class Dopri8(DiffraxMethod):
 """
     )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        tolerances = self.rtol is not None or self.atol is not None
-        if (self.h is None) != tolerances or (tolerances and (self.rtol is None or self.atol is None)):
-            raise InputError(
-                "Dopri8 needs either h, as in Dopri8(h=0.1), or both tolerances, as in "
-                f"Dopri8(rtol=1e-9, atol=1e-12), not h={self.h!r}, rtol={self.rtol!r}, atol={self.atol!r}."
-            )
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tsit5(_EitherMethod):
+    """diffrax's Runge-Kutta method of order 5(4) of Tsitouras, at a fixed step size or adaptive.
+
+    Give either ``h`` or both tolerances.
+
+    Parameters
+    ----------
+    h : float, optional
+        Length of a step, > 0.
+    rtol, atol : float, optional
+        Tolerances of diffrax's default (integral) controller.
+
+    Notes
+    -----
+    Samples as of `Dopri8`.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Tsit5, integrate
+    >>> solution = integrate(problems.load("pendulum"), Tsit5(rtol=1e-8, atol=1e-10), [0.0, 10.0])
+    >>> bool(solution.errors()["energy"].max() < 1e-6)
+    True
+    """
+
+    order = 5
+    evaluations = 6
+    citation = (
+        KIDGER
+        + """\
+@article{Tsitouras2011,
+  author = {Tsitouras, Ch.},
+  title = {{Runge--Kutta} pairs of order 5(4) satisfying only the first column simplifying assumption},
+  journal = {Computers \\& Mathematics with Applications},
+  volume = {62},
+  number = {2},
+  pages = {770--775},
+  year = {2011}
+}
+"""
+    )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Kvaerno5(DiffraxMethod):
+    """diffrax's singly diagonally implicit Runge-Kutta method of order 5(4) of Kvaerno, for stiff systems.
+
+    Parameters
+    ----------
+    rtol, atol : float
+        Tolerances of diffrax's default (integral) controller, and of the Newton iteration.
+
+    Notes
+    -----
+    Samples as of `Dopri8`. Evaluations are not counted: diffrax does not tell how many iterations it takes.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import Kvaerno5, integrate
+    >>> integrate(problems.load("pendulum"), Kvaerno5(rtol=1e-6, atol=1e-8), [0.0, 10.0]).status
+    <Status.FINISHED: 'finished'>
+    """
+
+    rtol: Share
+    atol: NotNegative
+
+    h: ClassVar[None] = None
+    order = 5
+    evaluations = None
+    family = "runge-kutta"
+    citation = (
+        KIDGER
+        + """\
+@article{Kvaerno2004,
+  author = {Kv{\\ae}rn{\\o}, Anne},
+  title = {Singly diagonally implicit {Runge--Kutta} methods with an explicit first stage},
+  journal = {BIT Numerical Mathematics},
+  volume = {44},
+  number = {3},
+  pages = {489--502},
+  year = {2004}
+}
+"""
+    )

@@ -75,7 +75,7 @@ class Multiples(dx.AbstractStepSizeController):
         return True, t1, self.base + n * self.h, False, n, dx.RESULTS.successful
 
 
-class Resuming(dx.AbstractStepSizeController):
+class Resuming(dx.AbstractAdaptiveStepSizeController):
     """A controller that remembers the step it wanted, ends after ``limit`` steps, and sees underflow.
 
     Its state: the inner controller's state, the next step's length, steps accepted.
@@ -83,6 +83,9 @@ class Resuming(dx.AbstractStepSizeController):
 
     inner: Any
     limit: Any
+    rtol: Any  # those of the inner controller, which an implicit solver asks for
+    atol: Any
+    norm: Any
 
     def wrap(self, direction: Any) -> "Resuming":
         """Leave it as it is: time goes forward."""
@@ -294,7 +297,8 @@ def _plainly(
 
 def _adaptive(terms: Any, solver: Any, dim: int, n_par: int, split: bool) -> Solve:
     def controller(limit: Any, rtol: Any, atol: Any) -> Any:
-        return Resuming(dx.PIDController(rtol=rtol, atol=atol), limit)
+        inner = dx.PIDController(rtol=rtol, atol=atol)
+        return Resuming(inner, limit, rtol, atol, inner.norm)
 
     def begin(tau: Any, y: Any, par: Any, rtol: Any, atol: Any) -> Any:
         control = controller(1, rtol, atol)

@@ -146,7 +146,8 @@ class AdaptiveStepper(RestorableStepper):
         super().__init__(y, t)
         self._program, self._par = program, par
         self._tolerances = np.float64(program.method.rtol), np.float64(program.method.atol)
-        self._stats.rejections = self._stats.evaluations = 0
+        self._stats.rejections = 0
+        self._stats.evaluations = None if program.method.evaluations is None else 0
         self._begin(1)
 
     def _begin(self, sign: int) -> None:
@@ -191,8 +192,8 @@ class AdaptiveStepper(RestorableStepper):
         stats = self._stats
         stats.steps += accepted
         stats.rejections = (stats.rejections or 0) + rejected
-        work = (accepted + rejected) * self._program.method.evaluations
-        stats.evaluations = (stats.evaluations or 0) + work
+        if (each := self._program.method.evaluations) is not None:
+            stats.evaluations = (stats.evaluations or 0) + (accepted + rejected) * each
 
     def _ends(self, grid: Array) -> tuple[Array, Array]:
         states, t, y = np.empty((grid.size, self._y.size)), self._t, self._y

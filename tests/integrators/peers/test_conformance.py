@@ -2,7 +2,14 @@ import pytest
 import rebound
 
 import integrators.testing as testing
-from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
+from integrators.peers.diffrax.methods import (
+    Dopri8,
+    Kvaerno5,
+    LeapfrogMidpoint,
+    ReversibleHeun,
+    SemiImplicitEuler,
+    Tsit5,
+)
 from integrators.peers.heyoka.taylor import Taylor
 from integrators.peers.rebound import (
     BS,
@@ -46,6 +53,8 @@ CASES = [
     pytest.param(ReversibleHeun(h=0.01), testing.pendulum, marks=pytest.mark.slow),  # compiles
     pytest.param(Dopri8(h=0.05), testing.pendulum, marks=pytest.mark.slow),
     (Dopri8(rtol=1e-9, atol=1e-11), testing.pendulum),
+    pytest.param(Tsit5(rtol=1e-8, atol=1e-10), testing.pendulum, marks=pytest.mark.slow),
+    pytest.param(Kvaerno5(rtol=1e-6, atol=1e-8), testing.pendulum, marks=pytest.mark.slow),
     (DOP853(rtol=1e-9, atol=1e-12), testing.two_bodies),
     (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),
     (BDF(rtol=1e-7, atol=1e-9), testing.pendulum),
