@@ -15,9 +15,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from integrators.peers import load, rebound, scipy
-from integrators.peers.diffrax import methods as diffrax
-from integrators.peers.heyoka import taylor as heyoka
+from integrators import registry
+from integrators.peers import load
 from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, Trajectories
 from problems import emit
 from problems.problem import System
@@ -176,7 +175,7 @@ def _rebound(system: System, method: Any) -> Begin:
             chosen.adaptive_mode = mode
         if h:
             sim.dt = h
-        if name == "whfast":
+        if name in ("whfast", "saba"):
             chosen.safe_mode = 0
         if name == "whfast512":  # made for G = 1, and for many steps at a time
             unit, sim.G = sim.G**0.5, 1.0
@@ -292,7 +291,7 @@ def _scipy(system: System, method: Any) -> Begin:
             return matrix
 
         name = type(method).__name__
-        options = {"jac": jac} if name == "Radau" and entries is not None else {}
+        options = {"jac": jac} if method.implicit and entries is not None else {}
 
         def go(t_end: float) -> Any:
             return solve_ivp(f, (t0, t_end), y0, method=name, rtol=method.rtol, atol=method.atol, **options)
@@ -322,11 +321,7 @@ SCRIPTS: dict[str, tuple[Script, type[Program]]] = {
 }
 METHODS = {
     method.__name__: _alone(method)
-    for method in (
-        heyoka.Taylor,
-        *(rebound.IAS15, rebound.Leapfrog, rebound.WHFast, rebound.WHFast512),
-        *(diffrax.Dopri8, diffrax.ReversibleHeun, diffrax.LeapfrogMidpoint, diffrax.SemiImplicitEuler),
-        *(scipy.DOP853, scipy.Radau),
-    )
+    for method in map(registry.get, registry.names())
+    if method.library in SCRIPTS
 }
 """By the names of the methods; ``peers.alone:NAME`` in a campaign."""

@@ -25,13 +25,16 @@ for library in ("heyoka", "rebound", "diffrax"):
     pytest.importorskip(library)
 
 CAMPAIGN = load("peers")
-# Of diffrax's methods with a fixed step, which share their code and compile for seconds, one is enough.
-SLOW = ("LeapfrogMidpoint", "ReversibleHeun", "Dopri8(h=")
+# Of diffrax's methods, which share their code and compile for seconds, two are enough.
+SLOW = ("LeapfrogMidpoint", "ReversibleHeun", "Dopri8(h=", "Kvaerno5", "Tsit5")
 SHARE = 0.020033  # of the span: some fifty steps and more, but of the short ones, the last one shortened
 SHORT = (
     "cr3bp",
     "kepler(e=0.6, t_end=30.0)",
     "kepler(e=0.6, t_end=6.0)",
+    "kepler(e=0.6, t_end=12.0)",
+    "kepler(e=0.6, t_end=600.0)",
+    "outer_solar_system(t_end=1200.0)",
     "kepler(e=0.6, t_end=300.0)",
     "outer_solar_system(t_end=600.0)",
 )
