@@ -25,12 +25,22 @@ METHODS = {
     "Leapfrog": ("#86720c", "#dcc44a", "v"),
     "WHFast": ("#8a2160", "#ec86bf", "P"),
     "WHFast512": ("#8a2160", "#ec86bf", "*"),
+    "SABA": ("#8a2160", "#ec86bf", "D"),
+    "MERCURIUS": ("#8a2160", "#ec86bf", "<"),
+    "TRACE": ("#8a2160", "#ec86bf", ">"),
+    "EOS": ("#86720c", "#dcc44a", "<"),
+    "JANUS": ("#86720c", "#dcc44a", ">"),
+    "BS": ("#17753a", "#5fcf86", "v"),
     "SemiImplicitEuler": ("#6b4bb8", "#b79cff", "X"),
     "LeapfrogMidpoint": ("#6b4bb8", "#b79cff", "<"),
     "ReversibleHeun": ("#6b4bb8", "#b79cff", ">"),
     "Dopri8": ("#6b4bb8", "#b79cff", "p"),
+    "Tsit5": ("#6b4bb8", "#b79cff", "v"),
+    "Kvaerno5": ("#6b4bb8", "#b79cff", "P"),
     "DOP853": ("#55606b", "#b4bfca", "h"),
     "Radau": ("#55606b", "#b4bfca", "H"),
+    "BDF": ("#55606b", "#b4bfca", "d"),
+    "LSODA": ("#55606b", "#b4bfca", "s"),
     "Motion": ("#a8324a", "#ff8a9e", "8"),  # what is a property of the motion, not of a method
 }
 OTHERS = (("#a8324a", "#ff8a9e", "8"), ("#3d6b1f", "#a5d677", "8"), ("#7a4a1e", "#e0a46a", "8"))

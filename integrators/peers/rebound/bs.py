@@ -33,7 +33,7 @@ class BS(AdaptiveMethod):
 
     Notes
     -----
-    The last step before each sample is shortened onto it (``"land"``); ``"steps"`` gives its own steps. There
+    The last step before each sample is shortened onto it (``"land"``); ``"steps"`` gives the steps that it takes. There
     are no checkpoints: from one of REBOUND's files it does not go on bit for bit (9e-14 on a pendulum).
 
     Examples
