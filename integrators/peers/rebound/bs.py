@@ -33,8 +33,8 @@ class BS(AdaptiveMethod):
 
     Notes
     -----
-    The last step before each sample is shortened onto it (``"land"``); ``"steps"`` gives the steps that it takes. There
-    are no checkpoints: from one of REBOUND's files it does not go on bit for bit (9e-14 on a pendulum).
+    The last step before each sample is shortened onto it (``"land"``); ``"steps"`` gives those that it takes.
+    There are no checkpoints: from one of REBOUND's files it does not go on bit for bit (9e-14 on a pendulum).
 
     Examples
     --------
