@@ -150,6 +150,8 @@ class HBVMProgram(Compiled):
         )  # fmt: skip
         self._fixed = tables.fixed(self.constants)
         self._fresh: dict[bool, Context] = {}
+        self.vectors: dict[tuple[int, bool], Context] = {}
+        """Contexts of tangent vectors, by their number and whether they move parameters, to be copied."""
         parts = [self.field, kernel, self.fused, *(self.kept.code if self.kept else ())]
         self.from_cache = all(made.from_cache for made in parts if made is not None)
         self._workspace: Workspace | None = None

@@ -74,6 +74,8 @@ class Program(Protocol):
     kept: Kept | None
     projected: bool
 
+    vectors: dict[tuple[int, bool], Context]
+
     def contexts(self) -> tuple[Context, Context]: ...
     def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None: ...
     def scaled(self, h: float) -> dict[str, Array]: ...
@@ -174,7 +176,7 @@ class HBVMStepper(ABC):
         if self._vectors and self._vectors.fits(directions):
             self._vectors.put(directions.state)
         else:
-            self._vectors = Vectors(system, (self._context, self._side), directions)
+            self._vectors = Vectors(system, (self._context, self._side), directions, program.vectors)
             if self._implicit is not None:
                 self._vectors.solve_by(self._implicit)
         program.compile_seconds += binary.clock() - started

@@ -50,9 +50,18 @@ class Vectors:
         Of the trajectory, and for its partial steps; complete, with the start.
     directions : Directions
         The vectors at the start.
+    fresh : dict
+        Where contexts are kept that the next trajectory of the same program can copy.
     """
 
-    def __init__(self, system: System, contexts: tuple[Context, Context], directions: Directions):
+    def __init__(
+        self,
+        system: System,
+        contexts: tuple[Context, Context],
+        directions: Directions,
+        fresh: dict[tuple[int, bool], Context],
+    ):
+        self._fresh = fresh
         self._context = contexts[0]
         self.shape, self._parameters = directions.state.shape, directions.parameters
         dim, count = self.shape
@@ -92,6 +101,22 @@ class Vectors:
     def _follower(self, system: System, base: Context, chosen: Directions, moves: bool) -> Context:
         """Return the context of a group that follows one of the trajectory's."""
         shape, n = base.shape, chosen.state.shape[1]
+        if (n, moves) not in self._fresh:
+            self._fresh[n, moves] = self._made(system, base, n, moves)
+        made = self._fresh[n, moves].copy()
+        made.point(base.tables)
+        made.tolerance, made.log_rest, made.varying = base.tolerance, base.log_rest, base.varying
+        made.rate = FIRST_RATE
+        parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
+        made.par[:] = np.concatenate(parameters)
+        if shape.second:
+            made.velocity[: n * shape.rows] = np.tile(base.velocity[: shape.rows], n)
+        made.write(_laid_out(chosen.state, shape.rows))
+        return made
+
+    def _made(self, system: System, base: Context, n: int, moves: bool) -> Context:
+        """Return the context of n vectors, without what belongs to one trajectory."""
+        shape = base.shape
         c, rows = shape.constants, n * shape.rows
         field = compile_field(system, system.tangent(self._what, n, parameters=moves), c.lanes)
         halves = 2 if not shape.second and system.dof is not None else 1
@@ -101,15 +126,7 @@ class Vectors:
             system.n_par * (1 + n if moves else 1), block, np.arange(halves * n), c,
         )  # fmt: skip
         padded = -(-rows // 8) * 8 + -(-shape.rows // 8) * 8
-        made = Context(wider, base.tables, {"padded": padded})
-        made.tolerance, made.log_rest, made.varying = base.tolerance, base.log_rest, base.varying
-        made.rate = FIRST_RATE
-        parameters = [base.par, *chosen.parameters.T] if moves else [base.par]
-        made.par[:] = np.concatenate(parameters)
-        if shape.second:
-            made.velocity[:rows] = np.tile(base.velocity[: shape.rows], n)
-        made.write(_laid_out(chosen.state, shape.rows))
-        return made
+        return Context(wider, base.tables, {"padded": padded})
 
     def _pulls(self, system: System, chosen: Directions) -> Array | None:
         """Return the derivatives of the velocities relative to these, by row; ``None`` where they are 0."""
