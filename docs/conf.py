@@ -1,6 +1,7 @@
 """How Sphinx builds the site: `make docs`."""
 
 import os
+import re
 import sys
 import time
 from importlib.metadata import version as installed
@@ -36,7 +37,14 @@ templates_path = ["_templates"]
 # --- pages in MyST, executed where they have code cells ---
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-myst_substitutions = {"version": version, "year": time.strftime("%Y")}  # for pages that enable them
+_paper = (HERE.parent / "reports" / "paper" / "report.md").read_text(encoding="utf-8")
+_verdicts = re.findall(r"\*\*(\d+)\*\* ([a-z ]+?)(?= ·|\n)", _paper)  # counts and words
+myst_substitutions = {  # for pages that enable them
+    "version": version,
+    "year": time.strftime("%Y"),
+    "claims": sum(int(count) for count, _ in _verdicts),
+    **{words.replace(" ", "_"): count for count, words in _verdicts},
+}
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE / "_build" / "executed")
 nb_execution_timeout = 300
