@@ -353,5 +353,6 @@ def _no_reference_at_end(m: Measured) -> str:
     if m.reference is not None and not m.complete:
         return f"ended at t = {m.t_stop:.4g}"
     if m.reference is not None and (m.position_t.size == 0 or m.position_t[-1] != m.t[-1]):
-        return "the reference does not reach the end time"
+        ends = f"ends at t = {m.position_t[-1]:.6g}" if m.position_t.size else "has none of the run's times"
+        return f"the reference {ends}; nothing was compared after it"
     return _no_reference(m)

@@ -8,7 +8,17 @@ from hbvm_bench.measure.metrics import GUARD_TOLERANCE
 from hbvm_bench.store.records import Record
 from hbvm_bench.summaries.outcomes import disturbed
 from hbvm_bench.summaries.points import accurate, number, short_name
-from hbvm_bench.summaries.rows import GROUPS, format_metric, group_of, reached, reason_of, seconds, status_of
+from hbvm_bench.summaries.rows import (
+    APART,
+    GROUPS,
+    RANKED_BY,
+    format_metric,
+    group_of,
+    reached,
+    reason_of,
+    seconds,
+    status_of,
+)
 
 RIGHT = {"position_end": 1e-8, "energy_max": 1e-13}
 """The errors in the summary's question "who is fastest among those that are right?\""""
@@ -104,11 +114,16 @@ def summary(records: Sequence[Record]) -> list[str]:
     counted = {
         "on": "follow the trajectory to the end",
         "apart": "reach the end with a large position error",
-        "uncompared": "reach the end and have no reference solution",
+        "uncompared": "reach the end, where there is no reference solution",
         "off": "lost the symmetry or the energy",
         "ended": "did not reach the end",
     }
-    some = [f"{len(groups[key])} {words}" for key, words in counted.items() if groups[key] or key == "on"]
+    compared = groups["on"] or groups["apart"]
+    some = [
+        f"{len(groups[key])} {words}"
+        for key, words in counted.items()
+        if groups[key] or (key == "on" and compared)
+    ]
     sentences = [f"{cases}: {', '.join(some)}."]
     if ranked := _ranked([r for r in records if reached(r)], "position_end"):
         sentences.append(_best("Smallest position error at the end", ranked, "position_end"))
@@ -118,6 +133,14 @@ def summary(records: Sequence[Record]) -> list[str]:
             sentences.append(_best(f"Fastest of the {len(fast)} with {level}", fast, "warm_seconds"))
         elif any(r.timing for r in ranked):
             sentences.append(f"No timed case reaches {level}.")
+    elif part := _ranked(groups["uncompared"], "position_max"):
+        near = sum((number(record, "position_max") or 0.0) < APART for record in part)
+        why = part[0].result.metrics[RANKED_BY].why
+        sentences.append(
+            f"{why[0].upper()}{why[1:]}. Up to there, {near} of {len(part)} have a position error "
+            f"below {APART:g}."
+        )
+        sentences.append(_best("Smallest position error up to there", part, "position_max"))
     elif groups["uncompared"]:
         sentences.append(
             "This problem has no stored reference: positions are not measured, and nothing is ranked. "

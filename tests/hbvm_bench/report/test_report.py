@@ -19,7 +19,7 @@ from hbvm_bench.report.page import document
 from hbvm_bench.report.problem import part
 from hbvm_bench.report.write import write
 from hbvm_bench.store import archive
-from hbvm_bench.store.records import Timing
+from hbvm_bench.store.records import Timing, Value
 from hbvm_bench.store.store import Index, Store
 from problems.errors import InputError
 from tests.hbvm_bench import made_up_run
@@ -271,7 +271,26 @@ def test_without_a_reference_nothing_is_ranked(run):
     bare = msgspec.structs.replace(record, result=msgspec.structs.replace(record.result, metrics=metrics))
     said = words.summary([bare, bare])
     assert any("no stored reference" in sentence for sentence in said)
+    assert not any("follow the trajectory" in sentence for sentence in said)
     assert not any(sentence.startswith(("Smallest", "Fastest")) for sentence in said)
+
+
+def test_where_the_reference_ends_early_it_is_compared_up_to_there(run):
+    record = reading.records(run)[0]
+    away = Value(why="the reference ends at t = 120; nothing was compared after it")
+    said = []
+    for error in (1e-9, 0.4):
+        metrics = {**record.result.metrics, "position_end": away, "position_max": Value(value=error)}
+        result = msgspec.structs.replace(record.result, metrics=metrics)
+        said.append(msgspec.structs.replace(record, result=result))
+    first, second, best = words.summary(said)
+    assert first == "2 cases: 2 reach the end, where there is no reference solution."
+    assert second == (
+        "The reference ends at t = 120; nothing was compared after it. "
+        "Up to there, 1 of 2 have a position error below 0.1."
+    )
+    assert best.startswith("Smallest position error up to there: ")
+    assert "1.0e-09" in best
 
 
 def test_of_an_ensemble_it_is_said_how_many_ends_are_known(run):
