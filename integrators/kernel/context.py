@@ -11,6 +11,7 @@ the vector field wants it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,14 @@ class Shape:
         """Length of the state."""
         return self.rows * (2 if self.second else 1)
 
+    @cached_property
+    def places(self) -> Integers:
+        """Where the components of (q, p), or of y, are in `Context.state`."""
+        if not self.second:
+            return np.arange(self.rows)
+        momenta = np.arange(self.rows) // 4 * 8 + np.arange(self.rows) % 4
+        return np.concatenate([momenta + 4, momenta])
+
 
 class Context(Memory):
     """A trajectory: what is integrated and how, tables, stages, the state, and how far it is.
@@ -137,9 +146,11 @@ class Context(Memory):
     # address of what writes the gradient of the energy and then the energy itself, called like the field with
     # eight stages; 0: no projection. See `step.projection`.
     energy_code = Integer()
-    energy = Real()  # that of the start, which steps end with
+    energy = Real()  # that of the start, which steps end with,
+    energy_scale = Real()  # and the inverse of how much of it the components make there
     energy_rows = Integer()  # rows of what it writes: one more than the state has; 0: no projection
     energy_width = Integer()  # components of a block of the state
+    energy_places = Array(of=int)  # where the components of (q, p) or y are in `state`
     energy_state = Array("energy_rows", 8)
     energy_found = Array("energy_rows", 8)
     rows = Integer()  # components of a stage: dof in second-order form, dim in first-order form
@@ -367,20 +378,11 @@ class Context(Memory):
 
     def read(self) -> Numbers:
         """Return a copy of the state, as (q, p) or y; shape (dim,)."""
-        state, rows = self.state, self.shape.rows
-        if not self.shape.second:
-            return state[:rows].copy()
-        places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
-        return state[np.concatenate([places + 4, places])]
+        return self.state[self.shape.places]
 
     def write(self, y: Numbers) -> None:
         """Set the state, given as `read` returns it."""
-        rows = self.shape.rows
-        if not self.shape.second:
-            self.state[:rows] = y
-            return
-        places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
-        self.state[np.concatenate([places + 4, places])] = y
+        self.state[self.shape.places] = y
 
     @property
     def tables(self) -> dict[str, Numbers]:
@@ -398,7 +400,7 @@ class Context(Memory):
         if self.shape.second:
             rows = self.shape.rows
             kh = h * self.velocity[:rows]
-            places = np.arange(rows) // 4 * 8 + np.arange(rows) % 4
+            places = self.shape.places[rows:]
             self.row_factor[:rows] = kh
             self.drift_factor[places] = kh
             self.kick_factor[places + 4] = kh

@@ -514,6 +514,7 @@ class AdaptiveProgram(HBVMProgram):
         if self._energy:
             context.energy_code = self._energy.address
             context.energy_width = width_of_blocks(self.system)
+            context.point({"energy_places": self.shape.places})
             context.tolerance = max(PART_OF_TOLERANCE * self.tol, TOLERANCE)
             context.log_rest = max(math.log2(context.tolerance), LOG_REST_VARYING)
         context.trusted = min(TRUSTED * context.tolerance, MOST_TRUSTED)

@@ -125,7 +125,7 @@ class HBVMStepper(ABC):
         "length_limit", "kinks", "kink_end", "doubt_end",
         "border", "border_ahead", "behind_time", "behind_low",
         "landing", "on_surface", "surface", "length_wanted", "behind_on_surface",
-        "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy",
+        "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy", "energy_scale",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (
         "state", "error", "next_state", "next_error", "values", "older_values", "strict", "floored",

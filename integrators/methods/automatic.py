@@ -63,13 +63,12 @@ MOST, LENGTH_PER_DEGREE = 14.0, 0.083
 # Systems of so many rows are as likely as not to have modes so fast that the iteration limits the steps.
 MANY_ROWS = 16
 
-
 LOOSE = 1e-10
 """With a projection of the energy HBVM(8, 7) is the cheaper one from this tolerance on.
 
-Its cost relative to `HBVM()`, median of the nine problems of `automatic`: 0.40 at 1e-3, 0.54 at 1e-6, 0.69 at
-1e-9 (HBVM(16, 14): 0.80), 1.02 at 1e-12 (0.89). HBVM(8, 5), (8, 6), (16, 10) and (16, 12) cost more than the
-better of the two."""
+Its cost relative to `HBVM()` without AVX-512, median of the nine problems of `automatic`: 0.45 at 1e-3, 0.60
+at 1e-6, 0.78 at 1e-9; that of HBVM(16, 14) 0.80 at 1e-9 and 0.85 at 1e-12. HBVM(8, 5), (8, 6), (16, 10) and
+(16, 12) cost more than the better of the two."""
 
 
 def choose_projected(tol: float) -> tuple[int, int, None]:

@@ -18,7 +18,7 @@ from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
-from integrators.kernel.step.projection import measure_energy
+from integrators.kernel.step.projection import take_energy
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.sample import dimension, followed, read, sample, vectors_of_state, write
 from integrators.kernel.step.surfaces import find_surface
@@ -168,7 +168,7 @@ def reset(ctx, start):
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
     if ctx.energy_code:
-        ctx.energy = measure_energy(ctx, ctx.state, ctx.error)
+        take_energy(ctx)
     set_factors(ctx, ctx.h)
     ctx.length = ctx.older_length = 0.0
     ctx.n = ctx.age = ctx.free = ctx.made = 0

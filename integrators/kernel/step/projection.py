@@ -11,65 +11,68 @@ the units; again until the rest is rounding. What the change rounds away goes to
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.lanes import two_sum
 from integrators.kernel.simd.memory import call_field, put, splat8
+from integrators.kernel.step.rule import SMALLEST
 
 MOST_CORRECTIONS = 5
-# A relative change of the state after which the energy is right to rounding: what is left is of its square.
-SMALL = 1e-8
+# The square of a relative change of the state after which the energy is right to rounding: what is left is of
+# this size.
+SMALL = 1e-16
 
 
 @compiled
-def place(ctx, i):
-    """Return where component i of (q, p) or y is in `Context.state`."""
-    if ctx.second == 0:
-        return i
-    d = i if i < ctx.rows else i - ctx.rows
-    return 8 * (d // 4) + d % 4 + (4 if i < ctx.rows else 0)
-
-
-@compiled
-def measure_energy(ctx, state, error):
-    """Set `Context.energy_found` at a state; return its energy."""
-    last = ctx.energy_rows - 1
-    given, found = ctx.energy_state, ctx.energy_found
-    for i in range(last):
-        put(given, 8 * i, splat8(state[place(ctx, i)]))
+def evaluate_energy(ctx, state):
+    """Set `Context.energy_found` to the gradient at a state, and then the energy; return that."""
+    rows = ctx.energy_rows - 1
+    places, given, found = ctx.energy_places, ctx.energy_state, ctx.energy_found
+    for i in range(rows):
+        put(given, 8 * i, splat8(state[places[i]]))
     call_field(ctx.energy_code, ctx.times, given, ctx.par, found)
-    low = 0.0
-    for i in range(last):
-        low += found[8 * i] * error[place(ctx, i)]
-    return found[8 * last] + low
+    return found[8 * rows]
 
 
 @compiled
 def block_size(ctx, first):
-    """Return the size of the block of the next state whose first component is given."""
-    size = 0.0
+    """Return the size of the block that begins at a component, in the state that is evaluated."""
+    given, size = ctx.energy_state, 0.0
     for i in range(first, first + ctx.energy_width):
-        size = max(size, abs(ctx.next_state[place(ctx, i)]))
+        size = max(size, abs(given[8 * i]))
     return size
 
 
 @compiled
+def take_energy(ctx):
+    """Let steps end with the energy of the present state, and take how much of it the components make."""
+    ctx.energy = evaluate_energy(ctx, ctx.state)
+    top = 0.0
+    for i in range(ctx.energy_rows - 1):
+        first = i - i % ctx.energy_width
+        top = max(top, block_size(ctx, first) * abs(ctx.energy_found[8 * i]))
+    ctx.energy_scale = 1.0 / top if top > SMALLEST else 1.0
+
+
+@compiled
 def project_onto_energy(ctx):
-    """Move the next state to the energy `Context.energy`; leave it where it is not moved by that."""
-    dim, width = ctx.energy_rows - 1, ctx.energy_width
-    slope, state, error = ctx.energy_found, ctx.next_state, ctx.next_error
+    """Move the next state to the energy `Context.energy`; leave it where its energy cannot be changed so."""
+    rows, width, scale = ctx.energy_rows - 1, ctx.energy_width, ctx.energy_scale
+    places, slope, state, error = ctx.energy_places, ctx.energy_found, ctx.next_state, ctx.next_error
     for _ in range(MOST_CORRECTIONS):
-        gap = measure_energy(ctx, state, error) - ctx.energy
+        gap = evaluate_energy(ctx, state) - ctx.energy
         steepness = 0.0
-        for first in range(0, dim, width):
+        for first in range(0, rows, width):
             size = block_size(ctx, first)
             for i in range(first, first + width):
-                slope[8 * i] *= size
-                steepness += slope[8 * i] * slope[8 * i]
-                slope[8 * i] *= size
-        factor = -gap / steepness if steepness > 0.0 else 0.0
-        if not abs(factor) * steepness**0.5 < 1.0:
+                gap += slope[8 * i] * error[places[i]]
+                weighted = size * (slope[8 * i] * scale)
+                steepness += weighted * weighted
+                slope[8 * i] = size * weighted
+        gap *= scale
+        if not gap * gap < steepness:  # the change would be as large as the state; or it is not a number
             return
-        for i in range(dim):
-            j = place(ctx, i)
+        factor = -gap / steepness
+        for i in range(rows):
+            j = places[i]
             new, lost = two_sum(state[j], factor * slope[8 * i] + error[j])
             state[j] = new
             error[j] = lost
-        if abs(factor) * steepness**0.5 <= SMALL:
+        if gap * gap <= SMALL * steepness:
             return

@@ -122,7 +122,7 @@ def part_step(ctx, side, part, known):
     else:
         predict(side, ctx, ctx.length, 1.0)
     side.rescaled = ctx.rescaled
-    side.energy = ctx.energy
+    side.energy, side.energy_scale = ctx.energy, ctx.energy_scale
     if ctx.rescaled:
         for b in range(ctx.block_count):
             side.expected[b] = ctx.expected[b]
