@@ -172,6 +172,8 @@ class Solutions(Trajectories):
         """Of each trajectory, the sentences that `integrators.Solution.warnings` would have."""
         problem = self.problem
         caveat, conserved = self.method.caveat(problem), self.method.conserved(problem.system)
+        if any(found.after is not None for one in self.events for found in one.values()):
+            conserved = {}  # the events' actions may change it
         lost = lost_invariants(
             problem.system, conserved, self.starts, self._times, self.y, self.par, self.steps
         )
@@ -313,7 +315,8 @@ class Solutions(Trajectories):
             found = [one.get(name) for one in self.events]
             lengths = np.array([0 if hits is None else len(hits) for hits in found], dtype=np.int64)
             arrays[f"event_counts:{name}"] = lengths
-            for key in ("t", "y", "direction"):
+            acts = any(hits is not None and hits.after is not None for hits in found)
+            for key in ("t", "y", "direction", *(["after"] if acts else [])):
                 parts = [getattr(hits, key) for hits in found if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
         if self.variations is not None:
@@ -418,5 +421,8 @@ def _events(
             raise TypeError(f"the times of {shown(name)} are not as many as its counts")
         ends = np.cumsum(counts)
         for i, (low, high) in enumerate(zip(ends - counts, ends, strict=True)):
-            found[i][name] = Occurrences(whole.t[low:high], whole.y[low:high], whole.direction[low:high])
+            after = None if whole.after is None else whole.after[low:high]
+            found[i][name] = Occurrences(
+                whole.t[low:high], whole.y[low:high], whole.direction[low:high], after
+            )
     return found

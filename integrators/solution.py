@@ -47,11 +47,14 @@ class Occurrences:
         States there: ends of steps of solved length.
     direction : ndarray of int, shape (n,)
         1 where g rises, -1 where it falls, 0 where it touches zero and turns back.
+    after : ndarray, shape (n, dim), optional
+        What the event's action has made of the states; ``None`` for an event without one.
     """
 
     t: Array
     y: Array
     direction: NDArray[np.int64]
+    after: Array | None = None
 
     def __len__(self) -> int:
         return self.t.size
@@ -185,6 +188,7 @@ class Solution:
             vectors = np.concatenate([first, self.variations])
             states = np.concatenate([states, vectors.reshape(len(vectors), -1)], axis=1)
         end = float(at[-1])
+        at, states = self._with_actions(at, states)
         if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
             end = self.t_stop  # a terminal event, after the last sample
         sign = 1.0 if end >= self.problem.t0 else -1.0
@@ -238,6 +242,18 @@ class Solution:
         found[own] = states[sample[own]]
         return found[places.reshape(times.shape)]
 
+    def _with_actions(self, at: Array, states: Array) -> tuple[Array, Array]:
+        """Return samples, and the states that events' actions have made in between, in order."""
+        acted = [found for found in self.events.values() if found.after is not None and found.t.size]
+        if not acted:
+            return at, states
+        sign = 1.0 if self.t_stop >= self.problem.t0 else -1.0
+        # At one time the sample counts, or else the state that the last of the events has made.
+        t = np.concatenate([at, *(found.t for found in acted[::-1])])
+        y = np.concatenate([states, *(found.after for found in acted[::-1] if found.after is not None)])
+        _, places = np.unique(sign * t, return_index=True)
+        return t[places], y[places]
+
     @cached_property
     def _program(self) -> Program:
         return self.method.compile(self.problem.system)
@@ -270,7 +286,8 @@ class Solution:
         said = warnings(problem, problem.y0, problem.par, end, self.method.caveat(problem), extra)
         if failure := extra.get("checkpoint"):
             said = (*said, failure)
-        conserved = {} if extra.get("sample") == "dense" else self.method.conserved(problem.system)
+        acted = any(found.after is not None for found in self.events.values())
+        conserved = {} if acted or extra.get("sample") == "dense" else self.method.conserved(problem.system)
         lost = lost_invariants(
             problem.system, conserved, problem.y0[None], self.t, self.y[None], problem.par[None],
             np.array([self.stats.steps]),
@@ -391,7 +408,9 @@ class Solution:
         if self.directions is not None:
             arrays["directions_state"], arrays["directions_parameters"] = self.directions
         for name, found in self.events.items():
-            arrays |= {f"event_{key}:{name}": value for key, value in vars(found).items()}
+            arrays |= {
+                f"event_{key}:{name}": value for key, value in vars(found).items() if value is not None
+            }
         words = {
             "format": FORMAT,
             "problem": packed_problem(self.problem, arrays),
@@ -505,7 +524,11 @@ def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occu
     if direction.dtype.kind != "i" or direction.shape != t.shape:
         raise TypeError(f"the directions of {shown(name)} are not as many as its times")
     n = np.size(t)
-    return Occurrences(doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64))
+    after = arrays.get(f"event_after:{name}")
+    return Occurrences(
+        doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64),
+        None if after is None else doubles(after, (n, dim), "after"),
+    )  # fmt: skip
 
 
 def _variations(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> Array | None:

@@ -51,6 +51,11 @@ class Event(CheckedOptions):
         time), -1: only where it falls, 0: everywhere, also where g touches zero.
     terminal : bool or int
         True: the integration ends at the first occurrence; a number n: at the n-th.
+    then : callable, optional
+        What happens to the state: a function of the same arguments, at the time of the event, that returns
+        the new state, a list of dim numbers (q then p): a bounce, a kick, a merging. It is traced once and
+        compiled, or else called with numbers, which costs some 30 µs. The integration goes on from there.
+        For the adaptive steps of `HBVM` and `Gauss`.
     name : str, optional
         What it is called in the solution; the function's own name by default.
 
@@ -63,7 +68,8 @@ class Event(CheckedOptions):
     --------
     >>> from integrators import Event
     >>> Event(lambda q: q[0], direction=1)
-    Event(g=<function ...>, direction=1, terminal=False, name=None)
+    Event(g=<function ...>, direction=1, terminal=False, then=None, name=None)
+    >>> bounce = Event(lambda q: q[0], direction=-1, then=lambda q, p: [q[0], -0.9 * p[0]])
     """
 
     _owner: ClassVar[str | None] = "an event"
@@ -72,11 +78,14 @@ class Event(CheckedOptions):
     _: KW_ONLY
     direction: Annotated[int, _Direction()] = 0
     terminal: Annotated[bool | int, _Count()] = False
+    then: Callable[..., Any] | None = None
     name: Annotated[str, Must("a text", lambda name: name)] | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.g):
             raise InputError(f"an event needs a function g, not {shown(self.g)}.")
+        if self.then is not None and not callable(self.then):
+            raise InputError(f"then={shown(self.then)} of an event must be a function of the state.")
         super().__post_init__()
 
     @property

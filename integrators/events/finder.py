@@ -43,13 +43,19 @@ class Hits:
     def __init__(self, events: Mapping[str, Event], sign: float, dim: int):
         self.names, self.sign, self._dim = list(events), sign, dim
         self._limits = [event.last for event in events.values()]
-        self._pieces: list[tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
+        self._acts = [event.then is not None for event in events.values()]
+        self._pieces: list[tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]] = []
         self.counts = [0] * len(self.names)
         self.terminal: str | None = None
         self.stop = float("nan")
 
-    def take(self, t: Array, y: Array, event: NDArray[np.int64], direction: NDArray[np.int64]) -> None:
-        """Take what has happened since the last time; what was after a terminal event has not."""
+    def take(
+        self, t: Array, y: Array, after: Array, event: NDArray[np.int64], direction: NDArray[np.int64]
+    ) -> None:
+        """Take what has happened since the last time; what was after a terminal event has not.
+
+        States are those before and ``after`` an event's action, the same where it has none.
+        """
         order = np.argsort(self.sign * t, kind="stable")
         if self.terminal is not None:
             return
@@ -63,7 +69,7 @@ class Hits:
         if self.terminal is not None:
             self.stop = float(t[order[-1]])
         if order.size:
-            self._pieces.append((t[order], y[order], event[order], direction[order]))
+            self._pieces.append((t[order], y[order], after[order], event[order], direction[order]))
 
     @property
     def reason(self) -> str:
@@ -72,18 +78,19 @@ class Hits:
 
     def occurrences(self) -> dict[str, Occurrences]:
         """Return what has happened, by the events' names."""
-        t, y, event, direction = self._joined()
+        t, y, after, event, direction = self._joined()
         found = {}
         for i, name in enumerate(self.names):
             own = event == i
-            found[name] = Occurrences(t[own], y[own], direction[own])
+            made = after[own] if self._acts[i] else None
+            found[name] = Occurrences(t[own], y[own], direction[own], made)
         return found
 
-    def _joined(self) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
-        none = np.empty(0, dtype=np.int64)
-        pieces = [*self._pieces, (np.empty(0), np.empty((0, self._dim)), none, none)]
-        t, y, event, direction = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        return t, y, event, direction
+    def _joined(self) -> tuple[Array, Array, Array, NDArray[np.int64], NDArray[np.int64]]:
+        none, nowhere = np.empty(0, dtype=np.int64), np.empty((0, self._dim))
+        pieces = [*self._pieces, (np.empty(0), nowhere, nowhere, none, none)]
+        t, y, after, event, direction = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return t, y, after, event, direction
 
     def save(self) -> dict[str, Any]:
         """Return everything, for `load`."""
@@ -174,6 +181,11 @@ class Ending:
         return int(np.count_nonzero(search.hits.sign * (times - self.stop) <= 0.0))
 
 
+def program_acts(program: Any) -> bool:
+    """Whether a program's trajectories can go on from a state that an event makes."""
+    return bool(getattr(program, "acts", False))
+
+
 def started_with_events(
     program: Any, method: MethodBase, problem: Problem, events: Mapping[str, Event]
 ) -> Callable[..., Any]:
@@ -184,6 +196,12 @@ def started_with_events(
     problems.errors.InputError
         If the method cannot find events, or a function cannot be used.
     """
+    acting = [name for name, event in events.items() if event.then is not None]
+    if acting and not program_acts(program):
+        raise InputError(
+            f"the event {acting[0]!r} changes the state, which {method!r} does not offer; use HBVM or Gauss "
+            "with an adaptive step size (tol=), or leave out then=."
+        )
     if not offers(program, Events):
         raise InputError(
             f"{method!r} cannot find events: it does not offer the states inside its steps that "

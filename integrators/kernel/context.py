@@ -29,9 +29,10 @@ Integers = NDArray[np.int64]
 # integral is to keep is no invariant. HALTED: a search for events has to be attended to before the next step.
 # UNSCALED: the step ahead does not become good enough however short it is, and the sizes that the blocks
 # will reach may say that it is. UNSEEN: a partial step sees what the step ahead has not. SLIDING: the field
-# pushes back to a switching surface from both sides.
+# pushes back to a switching surface from both sides. ACTS: an event in the step changes the state.
+# ACCUMULATE: such events come after ever shorter times.
 RUNNING, DONE, DIVERGED, NOT_FINITE, BUDGET, UNDERFLOW, SCATTERED, NOT_KEPT, HALTED = range(9)
-UNSCALED, UNSEEN, SLIDING = 9, 10, 11
+UNSCALED, UNSEEN, SLIDING, ACTS, ACCUMULATE = range(9, 14)
 
 # How states between steps are made.
 SIDE, LAND, DENSE = range(3)
@@ -52,6 +53,10 @@ VALUES, END, ARRIVE = range(3)
 # What vectors follow; see `Context.follow`: a solved STEP, a sample at the present STATE, or at the end of a
 # solved PART, and the present state's LANDING there.
 STEP, STATE, PART_END, LANDING = range(4)
+
+# What the search for events is asked for at the end of a step that such an event ends: to CHANGE the state,
+# and to BEGIN_ANEW from there.
+CHANGE, BEGIN_ANEW = 1, 2
 
 KINKS_KEPT = 64
 MOST_SIDES = 1 + MOST  # rows of what tells the sides of switching surfaces
@@ -260,6 +265,14 @@ class Context(Memory):
     left = Integer()  # steps of these that are left
     look = Integer()  # address of int64(context, memory), which looks for events in each step; 0: none
     look_memory = Integer()
+    acts = Integer()  # 1: some of these change the state; then steps end there, see `step.act`
+    seen = Integer()  # 1: the solved step has been looked at
+    acting = (
+        Integer()
+    )  # what an event that ends the solved step asks for: CHANGE, BEGIN_ANEW; 0: none ends it
+    act_time = Real()  # when
+    length_before = Real()  # of the step before it was ended there
+    acted = Real()  # when such an event happened last; infinite: never
     follow = Integer()  # address of int64(what, context, memory), which vectors follow the steps by; 0: none
     follow_memory = Integer()
 

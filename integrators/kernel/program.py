@@ -14,7 +14,7 @@ from integrators.kernel.batch import Batch, prepare_batch
 from integrators.kernel.context import ALWAYS_IMPLICIT, Context, Shape, blocks, width_of_blocks
 from integrators.kernel.ensemble.prepared import Lanes, lanes_of
 from integrators.kernel.events.engine import look
-from integrators.kernel.events.functions import EventFunction
+from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.fixed import FixedStepper
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import SOLVERS, Workspace, linearization
@@ -209,12 +209,17 @@ class HBVMProgram(Compiled):
         """
         started = binary.clock()
         functions = [EventFunction(name, event.g, problem) for name, event in events.items()]
+        actions = {
+            name: Action(name, event.then, problem)
+            for name, event in events.items()
+            if event.then is not None
+        }
         look.code()
         self.compile_seconds += binary.clock() - started
 
         def start(y0: ArrayLike, par: ArrayLike | None, t0: float, end: float) -> HBVMStepper:
             stepper = self.start(y0, par, t0)
-            stepper.look_for(events, functions, end)
+            stepper.look_for(events, functions, actions, end)
             return stepper
 
         return start
@@ -463,6 +468,11 @@ class AdaptiveProgram(HBVMProgram):
         made = fields.compile_field(self.system, what, ENERGY_LANES)
         self.from_cache = self.from_cache and made.from_cache
         return made
+
+    @property
+    def acts(self) -> bool:
+        """Whether an event may change the state: nothing is conserved that it would change."""
+        return self.kept is None
 
     def _sizes(self, atol: float | Sequence[float] | None) -> Array:
         """Return an absolute tolerance as sizes that ``tol`` is relative to, one for each block."""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from integrators.events.event import Event
 from integrators.kernel.adjoint.gradient import Adjoint, Records
 from integrators.kernel.context import (
+    ACCUMULATE,
     ALWAYS_IMPLICIT,
     AUTO,
     BUDGET,
@@ -27,7 +28,7 @@ from integrators.kernel.context import (
     SCATTERED,
     Context,
 )
-from integrators.kernel.events.functions import EventFunction
+from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.search import KernelSearch
 from integrators.kernel.implicit import engine as solver_engine
 from integrators.kernel.implicit.workspace import Solver, Workspace, report
@@ -124,6 +125,7 @@ class HBVMStepper(ABC):
         "error_behind", "error_ahead", "defect_behind", "defect_ahead",
         "length_limit", "kinks", "kink_end", "doubt_end",
         "border", "border_ahead", "behind_time", "behind_low",
+        "seen", "acting", "act_time", "length_before", "acted",
         "landing", "on_surface", "surface", "length_wanted", "behind_on_surface",
         "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy", "energy_scale",
     )  # fmt: skip
@@ -160,10 +162,13 @@ class HBVMStepper(ABC):
             self._take_implicit()
         self._begin(y, t0)
 
-    def look_for(self, events: Mapping[str, Event], functions: Sequence[EventFunction], end: float) -> None:
+    def look_for(
+        self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
+        end: float,
+    ) -> None:  # fmt: skip
         """Look for events in all steps from here on, up to a time."""
         contexts, code = (self._context, self._side), steps.code().address
-        self.search = KernelSearch(events, functions, contexts, code, end)
+        self.search = KernelSearch(events, functions, actions, contexts, code, end)
         self._pace = Pace(CHUNK_WITH_EVENTS, self._dim)
         self._pace.steps = FEWEST
 
@@ -558,7 +563,15 @@ class HBVMStepper(ABC):
                 f"h = {self._context.h!r}; take a smaller h."
             )
         if outcome == HALTED and self.search is not None:
+            if self.search.trouble is not None:
+                status, reason, self.error = self.search.trouble
+                return status, reason
             return Status.EVENT, self.search.hits.reason
+        if outcome == ACCUMULATE:
+            return Status.STALLED, (
+                f"events that change the state accumulate at t = {self.t!r}: the times between them become "
+                "too short to be told from none, or the state stays where the event happens."
+            )
         return failure(outcome, self._program, (self._context, self._side), self.t, self._solver)
 
 

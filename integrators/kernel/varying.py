@@ -21,7 +21,7 @@ from integrators.kernel.context import (
     Context,
 )
 from integrators.kernel.native import engine
-from integrators.kernel.step.rule import FIRST_AT_REST, SCALE_LASTS
+from integrators.kernel.step.rule import FIRST_AT_REST, RESTART, SCALE_LASTS
 from integrators.kernel.stepper import Ended, HBVMStepper, Program
 from integrators.options import SHORTEST, SMALLEST
 from integrators.protocol import Array, Samples, Status
@@ -32,7 +32,6 @@ LOOK_AHEAD = 2000  # steps of the look ahead, at most
 MOST_COMPARED = 20000  # of each of the trajectories that tell how errors grow: longer ones tell nothing
 LARGER = 1e3  # times as large as a block is, at least, what it will reach is worth knowing
 NOISE = 1e-12  # part of what it will reach, for what its growth leaves, that a field's rounding may come to
-RESTART = 256 * SHORTEST  # of the time: a step after a breakpoint is tried with this length at least
 
 
 class VaryingProgram(Program, Protocol):

@@ -144,6 +144,9 @@ def integrate(
     grid = _grid(problem, times)
     wanted = wanted_events(events, sample)
     end = float(check_times(grid, problem.t0)[-1]) if grid.size or wanted else problem.t0
+    acting = any(event.then is not None for event in wanted.values())
+    if acting and variations is not None:
+        raise InputError("variations do not go on past an event with then=; leave out one of them.")
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
         belongs = identity(problem, method, grid, sample, wanted, variations)
@@ -196,7 +199,7 @@ def integrate(
                 made += count if sample == "steps" else samples.t.size
             if watch is not None:
                 stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
-                if watch.due and samples.t.size and sample != "dense":
+                if watch.due and samples.t.size and sample != "dense" and not acting:
                     lost = _lost(problem, method, samples, stats.steps) | lost
                 if watch.keeps:
                     t, y = [np.concatenate(t)], [np.concatenate(y)]

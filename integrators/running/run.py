@@ -158,8 +158,13 @@ class Run:
             return np.concatenate([getattr(one[name], what) for one in found])
 
         return {
-            name: Occurrences(joined(name, "t"), joined(name, "y"), joined(name, "direction"))
-            for name in self._wanted
+            name: Occurrences(
+                joined(name, "t"),
+                joined(name, "y"),
+                joined(name, "direction"),
+                None if event.then is None else joined(name, "after"),
+            )
+            for name, event in self._wanted.items()
         }
 
     def step(self) -> Status:

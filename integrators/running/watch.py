@@ -161,6 +161,7 @@ def identity(
         "sample": str(sample),
         "events": ", ".join(
             f"{name} {code_digest(event.g, event.direction, str(event.last))}"
+            + ("" if event.then is None else f" {code_digest(event.then, 0, 'then')}")
             for name, event in events.items()
         ),
     } | ({} if variations is None else {"variations": _digest(variations)})

@@ -201,7 +201,7 @@ class System:
     def _scalar(self, function: Callable[..., Any], what: str) -> Node:
         return self._node(self._call(function, what), function, what)
 
-    def trace(self, function: Callable[..., Any], what: str) -> Function:
+    def trace(self, function: Callable[..., Any], what: str, outputs: int | None = None) -> Function:
         """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
 
         Parameters
@@ -210,6 +210,8 @@ class System:
             Returns one number; its arguments are among ``t, q, p, y, par, m``.
         what : str
             What it is, for messages.
+        outputs : int, optional
+            So many numbers, in a list, and not one.
 
         Raises
         ------
@@ -218,7 +220,15 @@ class System:
         """
         graph = Graph(self.dof)
         value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
-        return function_of(graph, [arguments.scalar(value, graph=graph, function=function, what=what)])
+        if outputs is None:
+            values = [value]
+        elif arguments.is_list(value) and len(value) == outputs:
+            values = list(value)
+        else:
+            raise InputError(f"{what} must return a list of {outputs} numbers, the new state.")
+        return function_of(
+            graph, [arguments.scalar(one, graph=graph, function=function, what=what) for one in values]
+        )
 
     @property
     def separable(self) -> bool:

@@ -10,6 +10,7 @@ import pytest
 SCRIPTS = Path(__file__).parents[2] / "examples"
 
 SAYS = {
+    "bouncing_ball.py": ["by an event: each impact found: True to 1e-9: True", "us each"],
     "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
     "lattice.py": ["energy kept: True"],
     "ensemble.py": ["28% of 10000 orbits are chaotic"],

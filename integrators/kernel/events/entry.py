@@ -1,6 +1,7 @@
 """What the steps call when a step is solved: the one C function of the search for events."""
 
-from integrators.kernel.context import DONE, HALTED
+from integrators.kernel.context import CHANGE, DONE, HALTED
+from integrators.kernel.events.actions import begin_anew, change_state, end_step
 from integrators.kernel.events.chebyshev import keep_samples, keeps_away, refine, suspect, transform
 from integrators.kernel.events.memory import (
     FINEST,
@@ -10,8 +11,10 @@ from integrators.kernel.events.memory import (
     RAISED,
     START,
     TERMINAL,
+    TINY,
     UNRESOLVED,
     UNSOLVABLE,
+    WHOLE,
     Search,
 )
 from integrators.kernel.events.sample import (
@@ -40,7 +43,6 @@ LOST = 4.0  # times the rounding of one state: what many steps leave of a g that
 SHORTEST = 1e-6  # of a step is more than a unit in the last place of time: else there is no place inside
 SAME = 1e-5  # of a step: two touches as close are one
 ULP = 2.0**-52
-TINY = 2.0**-1000  # a sign without a size
 
 searching = view(Search)
 
@@ -52,6 +54,8 @@ def entry(address, memory):
     search.halted = GOING
     search.raised = 0
     set_start(ctx, search)
+    if search.mode == WHOLE and ctx.acting:
+        return change_state(ctx, search) if ctx.acting == CHANGE else begin_anew(ctx, search)
     if search.mode == START:
         begin(ctx, search)
         return HALTED if search.raised else DONE
@@ -62,11 +66,18 @@ def entry(address, memory):
     for event in range(search.count):
         search.touched_before[event] = search.touched[event]
     search.halted = look(ctx, search)
+    if ctx.acts and search.halted == GOING and search.room - search.hits < search.count:
+        search.halted = FULL
     if search.halted != GOING:
         search.hits = before  # what is known of a step is all or nothing
         for event in range(search.count):
             search.touched[event] = search.touched_before[event]
         return HALTED
+    if ctx.acts:
+        outcome = end_step(ctx, search, before)
+        if outcome == DONE:
+            keep_ends(search)
+        return outcome
     return close(search, before)
 
 
@@ -114,15 +125,21 @@ def begin(ctx, search):
 @compiled
 def close(search, before):
     """Count what has happened; return HALTED at the last occurrence of a terminal event."""
-    for event in range(search.count):
-        search.ends[event] = search.sampled[FINEST * event + search.degree - 1]
-    search.known = search.stop
+    keep_ends(search)
     for i in range(before, search.hits):
         event = search.hit_events[i]
         search.happened[event] += 1
         if search.happened[event] == search.limits[event]:
             search.halted = TERMINAL
     return DONE if search.halted == GOING else HALTED
+
+
+@compiled
+def keep_ends(search):
+    """Keep what is known at the end of what was looked at."""
+    for event in range(search.count):
+        search.ends[event] = search.sampled[FINEST * event + search.degree - 1]
+    search.known = search.stop
 
 
 @compiled

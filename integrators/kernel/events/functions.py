@@ -85,11 +85,7 @@ class EventFunction:
         return SimpleNamespace(**self._system.unpack(par))
 
     def _evaluate(self, t: float, y: Any, par: SimpleNamespace) -> Any:
-        dof = self._system.dof
-        offered: dict[str, Any] = {"t": t, "y": y, "par": par, "m": np}
-        if dof is not None:
-            offered |= {"q": y[:dof], "p": y[dof:]}
-        return self._g(*[offered[name] for name in self._wanted])
+        return _called(self._g, self._wanted, self._system.dof, t, y, par)
 
     def _call(self, t: int, states: int, par: int, values: int) -> None:
         """Evaluate state by state; equal ones that follow each other only once."""
@@ -111,6 +107,89 @@ class EventFunction:
         except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
             self._raised.error = error
             _numbers(values, LANES + 1)[LANES] = 1.0
+
+
+class Action:
+    """What an event makes of the state, for one system: a function like `EventFunction`, of dim numbers.
+
+    Parameters
+    ----------
+    name : str
+        Of the event, for messages.
+    then : callable
+        The function.
+    problem : Problem
+        What it is a function of the states of.
+
+    Attributes
+    ----------
+    address : int
+        Of the C function; the state in the first lane is the one that counts.
+
+    Raises
+    ------
+    problems.errors.InputError
+        If it can neither be traced nor called with numbers, or does not return a state.
+    """
+
+    def __init__(self, name: str, then: Callable[..., Any], problem: Problem):
+        self._system, self._raised = problem.system, _Raised()
+        what = f"then of event {name!r}"
+        try:
+            traced = problem.system.trace(then, what, problem.system.dim)
+        except InputError as refused:
+            self._then, self._wanted, self._what = then, _wanted(then, refused), what
+            with np.errstate(all="ignore"):
+                try:
+                    self._made(problem.t0, problem.y0.copy(), problem.par.copy())
+                except InputError:
+                    raise
+                except Exception:
+                    raise refused from None
+            raised.expect_callbacks()
+            kind: Any = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)
+            self._alive = kind(self._call)
+            address = ctypes.cast(self._alive, ctypes.c_void_p).value
+            assert address is not None
+            self.address = address
+        else:
+            self.address = _compiled(traced).address
+
+    @property
+    def error(self) -> BaseException | None:
+        """What the function raised last in this thread, if Python runs it."""
+        return self._raised.error
+
+    def _made(self, t: float, y: Any, par: Any) -> Any:
+        parameters = SimpleNamespace(**self._system.unpack(par))
+        value = _called(self._then, self._wanted, self._system.dof, t, y, parameters)
+        state = np.asarray(value, dtype=np.float64)
+        if state.shape != (self._system.dim,):
+            raise InputError(f"{self._what} must return {self._system.dim} numbers, the new state.")
+        return state
+
+    def _call(self, t: int, states: int, par: int, values: int) -> None:
+        dim = self._system.dim
+        try:
+            if raised.kept() is not None:
+                _numbers(values, LANES * dim + 1)[LANES * dim] = 1.0
+                return
+            state = _numbers(states, LANES * dim)[::LANES].copy()
+            given = _numbers(par, self._system.n_par).copy()
+            _numbers(values, LANES * dim)[::LANES] = self._made(float(_numbers(t, 1)[0]), state, given)
+        except BaseException as error:  # also Ctrl-C: nothing passes through compiled code
+            self._raised.error = error
+            _numbers(values, LANES * dim + 1)[LANES * dim] = 1.0
+
+
+def _called(
+    function: Callable[..., Any], wanted: list[str], dof: int | None, t: float, y: Any, par: SimpleNamespace
+) -> Any:
+    """Return what a function makes of the arguments that it wants."""
+    offered: dict[str, Any] = {"t": t, "y": y, "par": par, "m": np}
+    if dof is not None:
+        offered |= {"q": y[:dof], "p": y[dof:]}
+    return function(*[offered[name] for name in wanted])
 
 
 class _Raised(threading.local):

@@ -6,6 +6,7 @@ FINE = 8  # places between two samples of a function where its zeros are looked 
 FINEST = 256  # samples in a step, or in a part of one, that are not exceeded
 PLACES = FINE * FINEST + 1
 ROOM = 3 * PLACES  # for marks and zeros, of which a place has three at most
+TINY = 2.0**-1000  # a sign without a size
 CACHED = 32  # states of a step that are remembered
 
 # What is looked at: the step that is solved, what of it there is up to a time, the start alone.
@@ -24,6 +25,9 @@ class Search(Memory):
     count = Integer()  # events
     functions = Array("count", of=int)  # addresses of void(times, states, par, values), on eight states
     directions = Array("count", of=int)  # 1, -1, or 0 for all
+    actions = Array("count", of=int)  # addresses of functions like those, that make a new state; 0: none
+    last = Real()  # the time up to which is looked, where some do
+    sign = Real()  # of the direction of time
     limits = Array("count", of=int)  # the occurrence that ends the integration; 0: none
     dim = Integer()
     terms = Integer()  # of the step's polynomial
@@ -54,8 +58,19 @@ class Search(Memory):
     hits = Integer()
     hit_times = Array()
     hit_states = Array()
+    hit_after = Array()  # states that the events' actions have made of these
     hit_events = Array(of=int)
     hit_directions = Array(of=int)
+
+    # --- events that change the state, or end it all, at the end of the step; see `events.actions` ---
+    due = Array("count", of=int)  # 1: it happens there
+    due_directions = Array("count", of=int)
+    values_before = Array("count")  # of the functions, before the state is changed
+    new_state = Array("dim")
+    made = Array(
+        "made_rows", 8
+    )  # a new state, in columns; the first of the last row: 1 where making it has raised
+    made_rows = Integer()
 
     # --- how it stands ---
     mode = Integer()  # WHOLE, PART or START

@@ -11,7 +11,7 @@ from integrators.events.event import Event
 from integrators.events.finder import Hits
 from integrators.kernel.context import DONE, Context
 from integrators.kernel.events.engine import look
-from integrators.kernel.events.functions import EventFunction
+from integrators.kernel.events.functions import Action, EventFunction
 from integrators.kernel.events.memory import (
     FINE,
     FINEST,
@@ -30,7 +30,7 @@ from integrators.protocol import Array, Status, UserError
 
 LEAST, MOST = 8, 16  # samples in a step to begin with; more where these do not show the function
 HITS, NUMBERS = 1024, 1 << 17  # occurrences, and components of their states, that are kept until Python asks
-LASTING = ("ends", "touched", "finite", "happened")
+LASTING = ("ends", "touched", "finite", "happened", "due", "due_directions")
 
 
 @lru_cache(maxsize=1)
@@ -65,6 +65,8 @@ class KernelSearch:
         What to look for.
     functions : sequence of EventFunction
         Theirs.
+    actions : mapping of str to Action
+        Of those that change the state.
     contexts : pair of Context
         Of the trajectory, and for partial steps; the solver of steps need not be there.
     steps : int
@@ -79,16 +81,17 @@ class KernelSearch:
     """
 
     def __init__(
-        self, events: Mapping[str, Event], functions: Sequence[EventFunction],
+        self, events: Mapping[str, Event], functions: Sequence[EventFunction], actions: Mapping[str, Action],
         contexts: tuple[Context, Context], steps: int, end: float,
     ):  # fmt: skip
-        self._functions = functions
+        self._functions, self._actions = functions, actions
         self._context, side = contexts
         self._dim, n = self._context.shape.dim, len(events)
         degree = 1 << (min(max(2 * self._context.s, LEAST), MOST) - 1).bit_length()
         numbers = {
             "count": n, "dim": self._dim, "degree": degree, "chunks": degree // 8, "terms": self._context.s,
-            "steps": steps, "own": self._context.address, "side": side.address,
+            "steps": steps, "own": self._context.address, "side": side.address, "made_rows": 1 + self._dim,
+            "last": end, "sign": 1.0 if end >= self._context.t0 else -1.0,
         }  # fmt: skip
         cosines, self._tables, transforms = _tables()
         self._memory = memory = Search(numbers, {"cosines": cosines, "transforms": transforms})
@@ -96,7 +99,8 @@ class KernelSearch:
         memory.functions[:] = [function.address for function in functions]
         memory.directions[:] = [event.direction for event in events.values()]
         memory.limits[:] = [event.last for event in events.values()]
-        self._hits = Hits(events, 1.0 if end >= self._context.t0 else -1.0, self._dim)
+        memory.actions[:] = [actions[name].address if name in actions else 0 for name in events]
+        self._hits = Hits(events, memory.sign, self._dim)
         self._make_room(max(8, min(HITS, NUMBERS // self._dim)))
         self.trouble: tuple[Status, str, Exception | None] | None = None
         if self._look(START) != DONE:
@@ -104,13 +108,14 @@ class KernelSearch:
             raise UserError(error) from error
         self._context.point({"look_memory": self._memory.words})  # keeps it alive
         self._context.look = look.code().address
+        self._context.acts, self._context.acted = int(bool(actions)), -memory.sign * np.inf
 
     def _make_room(self, room: int) -> None:
-        self._times, self._states = np.empty(room), np.empty((room, self._dim))
+        self._times, self._states, self._after = np.empty(room), *np.empty((2, room, self._dim))
         self._events, self._directions = np.empty((2, room), dtype=np.int64)
         self._memory.point(
             {
-                "hit_times": self._times, "hit_states": self._states,
+                "hit_times": self._times, "hit_states": self._states, "hit_after": self._after,
                 "hit_events": self._events, "hit_directions": self._directions,
             }
         )  # fmt: skip
@@ -125,7 +130,11 @@ class KernelSearch:
     @property
     def _error(self) -> Exception:
         """What a function has raised; Ctrl-C and the like are raised as they are."""
-        error = self._functions[self._memory.raised - 1].error
+        raised = self._memory.raised
+        if raised > 0:
+            error = self._functions[raised - 1].error
+        else:
+            error = self._actions[self._hits.names[-1 - raised]].error
         if isinstance(error, Exception):
             return error
         assert error is not None
@@ -140,6 +149,7 @@ class KernelSearch:
             self._make_room(2 * memory.room)
         if halted in (RAISED, UNRESOLVED, UNSOLVABLE):
             self._give_up(halted)
+            return not self._context.acts  # what an action would have changed is not known any more
         return halted != TERMINAL
 
     def _give_up(self, halted: int) -> None:
@@ -164,11 +174,15 @@ class KernelSearch:
     def hits(self) -> Hits:
         """What has happened."""
         n, self._memory.hits = self._memory.hits, 0
-        self._hits.take(self._times[:n], self._states[:n], self._events[:n], self._directions[:n])
+        self._hits.take(
+            self._times[:n], self._states[:n], self._after[:n], self._events[:n], self._directions[:n]
+        )
         return self._hits
 
     def finish(self, end: float) -> None:
         """Look at what there is of the step ahead, which is solved, up to a time."""
+        if self._context.acts:  # the step has been looked at when it was solved
+            return
         self._memory.goal = end
         while self._context.look and self._look(PART) != DONE and self.attend():
             pass

@@ -5,6 +5,7 @@ states at the ends of partial steps say where they are.
 """
 
 from integrators.kernel.events.chebyshev import NEAR
+from integrators.kernel.events.memory import TINY
 from integrators.kernel.events.sample import is_finite, sign
 from integrators.kernel.events.solve import (
     APART,
@@ -74,7 +75,7 @@ def find_lows(search, first, last):
     if last - first < 2:
         return
     turns = abs(p[0]) < corner or turns_between(search, 1, -BESIDE, search.places[1])
-    if first == 0 and abs(p[0]) < least and turns:
+    if first == 0 and TINY < abs(p[0]) < least and turns:  # a sign without a size has been looked at
         add_low(search, 0)
     for i in range(first + 1, last):
         size = abs(p[i])

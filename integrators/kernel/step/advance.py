@@ -39,7 +39,7 @@ def watched(ctx):
 @compiled
 def looked(ctx):
     """Look for events in the step ahead, and let vectors follow it, if anybody wants that; the outcome."""
-    outcome = call_look(ctx.look, ctx, ctx.look_memory) if ctx.look else DONE
+    outcome = call_look(ctx.look, ctx, ctx.look_memory) if ctx.look and ctx.acts == 0 else DONE
     if outcome == DONE and ctx.follow:
         outcome = call_follow(ctx.follow, STEP, ctx, ctx.follow_memory)
     return outcome

@@ -22,7 +22,7 @@ from integrators.kernel.simd.memory import get, put, splat8, sums, total
 from integrators.kernel.simd.operations import greatest, least, size, where
 from integrators.kernel.step.begin import prepare, set_step, start_plain
 from integrators.kernel.step.control import INFINITY, TINY
-from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, SMALLEST
+from integrators.kernel.step.rule import FIRST_AT_REST, NOTHING, RESTART, SMALLEST
 from integrators.kernel.step.stages import offset
 from integrators.kernel.step.sweep import evaluate
 
@@ -409,7 +409,7 @@ def first_length(ctx):
         rate = max(speed / position, (pull / position) ** 0.5)
     length = ctx.allowed_error ** (1.0 / (2.0 * ctx.error_degree + 1.0))
     ctx.restful = 0 if position > 0.0 and 0.0 < rate < INFINITY else 1
-    return length / rate if 0.0 < rate < INFINITY else length
+    return max(length / rate, RESTART * abs(ctx.t0)) if 0.0 < rate < INFINITY else length
 
 
 @compiled

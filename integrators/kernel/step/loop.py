@@ -13,6 +13,7 @@ from integrators.kernel.context import (
 from integrators.kernel.native.attributes import view
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import put, splat8
+from integrators.kernel.step.act import begin_events, change, end_at_action, length_after_action
 from integrators.kernel.step.advance import looked, step, watched
 from integrators.kernel.step.begin import set_factors
 from integrators.kernel.step.estimate import first_length, shorten_first
@@ -41,6 +42,23 @@ def repeat(ctx, target, budget):
 
 
 @compiled
+def look_first(ctx):
+    """Look for events in the solved step, if they may end it; the outcome."""
+    return end_at_action(ctx) if ctx.acts and ctx.seen == 0 else DONE
+
+
+@compiled
+def act(ctx):
+    """Go on from the state that an event at the end of the step behind makes; the outcome."""
+    outcome = change(ctx)
+    if outcome != DONE:
+        return outcome
+    ctx.next_length, ctx.length_behind = length_after_action(ctx), 0.0
+    begin_anew(ctx)
+    return begin_events(ctx)
+
+
+@compiled
 def approach(ctx, t, budget):
     """Take adaptive steps to the last one before t; return the outcome, and what is left to do."""
     while True:
@@ -58,6 +76,11 @@ def approach(ctx, t, budget):
         inside = rest < h - CLOSE * abs(t)
         if (watched(ctx) or (inside and rest > (1.0 - ctx.nodes[0]) * h)) and not holds(ctx):
             continue
+        outcome = look_first(ctx)
+        if outcome != DONE:
+            return outcome, budget
+        h = abs(ctx.h)
+        inside = rest < h - CLOSE * abs(t)
         if inside:
             return DONE, budget
         if budget == 0:
@@ -67,6 +90,10 @@ def approach(ctx, t, budget):
             return outcome, budget
         budget -= 1
         take(ctx)
+        if ctx.acting:
+            outcome = act(ctx)
+            if outcome != DONE:
+                return outcome, budget
 
 
 @compiled
@@ -142,6 +169,9 @@ def walk(ctx, times, out, budget):
             return outcome
         if over or (watched(ctx) and not holds(ctx)):
             continue
+        outcome = look_first(ctx)
+        if outcome != DONE:
+            return outcome
         if abs(remaining(ctx, end)) < abs(ctx.h) - CLOSE * abs(end):
             return DONE
         if budget == 0:
@@ -150,10 +180,15 @@ def walk(ctx, times, out, budget):
         if outcome != DONE:
             return outcome
         take(ctx)
+        if ctx.acting:
+            outcome = act(ctx)
         times[made] = ctx.t0
         write(ctx, ctx.state, out + dim * made)
         followed(ctx, ctx, STATE)
         made += 1
+        if outcome != DONE:
+            ctx.made = made
+            return outcome
 
 
 @compiled
@@ -167,11 +202,18 @@ def reset(ctx, start):
         put(ctx.state, 8 * i, splat8(0.0))
         put(ctx.error, 8 * i, splat8(0.0))
     read(ctx, ctx.state, start)
+    ctx.made = 0
+    begin_anew(ctx)
+
+
+@compiled
+def begin_anew(ctx):
+    """Begin at the present state, at t0: no history."""
     if ctx.energy_code:
         take_energy(ctx)
     set_factors(ctx, ctx.h)
     ctx.length = ctx.older_length = 0.0
-    ctx.n = ctx.age = ctx.free = ctx.made = 0
+    ctx.n = ctx.age = ctx.free = 0
     ctx.solved = UNSOLVED
     ctx.border = ctx.border_ahead = NOTHING
     find_surface(ctx)

@@ -53,6 +53,8 @@ SMALLEST, LARGE = 1e-280, 1e280  # a block smaller than that has no size to divi
 # of a step: what is to come cannot be seen from what has been. Sixteen nodes are then a 168th of the interval
 # apart at most, eight an 87th.
 LONGEST = 2.0**-4
+# Of the time: a first step, and one after a breakpoint, is tried with this length at least.
+RESTART = 2.0**-40
 # The first step where the field at the start tells no time scale. Some six steps, each at most twice as long
 # as the one before, lead from it to the longest one.
 FIRST_AT_REST = 2.0**-10

@@ -207,7 +207,7 @@ def sample(ctx, side, between, t, part, out):
         return DONE
     outcome = part_step(ctx, side, part, 0.0)
     add_counters(ctx, side)
-    if outcome == DONE and ctx.varying and ctx.blind and changes(side):
+    if outcome == DONE and ctx.varying and ctx.blind and ctx.acts == 0 and changes(side):
         # The step ahead was judged by nodes that see nothing of this: it is solved again, and no longer.
         ctx.solved, ctx.length, ctx.next_length = UNSOLVED, 0.0, part
         ctx.rejections += 1

@@ -236,6 +236,7 @@ def ready(ctx):
     """Solve the step ahead with a length that the tolerance allows; `Context.h` is its length."""
     if ctx.solved:
         return DONE
+    ctx.seen = ctx.acting = 0
     if ctx.slow >= max(ctx.held, HELD_BACK_STEPS):
         if ctx.solver == 0:
             return want_solver(ctx)

@@ -115,7 +115,7 @@ class TaylorSearch:
             now = list(compress(now, [not is_ahead for is_ahead in ahead]))
         if now:
             t, y, event, direction = (np.array(column) for column in zip(*now, strict=True))
-            self._hits.take(t, y, event, direction)
+            self._hits.take(t, y, y, event, direction)
         return self._hits
 
     def work(self) -> dict[str, int]:

@@ -1,0 +1,183 @@
+"""Events that change the state: which comes first in a step, what it makes of the state, and where to go on.
+
+The step is solved anew to the first of them. Its function is 0 there, and the sign that it has next, which
+rounding hides, is that of its slope along the trajectory from the new state: so the same zero is not found
+again. Where the slope is nothing too, the trajectory stays there.
+"""
+
+from integrators.kernel.context import ACCUMULATE, ACTS, DONE, HALTED
+from integrators.kernel.events.memory import RAISED, TERMINAL, TINY
+from integrators.kernel.events.sample import NAN, function, is_finite, noise_of, sign, spread_state
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_field, put, splat8
+from integrators.kernel.step.sample import read, vectors_of_state
+
+SIMULTANEOUS = 2.0**-49  # times whose relative difference is at most this are the same
+RESIDUE = 4.0  # times the function's value at the zero that was found, its value after may be, and is still 0
+AHEAD = 2.0**-10  # of a step, to see where a function goes
+
+
+@compiled
+def earlier(search, i, j):
+    """Whether occurrence i comes before occurrence j."""
+    return (search.hit_times[i] - search.hit_times[j]) * search.sign < 0.0
+
+
+@compiled
+def ends_step(search, before, i):
+    """Whether the step ends at occurrence i: by an action, or as the last one of a terminal event."""
+    event = search.hit_events[i]
+    if search.actions[event]:
+        return True
+    if search.limits[event] == 0:
+        return False
+    number = search.happened[event] + 1
+    for j in range(before, search.hits):
+        if search.hit_events[j] == event and earlier(search, j, i):
+            number += 1
+    return number == search.limits[event]
+
+
+@compiled
+def keep(search, outof, into):
+    """Keep an occurrence in another place."""
+    search.hit_times[into] = search.hit_times[outof]
+    search.hit_events[into] = search.hit_events[outof]
+    search.hit_directions[into] = search.hit_directions[outof]
+    for d in range(search.dim):
+        search.hit_states[search.dim * into + d] = search.hit_states[search.dim * outof + d]
+        search.hit_after[search.dim * into + d] = search.hit_states[search.dim * outof + d]
+
+
+@compiled
+def end_step(ctx, search, before):
+    """Drop what does not happen, as the step ends before it; return ACTS if the step ends, or DONE."""
+    first, kept = -1, before
+    for i in range(before, search.hits):
+        if (search.hit_times[i] - search.last) * search.sign > 0.0:
+            continue
+        keep(search, i, kept)
+        kept += 1
+    search.hits = kept
+    for i in range(before, search.hits):
+        if ends_step(search, before, i) and (first < 0 or earlier(search, i, first)):
+            first = i
+    for event in range(search.count):
+        search.due[event] = 0
+    if first >= 0:
+        end, kept = search.hit_times[first], before
+        ctx.act_time = end
+        close = SIMULTANEOUS * abs(end)
+        for i in range(before, search.hits):
+            event, late = search.hit_events[i], (search.hit_times[i] - end) * search.sign
+            if late > close:
+                continue
+            limit = search.limits[event]
+            if search.actions[event] or (limit and i == first):
+                search.due[event] = 1
+                search.due_directions[event] = search.hit_directions[i]
+            else:
+                keep(search, i, kept)
+                kept += 1
+        search.hits = kept
+    for i in range(before, search.hits):
+        search.happened[search.hit_events[i]] += 1
+    return DONE if first < 0 else ACTS
+
+
+@compiled
+def make(ctx, search, event):
+    """Make the new state by the event's action; return whether it could be made."""
+    spread_state(search, search.time, search.new_state)
+    search.made[8 * search.dim] = 0.0
+    call_field(search.actions[event], search.times, search.block, ctx.par, search.made)
+    if search.made[8 * search.dim] != 0.0:
+        search.raised = -1 - event
+        return False
+    for d in range(search.dim):
+        search.new_state[d] = search.made[8 * d]
+    return True
+
+
+@compiled
+def change_state(ctx, search):
+    """Note what happens at the present state, and change it; return DONE or HALTED."""
+    for d in range(search.dim):
+        search.new_state[d] = search.step_state[d]
+    for event in range(search.count):
+        search.event = event
+        search.values_before[event] = function(ctx, search, search.time, search.step_state)
+    halted = False
+    for event in range(search.count):
+        if search.due[event] == 0:
+            continue
+        i = search.hits
+        search.hit_times[i], search.hit_events[i] = search.time, event
+        search.hit_directions[i] = search.due_directions[event]
+        search.happened[event] += 1
+        if search.happened[event] == search.limits[event]:
+            search.halted, halted = TERMINAL, True
+        elif not make(ctx, search, event):
+            search.halted = RAISED
+            return HALTED
+        for d in range(search.dim):
+            search.hit_states[search.dim * i + d] = search.step_state[d]
+            search.hit_after[search.dim * i + d] = search.new_state[d]
+        search.hits = i + 1
+    if halted:
+        return HALTED
+    for i in range(vectors_of_state(ctx)):
+        put(ctx.state, 8 * i, splat8(0.0))
+        put(ctx.error, 8 * i, splat8(0.0))
+    read(ctx, ctx.state, search.new_state)
+    return DONE
+
+
+@compiled
+def set_state_ahead(ctx, search):
+    """Set `Search.end_state` a little ahead of the present state, by its slope alone.
+
+    It is there to see where functions go. Return whether it is finite.
+    """
+    lanes, rows, values, move = ctx.lanes, ctx.rows, ctx.sums, AHEAD * ctx.next_length
+    for lane in range(lanes):
+        ctx.times[lane] = ctx.t0
+        for d in range(rows):
+            ctx.stages[lanes * d + lane] = search.step_state[d]
+    call_field(ctx.field, ctx.times, ctx.stages, ctx.par, values)
+    ctx.evaluations += 1
+    finite = True
+    for d in range(rows):
+        slope = values[lanes * d]
+        finite = finite and is_finite(slope)
+        if ctx.second:
+            momentum = search.step_state[rows + d]
+            search.end_state[d] = search.step_state[d] + move * (ctx.velocity[d] * momentum)
+            search.end_state[rows + d] = momentum + move * slope
+        else:
+            search.end_state[d] = search.step_state[d] + move * slope
+    return finite
+
+
+@compiled
+def begin_anew(ctx, search):
+    """Set what is known of the functions at the new state; ACCUMULATE if the trajectory stays there."""
+    t, state = search.time, search.step_state
+    finite = set_state_ahead(ctx, search)
+    search.known = t
+    for event in range(search.count):
+        search.event = event
+        value = function(ctx, search, t, state)
+        noise = noise_of(ctx, search, t, state)
+        before = search.values_before[event]
+        search.touched[event] = NAN
+        if search.due[event] and abs(value) <= noise + RESIDUE * abs(before):
+            ahead = function(ctx, search, t + AHEAD * ctx.next_length, search.end_state)
+            if not finite or not abs(ahead - value) > noise:
+                return ACCUMULATE
+            value = TINY * sign(ahead - value)
+        elif abs(value) <= noise:
+            value = TINY * sign(before if abs(before) > noise else search.ends[event])
+        search.ends[event] = value
+        search.due[event] = 0
+    return HALTED if search.raised else DONE

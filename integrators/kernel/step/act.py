@@ -1,0 +1,65 @@
+"""Events that change the state: steps end where one happens, and the next begins from the new state."""
+
+from integrators.kernel.context import ACCUMULATE, ACTS, BEGIN_ANEW, BY_VALUES, CHANGE, DONE, UNSOLVED
+from integrators.kernel.native.jit import compiled
+from integrators.kernel.simd.memory import call_look
+from integrators.kernel.step.control import SHORTEST
+from integrators.kernel.step.vary import attempt
+
+ONWARD = 1.25  # times that are probably enough to see the next one
+
+
+@compiled
+def end_at_action(ctx):
+    """Look for events in the solved step ahead, and solve it anew to the first that changes the state."""
+    outcome = call_look(ctx.look, ctx, ctx.look_memory)
+    if outcome == DONE:
+        ctx.seen = 1
+    if outcome != ACTS:
+        return outcome
+    part = (ctx.act_time - ctx.t0) - ctx.time_low
+    if not abs(part) > SHORTEST * abs(ctx.t0):
+        return ACCUMULATE
+    ctx.length_before = ctx.h if abs(ctx.h) > abs(ctx.length_after) else ctx.length_after
+    if part != ctx.h:
+        ctx.length, ctx.rejected = ctx.h, 1
+        ctx.solved = UNSOLVED
+        if ctx.implicit:
+            ctx.implicit_steps -= 1  # it is one step
+        outcome = attempt(ctx, part)
+        ctx.rejected = 0
+        if outcome != DONE:
+            return outcome
+        ctx.solved = BY_VALUES
+        ctx.landing = 0
+    ctx.seen, ctx.acting = 1, CHANGE
+    return DONE
+
+
+@compiled
+def change(ctx):
+    """Let the event that has ended the step behind change the state; the outcome."""
+    ctx.t0, ctx.time_low = ctx.act_time, 0.0
+    outcome = call_look(ctx.look, ctx, ctx.look_memory)
+    if outcome == DONE:
+        ctx.acting = BEGIN_ANEW
+    return outcome
+
+
+@compiled
+def length_after_action(ctx):
+    """Return the length of a step after such an event: not much more than the time since the last one.
+
+    Beyond the next one a field may be another one, and what happens before is a small part of a long step.
+    """
+    length, since = ctx.length_before, ONWARD * (ctx.t0 - ctx.acted)
+    ctx.acted = ctx.t0
+    return since if abs(since) < abs(length) else length
+
+
+@compiled
+def begin_events(ctx):
+    """Let the search for events begin at the new state; the outcome."""
+    outcome = call_look(ctx.look, ctx, ctx.look_memory)
+    ctx.acting = 0
+    return outcome

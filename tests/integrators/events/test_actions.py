@@ -1,0 +1,305 @@
+"""Events that change the state: steps end there, and everything goes on from the new state."""
+
+import math
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import integrators
+from integrators import HBVM, Event, Gauss, LineIntegral, Status, Taylor
+from problems import Hamiltonian, Problem, VectorField
+from problems.errors import InputError
+
+integrate: Any = integrators.integrate
+integrate_many: Any = integrators.integrate_many
+BALL = Hamiltonian(lambda q, p: p[0] ** 2 / 2 + q[0], dof=1, name="ball")
+PLAIN = VectorField(lambda y: [y[1], -1.0], dim=2, name="ball as a field")
+END = 30.0
+
+
+def bouncing(restitution, *, python=False, **options):
+
+    def traced(y):
+        return [y[0], -restitution * y[1]]
+
+    def code(y):
+        return np.asarray([y[0], -restitution * float(y[1])])
+
+    return Event(lambda y: y[0], direction=-1, then=code if python else traced, name="bounce", **options)
+
+
+def impacts(restitution, height=1.0, end=END):
+    """Return the times of impacts from rest, and the speeds after them."""
+    v = math.sqrt(2.0 * height)
+    times, speeds = [v], [restitution * v]
+    while times[-1] + 2.0 * speeds[-1] < end and len(times) < 200:
+        times.append(times[-1] + 2.0 * speeds[-1])
+        speeds.append(restitution * speeds[-1])
+    return np.array(times), np.array(speeds)
+
+
+def heights(t, restitution):
+    """Return height and speed at times; a step may end at an impact but for rounding: those after it."""
+    times, speeds = impacts(restitution)
+    i = np.searchsorted(times - 1e-11, t, side="right") - 1
+    since = t - times[i]
+    fallen = i < 0
+    h = np.where(fallen, 1.0 - t * t / 2.0, speeds[i] * since - since * since / 2.0)
+    return np.stack([h, np.where(fallen, -t, speeds[i] - since)], axis=1)
+
+
+@pytest.mark.parametrize("python", [False, True])
+@pytest.mark.parametrize("restitution", [1.0, 0.95])
+@pytest.mark.parametrize("method", [HBVM(), HBVM(k=8, s=7, tol=1e-10), Gauss(s=4, tol=1e-10)], ids=repr)
+def test_a_ball_bounces(method, restitution, python):
+    grid = np.linspace(0.0, END, 101)
+    for system in (BALL, PLAIN):
+        problem = Problem(system, y0=[1.0, 0.0], t_end=END)
+        event = bouncing(restitution, python=python)
+        for sample in (None, "steps", "dense"):
+            found = integrate(problem, method, grid, sample, events=event)
+            assert found.status is Status.FINISHED
+            assert np.abs(found.y - heights(found.t, restitution)).max() < 1e-12  # measured 6e-14
+        times, speeds = impacts(restitution)
+        hits = found.events["bounce"]
+        assert np.abs(hits.t - times).max() < 1e-12  # measured 7e-14
+        assert np.abs(hits.after[:, 1] - speeds).max() < 1e-12
+        assert np.array_equal(hits.after[:, 1], -restitution * hits.y[:, 1])
+        assert np.abs(hits.y[:, 0]).max() < 1e-13
+
+
+def test_a_solution_is_known_at_any_time_and_from_its_file(tmp_path):
+    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=END), HBVM(), [END / 3, END], events=bouncing(0.95))
+    times = np.linspace(0.0, END, 500)
+    assert np.abs(found(times) - heights(times, 0.95)).max() < 1e-12  # measured 8e-14
+    hits = found.events["bounce"]
+    assert np.array_equal(found(hits.t), hits.after)
+    found.save(tmp_path / "ball.npz")
+    loaded: Any = integrators.load(tmp_path / "ball.npz")
+    assert np.array_equal(loaded.events["bounce"].after, hits.after)
+    assert np.array_equal(loaded(times), found(times))
+    assert pickle.loads(pickle.dumps(found)).events["bounce"].after.tolist() == hits.after.tolist()
+    assert found.warnings == ()  # the ball has lost energy at the floor, the method none
+
+
+def test_a_ball_that_comes_to_rest_has_a_status():
+    for restitution, end in ((0.9, 19.0), (0.5, 3.0)):
+        problem = Problem(BALL, y0=[1.0, 0.0], t_end=100.0)
+        found = integrate(problem, HBVM(), events=bouncing(restitution))
+        assert found.status is Status.STALLED
+        assert "accumulate at t = " in found.reason
+        assert abs(found.t_stop - end * math.sqrt(2.0)) < 1e-8  # measured 4e-10
+        assert found.y[:, 0].min() > -1e-12
+    stops = Event(lambda q: q[0], direction=-1, then=lambda q: [q[0], 0.0], name="clay")
+    found = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=100.0), HBVM(), events=stops)
+    assert found.status is Status.STALLED
+    assert abs(found.t_stop - math.sqrt(2.0)) < 1e-14
+
+
+def test_a_kick_that_goes_on_through_the_surface_happens_once():
+    kick = Event(lambda q: q[0] - 0.5, then=lambda q, p: [q[0], 2.0 * p[0]], name="kick")
+    free = Hamiltonian(lambda q, p: p[0] ** 2 / 2, dof=1)
+    found = integrate(Problem(free, q0=[0.0], p0=[1.0], t_end=2.0), HBVM(), [2.0], events=kick)
+    assert found.events["kick"].t.tolist() == [0.5]
+    assert np.abs(found.y[-1] - [3.5, 2.0]).max() < 1e-14
+
+
+def billiard(**options):
+    """Return a disc in the unit square, with four walls that have nothing to do with each other."""
+    free = VectorField(lambda y: [y[2], y[3], 0.0, 0.0], dim=4, name="billiard")
+    walls = [
+        Event(lambda y: y[0], direction=-1, then=lambda y: [y[0], y[1], -y[2], y[3]], name="left"),
+        Event(lambda y: y[0] - 1, direction=1, then=lambda y: [y[0], y[1], -y[2], y[3]], name="right"),
+        Event(lambda y: y[1], direction=-1, then=lambda y: [y[0], y[1], y[2], -y[3]], name="bottom"),
+        Event(
+            lambda y: y[1] - 1, direction=1, then=lambda y: [y[0], y[1], y[2], -y[3]], name="top", **options
+        ),
+    ]
+    return free, walls
+
+
+@pytest.mark.parametrize("start", [[0.3, 0.4, 0.7, 0.31], [0.5, 0.5, 1.0, 1.0]])
+def test_a_billiard_has_its_walls_in_order_and_corners_at_once(start):
+    free, walls = billiard()
+    watch = Event(lambda y: y[0] - y[1] / 3 - 0.2, name="watch")
+    grid = np.linspace(0.0, 40.0, 81)
+    found = integrate(Problem(free, y0=start, t_end=40.0), HBVM(), grid, events=[*walls, watch])
+    unfolded = np.array(start[:2]) + np.multiply.outer(grid, start[2:])
+    expected = 1.0 - np.abs(unfolded % 2.0 - 1.0)
+    assert found.status is Status.FINISHED
+    assert np.abs(found.y[:, :2] - expected).max() < 1e-12  # measured 2e-14
+    times = np.linspace(0.0, 40.0, 200001)
+    path = 1.0 - np.abs((np.array(start[:2]) + np.multiply.outer(times, start[2:])) % 2.0 - 1.0)
+    g = path[:, 0] - path[:, 1] / 3 - 0.2
+    g = g[np.abs(g) > 1e-9]
+    assert len(found.events["watch"]) == np.count_nonzero(g[1:] * g[:-1] < 0.0)
+
+
+def test_a_terminal_event_ends_before_or_at_an_action():
+    free, walls = billiard(terminal=3)
+    grid = np.linspace(0.0, 40.0, 401)
+    found = integrate(Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), HBVM(), grid, events=walls)
+    assert found.status is Status.EVENT
+    assert abs(found.t_stop - 4.6 / 0.31) < 1e-13
+    assert found.t[-1] <= found.t_stop < found.t[-1] + 0.1
+    top = found.events["top"]
+    assert len(top) == 3
+    assert np.array_equal(top.y[2], top.after[2])
+    assert len(found.events["bottom"]) == 2
+    passing = Event(lambda y: y[0] - 0.9, direction=1, terminal=2, name="passing")
+    found = integrate(
+        Problem(free, y0=[0.3, 0.4, 0.7, 0.31], t_end=40.0), HBVM(), grid, events=[*walls[:2], passing]
+    )
+    assert abs(found.t_stop - 2.6 / 0.7) < 1e-13
+    assert len(found.events["right"]) == 1
+
+
+def test_checkpoints_go_on_bit_for_bit(tmp_path):
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+    grid = np.linspace(0.0, END, 61)
+    whole = integrate(problem, HBVM(), grid, events=bouncing(0.95))
+    path = Path(tmp_path / "ball.ckpt")
+
+    def after(count):
+        """Return what presses Ctrl-C at a report of the progress."""
+        reports = iter(range(count))
+
+        def report(progress):
+            if next(reports, None) is None:
+                raise KeyboardInterrupt
+
+        return report
+
+    found: Any = None
+    for count in (2, 3, 4):
+        found = integrate(
+            problem, HBVM(), grid, events=bouncing(0.95), checkpoint=path, every_seconds=0.0, resume=path,
+            progress=after(count),
+        )  # fmt: skip
+        assert found.status is Status.INTERRUPTED
+    assert 0.0 < found.t_stop < END
+    found = integrate(problem, HBVM(), grid, events=bouncing(0.95), resume=path)
+    assert found.status is Status.FINISHED
+    assert np.array_equal(found.y, whole.y)
+    assert np.array_equal(found.events["bounce"].after, whole.events["bounce"].after)
+    with pytest.raises(InputError, match="is a checkpoint of"):
+        integrate(problem, HBVM(), grid, events=bouncing(0.9), resume=path)
+
+
+def test_pieces_of_a_trajectory_have_the_bits_of_the_whole():
+    program: Any = HBVM().compile(BALL)
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+    events = {"bounce": bouncing(0.95)}
+    start = program.with_events(problem, events)
+    grid = np.linspace(0.25, END, 120)
+    steppers = [start(problem.y0, problem.par, 0.0, END) for _ in range(3)]
+    for stepper in steppers:
+        stepper.destination = END
+    first, second, unbroken = steppers
+    whole = unbroken.advance(grid).y
+    for t, state in zip(grid, whole, strict=True):
+        assert np.array_equal(first.advance(np.array([t])).y[0], state), t
+        second.restore(first.checkpoint())
+        second.search.load(first.search.save())
+        first, second = second, first
+
+
+def test_trajectories_of_an_ensemble_bounce_one_by_one():
+    starts = np.stack([np.linspace(0.5, 2.0, 7), np.zeros(7)], axis=1)
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+    many = integrate_many(problem, HBVM(), starts=starts, times=[7.0, END], events=bouncing(0.95), threads=2)
+    for i, y0 in enumerate(starts):
+        alone = integrate(Problem(BALL, y0=y0, t_end=END), HBVM(), [7.0, END], events=bouncing(0.95))
+        assert np.array_equal(many.y[i], alone.y)
+        assert np.array_equal(many.events[i]["bounce"].after, alone.events["bounce"].after)
+    assert many.warnings == [()] * 7
+
+
+def test_it_bounces_backwards_and_step_by_step():
+    forth = integrate(Problem(BALL, y0=[1.0, 0.0], t_end=10.0), HBVM(), [10.0], events=bouncing(1.0))
+    back = Problem(BALL, y0=forth.y[-1], t0=10.0, t_end=0.0)
+    assert np.abs(integrate(back, HBVM(), [0.0], events=bouncing(1.0)).y[-1] - [1.0, 0.0]).max() < 1e-13
+    run: Any = integrators.start(Problem(BALL, y0=[1.0, 0.0], t_end=END), HBVM(), events=bouncing(0.95))
+    while run.t < 10.0:
+        assert run.step() is Status.RUNNING
+        assert run.y[0] > -1e-13
+    assert np.abs(run.y - heights(np.array([run.t]), 0.95)[0]).max() < 1e-12
+    assert len(run.events["bounce"]) == np.count_nonzero(impacts(0.95)[0] < run.t + 1e-9)
+    assert run.events["bounce"].after.shape == run.events["bounce"].y.shape
+
+
+def test_what_cannot_be_is_refused_and_what_raises_is_a_status():
+    problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
+    for method in (HBVM(k=4, s=2, h=0.1), LineIntegral(k=4, s=2, tol=1e-8, invariants=["energy"]), Taylor()):
+        with pytest.raises(InputError, match="adaptive step size"):
+            integrate(problem, method, events=bouncing(1.0))
+    with pytest.raises(InputError, match="then="):
+        integrate(problem, HBVM(), events=bouncing(1.0), variations="y0")
+    with pytest.raises(InputError, match="2 numbers, the new state"):
+        integrate(problem, HBVM(), events=Event(lambda q: q[0], then=lambda q: [q[0]]))
+    with pytest.raises(InputError, match="then=3 of an event"):
+        Event(lambda q: q[0], then=3)  # pyright: ignore[reportArgumentType]
+    calls = []
+
+    def fails(y):
+        calls.append(float(y[1]))
+        if len(calls) > 3:
+            raise ZeroDivisionError("a ball that breaks")
+        return [y[0], -y[1]]
+
+    found = integrate(problem, HBVM(), events=Event(lambda y: y[0], direction=-1, then=fails, name="bounce"))
+    assert found.status is Status.USER_ERROR
+    assert "a ball that breaks" in found.reason
+    assert isinstance(found.error, ZeroDivisionError)
+    assert len(found.events["bounce"]) == 2  # one call was to see what it returns
+    assert found.t[-1] < 5.0 * math.sqrt(2.0)
+
+
+PENDULUM = Hamiltonian(
+    lambda q, p, par, m: (
+        p[0] ** 2 / 2 - par.g * m.cos(q[0]) + (q[1] ** 2 + p[1] ** 2) / 2 + 0.1 * q[0] ** 2 * q[1]
+    ),
+    dof=2, parameters={"g": 1.0}, name="pendulum and oscillator",
+)  # fmt: skip
+
+
+def by_hand(problem, event):
+    """Return the times of an event's actions and the last state, by a new start after each."""
+    t, y, end, times = problem.t0, problem.y0, problem.t_end, []
+    while True:
+        piece = Problem(PENDULUM, y0=y, parameters=problem.parameters, t0=t, t_end=end)
+        plain = Event(event.g, direction=event.direction, name="plain")
+        found = integrate(piece, HBVM(), [end], events=plain)
+        hits = found.events["plain"]
+        later = np.flatnonzero(hits.t > t + 1e-9 * bool(times))  # it may find the same zero again
+        if not later.size:
+            return np.array(times), found.y[-1]
+        t, y = float(hits.t[later[0]]), hits.y[later[0]]
+        y = np.array(event.then(y[:2], y[2:]))
+        times.append(t)
+
+
+@pytest.mark.slow
+def test_random_kicks_agree_with_a_loop_by_hand():
+    rng = np.random.default_rng(5)
+    for case in range(30):
+        level, gain = rng.uniform(-0.5, 0.5), rng.choice([-1.0, -0.9, 0.9, 1.05, 1.0])
+        direction = int(rng.choice([-1, 1] if gain < 0.0 else [-1, 0, 1]))
+        y0 = rng.uniform(-1.0, 1.0, 4)
+        if gain < 0.0:
+            y0[0] = level - 0.3 * direction
+
+        def then(q, p, gain=gain):
+            return [q[0], q[1], gain * p[0], p[1]]
+
+        event = Event(lambda q, level=level: q[0] - level, direction=direction, then=then, name="kick")
+        problem = Problem(PENDULUM, y0=y0, parameters={"g": rng.uniform(0.5, 2.0)}, t_end=15.0)
+        method = (HBVM(), HBVM(k=8, s=7, tol=1e-10), Gauss(s=5, tol=1e-11))[case % 3]
+        found = integrate(problem, method, np.linspace(0.0, 15.0, 31), events=event)
+        times, end = by_hand(problem, event)
+        assert found.events["kick"].t.shape == times.shape, case
+        assert np.abs(found.events["kick"].t - times).max(initial=0.0) < 1e-8  # measured 1e-9
+        assert np.abs(found.y[-1] - end).max() < 1e-7  # measured 4e-9
