@@ -207,7 +207,7 @@ def test_pieces_of_a_trajectory_have_the_bits_of_the_whole():
         first, second = second, first
 
 
-def test_trajectories_of_an_ensemble_bounce_one_by_one():
+def test_trajectories_of_an_ensemble_bounce_one_by_one(tmp_path):
     starts = np.stack([np.linspace(0.5, 2.0, 7), np.zeros(7)], axis=1)
     problem = Problem(BALL, y0=[1.0, 0.0], t_end=END)
     many = integrate_many(problem, HBVM(), starts=starts, times=[7.0, END], events=bouncing(0.95), threads=2)
@@ -216,6 +216,9 @@ def test_trajectories_of_an_ensemble_bounce_one_by_one():
         assert np.array_equal(many.y[i], alone.y)
         assert np.array_equal(many.events[i]["bounce"].after, alone.events["bounce"].after)
     assert many.warnings == [()] * 7
+    many.save(tmp_path / "balls.npz")
+    loaded: Any = integrators.load(tmp_path / "balls.npz")
+    assert np.array_equal(loaded.events[3]["bounce"].after, many.events[3]["bounce"].after)
 
 
 def test_it_bounces_backwards_and_step_by_step():
