@@ -193,6 +193,22 @@ def test_the_map_of_gauss_is_symplectic(method):
     assert (errors / np.linalg.norm(maps, axis=(1, 2)) ** 2).max() < 2e-15  # measured: 3e-16
 
 
+@pytest.mark.slow
+def test_the_map_of_each_of_a_million_steps_is_symplectic():
+    problem, J = problems.load("henon_heiles"), np.kron([[0, 1], [-1, 0]], np.eye(2))
+    stepper = Gauss(s=6, h=0.5).compile(problem.system).start(problem.y0, problem.par)
+    worst = 0.0
+    for first in range(0, 1_000_000, 25):
+        stepper.follow(np.eye(4), np.zeros((0, 4)))
+        made = stepper.advance([stepper.t, (first + 25) * 0.5], sample="steps")
+        maps = stepper.variations
+        assert len(made.t) == 26
+        products = np.swapaxes(maps, 1, 2) @ J @ maps
+        changes = np.abs(np.diff(products, axis=0)).max(axis=(1, 2))
+        worst = max(worst, float((changes / np.linalg.norm(maps[1:], axis=(1, 2)) ** 2).max()))
+    assert worst < 1e-15  # measured: 1.8e-16
+
+
 def test_they_change_nothing_of_the_trajectory():
     problem, times = problems.load("kepler", e=0.6), np.linspace(0.0, 30.0, 40)
     for method in (HBVM(), Gauss(s=8, h=0.1)):
