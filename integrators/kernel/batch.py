@@ -7,6 +7,7 @@ whose equations the iteration does not solve, or is slow to solve, leaves its la
 its start; so does one with steps of its own length whose field has a kink.
 """
 
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -110,7 +111,8 @@ class _Work:
         n, result = len(self.starts), self.result
         width = lanes.lanes.width
         size = max(1, n // (width * JOBS * self.threads)) * width
-        self.share(lanes.run, [range(i, min(i + size, n)) for i in range(0, n, size)])
+        jobs = deque(range(i, min(i + size, n)) for i in range(0, n, size))
+        self.share(lanes.run, [jobs] * min(self.threads, len(jobs)))
         stayed = lanes.arrived == 1
         result.steps[stayed] = lanes.steps[stayed]
         result.iterations[stayed] = lanes.sweeps[stayed]
@@ -216,20 +218,30 @@ class _InLanes:
         """Sweeps in which each took part."""
         return self.arrays["all_sweeps"]
 
-    def run(self, members: range) -> None:
-        """Integrate some trajectories."""
+    def run(self, jobs: deque[range]) -> None:
+        """Integrate trajectories by the jobs that are left, which other threads take from too."""
         try:
             memory = self.spare.pop()
         except IndexError:  # another thread has it
             memory = self.memory()
         group = memory[0]
-        group.at, group.end, group.sample = members.start, members.stop, -1
+        group.sample = -1
         pace = Pace(CHUNK, self.work.starts.shape[1])
-        done = False
-        while not done and not self.work.stop.is_set():
-            with pace:
-                done = self.advance(memory, pace.steps) == 1
-        self.spare.append(memory)
+        while True:
+            try:
+                members = jobs.popleft()
+            except IndexError:
+                if not group.more:
+                    break
+                group.more = 0  # what is in lanes still
+            else:
+                group.at, group.end, group.more = members.start, members.stop, 1
+            done = False
+            while not done:
+                if self.work.stop.is_set():
+                    return
+                with pace:
+                    done = self.advance(memory, pace.steps) == 1
 
 
 class _Fixed(_InLanes):

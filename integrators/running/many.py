@@ -47,6 +47,8 @@ from problems.systems.base import System
 FIRST = 64  # trajectories for each thread, of the first piece
 SHARES, MOST = 64, 4096  # pieces for an executor, and trajectories of one
 NUMBERS = 2**22  # of the states of a piece that is reduced
+# Seconds of a piece, about, where nobody is told of it: lanes are idle at its end, and Ctrl-C loses it.
+UNWATCHED = 0.5
 
 
 @checked_arguments
@@ -198,7 +200,8 @@ def integrate_many(
     else:
         batches = start is None and variations is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
-        made = _local(here, gathered, few if batches else threads, size)
+        soon = SOON if progress or checkpoint is not None else UNWATCHED
+        made = _local(here, gathered, few if batches else threads, size, soon)
     began = perf_counter()
     with Bar() if progress is True else nullcontext(progress or None) as report, suppress(KeyboardInterrupt):
         for numbers, found, happened in made:
@@ -296,16 +299,20 @@ def _program(system: System, method: MethodBase, backend: str | None) -> Program
 
 
 def _local(
-    integrate: Callable[..., tuple[Trajectories, Any]], gathered: Gathered, first: int, size: int | None
+    integrate: Callable[..., tuple[Trajectories, Any]],
+    gathered: Gathered,
+    first: int,
+    size: int | None,
+    soon: float,
 ) -> Iterator[tuple[NDArray[np.int64], Trajectories, Any]]:
-    """Integrate what is missing, ``size`` at a time, or, from ``first`` on, as many as take about `SOON`."""
+    """Integrate what is missing: ``size`` at a time, or ``first`` and then what takes ``soon`` seconds."""
     (missing,) = gathered.missing(len(gathered)) or [np.empty(0, dtype=np.int64)]
     count = first if size is None else size
     while missing.size:
         before = perf_counter()
         numbers, missing = missing[:count], missing[count:]
         yield (numbers, *integrate(numbers))
-        if size is None and perf_counter() - before < SOON / 2.0:
+        if size is None and perf_counter() - before < soon / 2.0:
             count *= 2
 
 

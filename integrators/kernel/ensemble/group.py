@@ -110,6 +110,7 @@ class Group(Memory):
     trajectories = Integer()  # n
     at = Integer()  # first trajectory of the group,
     end = Integer()  # and the one after the last to be done
+    more = Integer()  # whether others may follow these
     sample = Integer()  # the next one to be made; -1: the group is not loaded
 
     # --- or one in each lane after another; see `ensemble.own` ---

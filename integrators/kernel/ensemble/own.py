@@ -261,6 +261,9 @@ def share(group, ctx):
 def run(first, budget):
     """Integrate the trajectories from ``at`` to ``end``; return 1 at their end, or 0 after ``budget`` steps.
 
+    Where `Group.more` is set it returns as soon as a lane is without a trajectory: the others go on in the
+    next call, beside those that follow.
+
     Parameters
     ----------
     first : int
@@ -280,7 +283,7 @@ def run(first, budget):
         running = 0
         for lane in range(lanes):
             running += 1 if group.ordinary[lane] == 1.0 else enter(group, lane)
-        if running == 0:
+        if running == 0 or (group.more and running < lanes):
             return 1
         if budget <= 0:
             return 0

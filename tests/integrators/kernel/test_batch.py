@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import problems
+from integrators.kernel import batch
 from integrators.kernel.batch import _Work
 from integrators.kernel.ensemble import prepared
 from integrators.kernel.program import AdaptiveProgram, HBVMProgram
@@ -273,6 +274,31 @@ def test_own_steps_in_lanes_are_the_same_bits_in_any_place_and_on_any_threads(na
             assert np.array_equal(part.y, whole.y[order])
             assert part.steps.tolist() == whole.steps[order].tolist()
             assert part.iterations.tolist() == whole.iterations[order].tolist()
+
+
+def test_few_lanes_are_idle_while_trajectories_of_several_jobs_are_left(monkeypatch):
+    class Every(batch.Pace):
+        """Has every step of all lanes return."""
+
+        @property
+        def steps(self):
+            return 1
+
+        @steps.setter
+        def steps(self, _):
+            calls.append(1)
+
+    calls = []
+    monkeypatch.setattr(batch, "Pace", Every)
+    morse = problems.load("morse", t_end=8.0)
+    program = AdaptiveProgram(morse.system, k=8, s=7, tol=1e-10)
+    n, depths = 1024, np.linspace(0.7, 1.3, 1024)
+    par = np.tile(morse.par, (n, 1))
+    par[:, 0] *= np.random.default_rng(1).permutation(depths)
+    made = program.batch(np.tile(morse.y0, (n, 1)), par, times=[8.0])
+    width = program.in_lanes().width
+    # .93; .87 where all lanes waited for the last trajectory of each job
+    assert made.steps.sum() > 0.9 * width * len(calls)
 
 
 def test_own_steps_keep_the_energy_of_eccentric_orbits():
