@@ -370,6 +370,18 @@ class Context(Memory):
     behind_time = Real()
     behind_low = Real()
     behind_on_surface = Integer()  # `on_surface` there
+    # Reversible steps, of length `epsilon` / density; see `step.reversible`.
+    pace = Integer()  # address of `problems.emit.time_scale`, called like the field; 0: no such steps
+    pace_rows = Integer()
+    pace_parameters = Integer()
+    pace_par = Array("pace_parameters")
+    pace_state = Array("pace_rows", "lanes")
+    pace_values = Array(2, "lanes")
+    pace_times = Array("lanes")
+    epsilon = Real()  # negative backwards
+    log_density = Real()  # of the step ahead
+    log_density_behind = Real()
+    density_slope = Real()  # of the logarithm, in time, at the state
     kink_places = Array(2, KINKS_KEPT)  # pairs: time and length of the last step rejected at each place
 
     def __init__(self, shape: Shape, tables: Mapping[str, Numbers], more: Mapping[str, int] | None = None):
@@ -383,6 +395,7 @@ class Context(Memory):
             "first": c.first, "two_steps": int(c.two_steps), "mode_groups": mode_groups, "modes": c.modes,
             "most_groups": max(groups, mode_groups),
             "block_count": shape.group.size, "group_count": int(shape.group.max()) + 1, "energy_rows": 0,
+            "pace_rows": 0, "pace_parameters": 0,
         }  # fmt: skip
         super().__init__({**numbers, **(more or {})}, {**tables, "block": shape.block, "group": shape.group})
         self.shape = shape

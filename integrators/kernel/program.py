@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -43,6 +44,7 @@ from problems import emit
 from problems.analysis.sides import sides
 from problems.analysis.structure import depends_on_time
 from problems.analysis.switches import Switches
+from problems.emit.time_scale import time_scale
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -63,6 +65,12 @@ of a lattice are moved by the others' rounding.
 
 ENERGY_LANES = 8
 """States at which the energy is evaluated at a time, all of them the same."""
+
+SCOUTED = 256
+"""Ordinary adaptive steps that tell how long reversible ones are."""
+
+MOST_EPSILON = 0.2
+"""Reversible steps are no longer than this part of the field's time scale, whose density longer ones lose."""
 
 UNSEEN = 1e-12
 """Part of a block's size that the error at a kink of the field may always be."""
@@ -102,6 +110,7 @@ class HBVMProgram(Compiled):
     """Length of the first step, where steps vary; ``None``: chosen."""
     threaded = True
     """Whether `batch` takes threads."""
+    _more: Mapping[str, int] = MappingProxyType({})
     for_many: "Callable[[], HBVMProgram] | None" = None
     """What makes the program that takes trajectories in lanes, where that is one of another k and s."""
     projected = False
@@ -325,7 +334,7 @@ class HBVMProgram(Compiled):
 
     def _made(self, *, side: bool) -> Context:
         tables = {**self._fixed, **({} if side else self.scaled(self.h))}
-        more = {"energy_rows": self.system.dim + 1} if self.projected else {}
+        more = {"energy_rows": self.system.dim + 1} if self.projected else self._more
         made = self.kept.context(self.shape, tables) if self.kept else Context(self.shape, tables, more)
         made.tolerance = TOLERANCE
         made.log_rest = LOG_REST
@@ -551,6 +560,60 @@ class AdaptiveProgram(HBVMProgram):
         self.limit(context, 0.0)
         context.stop = context.length_limit = math.inf
         return context
+
+
+class ReversibleProgram(AdaptiveProgram):
+    """Gauss with steps that are the same backwards, compiled for one system.
+
+    Parameters
+    ----------
+    system : System
+        Traced, not of the time.
+    s : int
+        Stages, s > 1.
+    tol : float
+        Local error per step, about: that of as many ordinary adaptive steps as `SCOUTED`.
+    """
+
+    def __init__(self, system: System, *, s: int, tol: float):
+        super().__init__(system, k=s, s=s, tol=tol, solver="fixed_point")
+        self._scale = time_scale(system.function("field"), system.n_par)
+        self._pace = fields.compile_field(system, self._scale, self.constants.lanes)
+        self._ordinary = AdaptiveProgram(system, k=s, s=s, tol=tol)
+        self._more = {"pace_rows": system.dim, "pace_parameters": system.n_par + 1}
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing but the tolerance limits the steps: lanes have no such steps."""
+        return False
+
+    @property
+    def description(self) -> str:
+        """The method with all that steps depend on, as text."""
+        return f"Gauss(s={self.constants.s}, tol={self.tol!r}, steps='reversible')"
+
+    def _made(self, *, side: bool) -> Context:
+        context = super()._made(side=side)
+        context.log_rest = LOG_REST
+        return context
+
+    def load(self, contexts: tuple[Context, Context], y: Array, par: Array, t0: float) -> None:
+        """Put what a trajectory from (t0, y) begins with into a pair of contexts."""
+        super().load(contexts, y, par, t0)
+        context = contexts[0]
+        context.pace = self._pace.address
+        ahead = self._ordinary.start(y, par, t0).take(SCOUTED)
+        states = np.concatenate([y[np.newaxis], ahead.y]).T
+        times = np.append(t0, ahead.t)
+        rate = emit.numpy(self.system, self._scale)
+        bare = rate(t0, states, np.append(par, 0.0))[0]
+        order = np.argsort(bare)
+        elapsed = np.cumsum(np.abs(np.gradient(times))[order])
+        median = bare[order][np.searchsorted(elapsed, 0.5 * elapsed[-1])]  # over the time
+        context.pace_par[:] = np.append(par, median)
+        rates = rate(t0, states, context.pace_par)[0] ** 0.25
+        lengths = np.diff(times) * (rates[:-1] + rates[1:]) / 2.0
+        context.epsilon = min(float(np.median(lengths[len(lengths) // 8 :])), MOST_EPSILON)
 
 
 def _decays(k: int, m: int, tol: float, middle: int, looks: bool) -> tuple[float, float]:

@@ -127,6 +127,7 @@ class HBVMStepper(ABC):
         "border", "border_ahead", "behind_time", "behind_low",
         "seen", "acting", "act_time", "length_before", "acted",
         "landing", "on_surface", "surface", "length_wanted", "behind_on_surface",
+        "epsilon", "log_density", "log_density_behind", "density_slope",
         "interval", "restful", "blind", "rescaled", "borrowed", "asks", "energy", "energy_scale",
     )  # fmt: skip
     _arrays: ClassVar[tuple[str, ...]] = (

@@ -146,6 +146,10 @@ class AdaptiveStepper(HBVMStepper):
         if way == 0.0 or not math.copysign(1.0, way) * ctx.next_length < 0.0:
             return
         ctx.next_length *= -1.0
+        if ctx.pace:  # the step behind comes again
+            ctx.log_density, ctx.log_density_behind = ctx.log_density_behind, ctx.log_density
+            ctx.epsilon *= -1.0
+            ctx.next_length = ctx.epsilon * math.exp(-ctx.log_density)
         ctx.border = NOTHING
         self._forget()
 

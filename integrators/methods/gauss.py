@@ -2,12 +2,13 @@
 
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
 from integrators.methods.hbvm import HBVM, Solver
 from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
+from problems.analysis.structure import depends_on_time
 from problems.errors import InputError
 from problems.problem import Problem, System
 
@@ -20,6 +21,9 @@ CITATION = """\
   year = {2006}
 }
 """
+
+
+Steps = Literal["reversible"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -49,11 +53,27 @@ class Gauss(MethodBase):
         the first step's.
     tol : float, optional
         Local error per step, as for `HBVM`; s > 1. With the steps that then vary, Gauss
-        keeps no energy over long times (`test_adaptive`): it is there to be compared with.
+        keeps no energy over long times (`test_adaptive`), unless they are reversible.
     solver : {"auto", "fixed_point", "newton", "blended"}
         How the stage equations are solved; see `HBVM`.
     max_step, breakpoints, max_steps, atol
         With ``tol``; see `HBVM`.
+    steps : {"reversible"}, optional
+        With ``tol`` and nothing else but ``s``: adaptive steps that keep the long-time behaviour, because
+        going back repeats them. Their density rho follows a rate w of the field,
+
+            w^4 = |(J^2)_qq|^2 + w_0^4,    J the Jacobian of the field,
+            log rho_{n+1/2} = log rho_{n-1/2} + 2 epsilon (w'/w)(y_n) / (rho_{n-1/2} + rho_{n+1/2}),
+            h_{n+1/2} = epsilon / rho_{n+1/2},    log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0),
+
+        (E. Hairer, G. Söderlind, SIAM J. Sci. Comput. 26 (2005) 1838-1851). (J^2)_qq is the derivative of the
+        accelerations; w_0^2 is its median norm over the time of 256 ordinary adaptive steps, and epsilon
+        the median of h w over these, at most 0.2. So ``tol`` is the local error of a typical step, and no
+        step is rejected. In reversible systems the energy does not drift and the way back leads to the
+        start, to rounding (`test_reversible`), as long as the motion is regular: chaos multiplies rounding,
+        and a close encounter with another time scale than the first steps is not controlled by ``tol``.
+        For positions and momenta, by a formula without the time; its sums are written out, so for a few
+        bodies. Fixed-point iteration.
 
     Raises
     ------
@@ -77,6 +97,7 @@ class Gauss(MethodBase):
     breakpoints: Landings = ()
     max_steps: Count | None = None
     atol: Absolute | None = None
+    steps: Steps | None = None
 
     library = "hbvm-bench"
     citation = CITATION
@@ -86,6 +107,11 @@ class Gauss(MethodBase):
         super().__post_init__()
         if self.h is None and self.tol is None:
             raise InputError("Gauss needs a step h, or a tolerance tol for an adaptive step size.")
+        if self.steps is not None:
+            given = [name for name in self.options() if name not in ("s", "tol", "steps")]
+            if self.tol is None or given or self.s == 1:
+                others = f"without {', '.join(given)}" if given else "with tol and s > 1"
+                raise InputError(f"Gauss takes steps={self.steps!r} {others}: all steps follow from tol.")
         try:
             self.as_hbvm()
         except InputError as error:
@@ -104,6 +130,21 @@ class Gauss(MethodBase):
             atol=self.atol,
         )  # fmt: skip
 
+    def accepts(self, problem: Problem) -> str | None:
+        """Accept every system; with reversible steps those with a formula without the time."""
+        return self._refusal(problem.system)
+
+    def _refusal(self, system: System) -> str | None:
+        if self.steps is None:
+            return None
+        if not system.traced:
+            return "reversible steps need a formula, and its field is code; leave out steps='reversible'."
+        if system.dof is None:
+            return "reversible steps need positions and momenta; leave out steps='reversible'."
+        if depends_on_time(system):
+            return "reversible steps need a field without the time; leave out steps='reversible'."
+        return None
+
     def caveat(self, problem: Problem) -> str | None:
         """Name a field with kinks that these options do not look for; see `HBVM`."""
         why = blind(self.s, self.tol, self.solver)
@@ -112,11 +153,17 @@ class Gauss(MethodBase):
 
     def compile(self, system: System) -> Program:
         """Compile as `HBVM.compile` does, Poisson systems like any other."""
+        if (refusal := self._refusal(system)) is not None:
+            raise InputError(refusal)
         made = self._compiled(system)
         made.method = self
         return made
 
     def _compiled(self, system: System) -> Any:
+        if self.tol is not None and self.steps is not None:
+            from integrators.kernel.program import ReversibleProgram
+
+            return ReversibleProgram(system, s=self.s, tol=self.tol)
         if self.tol is not None:
             from integrators.kernel.program import AdaptiveProgram
 

@@ -51,7 +51,7 @@ def forward(
     >>> emit.numpy(pendulum, along)(0.0, np.array([1.0, 0.0, 0.5, 0.0]), pendulum.pack()).round(3).tolist()
     [0.0, -0.878]
     """
-    rule = _Rule(Graph(function.graph.dof), size, directions, parameters)
+    rule = Rule(Graph(function.graph.dof), size, directions, parameters)
     outputs = len(function.outputs)
     found: list[tuple[Term, ...]] = [()] * (outputs * directions)
     for i, terms in enumerate(function.outputs):
@@ -74,7 +74,7 @@ def forward(
     return Function(rule.graph, tuple(found), tuple(loops), name)
 
 
-class _Rule:
+class Rule:
     """The values of nodes where the state comes behind the directions, and their derivatives."""
 
     def __init__(self, graph: Graph, size: int, directions: int, parameters: int | None):

@@ -20,6 +20,7 @@ from integrators.kernel.step.estimate import first_length, shorten_first
 from integrators.kernel.step.finish import arrive
 from integrators.kernel.step.kinks import arrived, holds
 from integrators.kernel.step.projection import take_energy
+from integrators.kernel.step.reversible import begin_pace
 from integrators.kernel.step.rule import FIRST_RATE
 from integrators.kernel.step.sample import dimension, followed, read, sample, vectors_of_state, write
 from integrators.kernel.step.surfaces import find_surface
@@ -222,7 +223,9 @@ def begin_anew(ctx):
     if ctx.strategy != ALWAYS_IMPLICIT:
         ctx.implicit = ctx.slow = ctx.held = ctx.left = 0
     arrive(ctx)
-    if ctx.varying and ctx.next_length == 0.0:
+    if ctx.pace:
+        begin_pace(ctx)
+    elif ctx.varying and ctx.next_length == 0.0:
         ctx.next_length = first_length(ctx)
         shorten_first(ctx)
         ctx.age = 0

@@ -49,6 +49,7 @@ from integrators.kernel.step.graze import grazes
 from integrators.kernel.step.handover import solve_implicitly, want_solver
 from integrators.kernel.step.iterate import close, polish, settle, test
 from integrators.kernel.step.kinks import count, keep_end, kink, undo
+from integrators.kernel.step.reversible import keep_pace
 from integrators.kernel.step.rule import FIRST_RATE, FUTILE_PART, ROUNDING, SCALE_LASTS
 from integrators.kernel.step.sums import time_after
 from integrators.kernel.step.surfaces import AGAIN, LANDED, leave, locate, look_across
@@ -237,6 +238,8 @@ def ready(ctx):
     if ctx.solved:
         return DONE
     ctx.seen = ctx.acting = 0
+    if ctx.pace:
+        return solve_at_pace(ctx)
     if ctx.slow >= max(ctx.held, HELD_BACK_STEPS):
         if ctx.solver == 0:
             return want_solver(ctx)
@@ -272,6 +275,16 @@ def ready(ctx):
             undo(ctx)
             begin_attempts(ctx)
         failure = UNDERFLOW if outcome == DONE else outcome
+
+
+@compiled
+def solve_at_pace(ctx):
+    """Solve the step ahead, whose length nothing but the density of the steps determines."""
+    if not abs(ctx.next_length) > SHORTEST * abs(ctx.t0):
+        return UNDERFLOW
+    outcome = attempt(ctx, ctx.next_length)
+    ctx.solved = BY_VALUES if outcome == DONE else UNSOLVED
+    return outcome
 
 
 @compiled
@@ -437,6 +450,8 @@ def take(ctx):
     ctx.length_behind = ctx.h
     ctx.error_behind = ctx.error_ahead
     ctx.defect_behind = ctx.defect_ahead
+    if ctx.pace:
+        keep_pace(ctx)
     if ctx.sides:
         arrive_on_surface(ctx)
 

@@ -1,5 +1,8 @@
 """Gradients by the adjoint are the derivatives of the steps that are taken, to rounding."""
 
+import doctest
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -169,3 +172,9 @@ def test_methods_without_an_adjoint_are_refused():
         gradient(problems.load("rigid_body"), HBVM(k=4, s=2, h=0.1), lambda y: y[0])
     with pytest.raises(InputError, match="use Gauss or HBVM"):
         gradient(problems.load("pendulum"), IAS15(), lambda q: q[0])
+
+
+def test_the_guide_on_fitting_shows_what_happens():
+    page = Path(__file__).parents[3] / "docs" / "howto" / "fitting.md"
+    failed, tried = doctest.testfile(str(page), module_relative=False)
+    assert (failed, tried > 10) == (0, True)

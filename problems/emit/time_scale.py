@@ -1,0 +1,63 @@
+r"""The time scale of a trajectory, from its formula.
+
+For ``y' = f(y)`` with positions and momenta and the Jacobian J the matrix ``(J^2)_qq`` is, where
+``q'' = a(q)``, the derivative of the accelerations. Its norm is the square of a rate, as long as forces are
+not constant:
+
+    w^4 = |(J^2)_qq|^2 + w_0^4,
+
+with the Frobenius norm and a constant w_0. For Kepler's problem w is of the size of ``r^-3/2``.
+"""
+
+from problems.calculus.forward import Rule
+from problems.calculus.function import Function, function_of
+from problems.emit.plan import written_out
+from problems.trace.graph import PAR, Node
+
+
+def time_scale(field: Function, parameters: int) -> Function:
+    """Return the fourth power of the rate of a field, and the rate of change of its logarithm.
+
+    Parameters
+    ----------
+    field : Function
+        Right-hand side for positions and momenta; not of the time. Its declared sums are written out.
+    parameters : int
+        Length of the parameter vector.
+
+    Returns
+    -------
+    Function
+        Two outputs, ``w^4`` and ``w'/w`` along the field; ``par`` holds the parameters, then ``w_0^4``.
+    """
+    graph, f = field.graph, written_out(field)
+    dof, zero, one = len(f) // 2, graph.const(0.0), graph.const(1.0)
+    total = graph.symbol("par", parameters, flags=PAR)
+    for j in range(dof):
+        column = _along(f, _along(f, [one if i == j else zero for i in range(2 * dof)]))
+        for entry in column[:dof]:
+            total = total + entry * entry
+    (slope,) = _along([total], f)
+    return function_of(graph, [total, slope / (4.0 * total)], "time_scale")
+
+
+def _along(nodes: list[Node], directions: list[Node]) -> list[Node]:
+    """Return the derivatives of nodes along a direction whose components are nodes of the same graph."""
+    rule = _Along(directions)
+    zero = directions[0].graph.const(0.0)
+    return [zero if (slope := rule.slope(node, 0)) is None else slope for node in nodes]
+
+
+class _Along(Rule):
+    def __init__(self, directions: list[Node]):
+        super().__init__(directions[0].graph, len(directions), 1, None)
+        self._directions = directions
+
+    def _value(self, node: Node) -> Node:
+        return node
+
+    def _slope(self, node: Node, direction: int) -> Node | None:
+        if node.op != "symbol":
+            return super()._slope(node, direction)
+        found = self._directions[node.data[1]] if node.data[0] == "y" else None
+        return None if found is None or (found.op == "const" and found.data == 0.0) else found
