@@ -148,6 +148,16 @@ def test_events_have_the_energy_of_the_start():
     assert np.ptp(0.5 * (u**2 + v**2) - 1.0 / np.hypot(x, y)) < 5e-15  # 1.8e-15
 
 
+def test_a_state_that_an_event_makes_has_its_own_energy():
+    ball = Hamiltonian(lambda q, p: p[0] ** 2 / 2 + q[0] + q[0] ** 4, dof=1, name="ball")
+    bounce = Event(lambda q: q[0], direction=-1, then=lambda y: [y[0], -0.9 * y[1]], name="bounce")
+    solution = integrate(Problem(ball, y0=[1.0, 0.0], t_end=3.0), projected(1e-4), events=[bounce])
+    assert len(solution.events["bounce"].t) >= 2
+    left = 2.0 * 0.81 ** len(solution.events["bounce"].t)
+    q, p = solution.y[-1]
+    assert abs(p**2 / 2 + q + q**4 - left) < 1e-14  # 1.1e-16
+
+
 @pytest.mark.parametrize("sample", ["side", "land", "steps"])
 def test_every_sample_is_projected(sample):
     times = np.linspace(0.0, 50.0, 101)[1:]
