@@ -46,7 +46,7 @@ def compile_ahead(processes: int = 1) -> dict[str, float | None]:
 
 
 def lower() -> None:
-    """Write the bitcode that every machine of this system can start from, where the package is built."""
+    """Write the text of LLVM that every machine of this system can start from, where the package is built."""
     lowered.write({engine.key: engine.lower() for engine in ENGINES.values()})
 
 

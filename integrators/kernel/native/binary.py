@@ -158,13 +158,13 @@ def build(
         return _optimized(_linked(function, arguments, returns, around), _object)
 
 
-def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> bytes:
-    """Return what `build` makes machine code of, as bitcode: the same for all processors of a system."""
+def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
+    """Return what `build` makes machine code of, as LLVM's text: the same for all processors of a system."""
     with _alone():
-        return _linked(function, arguments, returns).as_bitcode()
+        return str(_linked(function, arguments, returns))
 
 
-def build_lowered(bitcode: bytes) -> bytes:
+def build_lowered(text: str) -> bytes:
     """Return the object file that `build` makes, of what `lower` has returned; without numba.
 
     Raises
@@ -173,7 +173,7 @@ def build_lowered(bitcode: bytes) -> bytes:
         If this LLVM cannot read it.
     """
     with _alone():
-        return _optimized(llvm.parse_bitcode(bitcode), _object)
+        return _optimized(llvm.parse_assembly(text), _object)
 
 
 def assembly(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
@@ -192,7 +192,24 @@ def _linked(
     """Return a module of the `ENTRY` and all that it calls."""
     from integrators.kernel.native import jit  # imports numba
 
-    module, inner = jit.module(function, tuple(kind for kind, _ in arguments))
+    made = jit.module(function, tuple(kind for kind, _ in arguments))
+    return _entered(made, arguments, returns, around)
+
+
+def emitted(made: tuple[Any, str], arguments: Sequence[tuple[Any, str]], returns: str) -> bytes:
+    """Return the object file of what `jit.module` has returned; the rest as for `build`."""
+    with _alone():
+        return _optimized(_entered(made, arguments, returns), _object)
+
+
+def _entered(
+    made: tuple[Any, str],
+    arguments: Sequence[tuple[Any, str]],
+    returns: str,
+    around: Callable[[str], str] | None = None,
+) -> Any:
+    """Return the module with an `ENTRY`, which alone is seen from outside."""
+    module, inner = made
     entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
     module.link_in(llvm.parse_assembly(entry))
     for value in [*module.functions, *module.global_variables]:
@@ -250,11 +267,19 @@ def load(code: bytes) -> int:
     """Put an object file into this process; return the address of its `ENTRY`."""
     with lock:
         _initialize()
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-        engine.finalize_object()
-        _engines.append(engine)
-        return engine.get_function_address(ENTRY)
+        if hasattr(llvm, "create_mcjit_compiler"):
+            engine: Any = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+            engine.finalize_object()
+            _engines.append(engine)
+            return engine.get_function_address(ENTRY)
+        # LLVM's successor of MCJIT takes ten times as long to begin, and so comes second.
+        name = f"{ENTRY} {len(_engines)}"
+        engine = llvm.create_lljit_compiler(use_jit_link=False)
+        image = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)
+        library = image.link(engine, name)
+        _engines.append((engine, library))
+        return library[ENTRY]
 
 
 @lru_cache(maxsize=1)

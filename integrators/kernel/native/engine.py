@@ -44,15 +44,15 @@ class Engine:
 
         def make() -> tuple[str, bytes]:
             _say_what_is_waited_for()
-            if (bitcode := lowered.get(self.key)) is not None:
+            if (text := lowered.get(self.key)) is not None:
                 with suppress(RuntimeError):
-                    return " ", binary.build_lowered(bitcode)
+                    return " ", binary.build_lowered(text)
             return " ", binary.build(*self._compiled())
 
         return binary.obtain(self.key, make)
 
-    def lower(self) -> bytes:
-        """Return it as bitcode; see `integrators.kernel.native.lowered`."""
+    def lower(self) -> str:
+        """Return it as LLVM's text; see `integrators.kernel.native.lowered`."""
         return binary.lower(*self._compiled())
 
     def _compiled(self) -> tuple[Any, list[tuple[Any, str]], str]:

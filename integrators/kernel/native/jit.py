@@ -1,169 +1,96 @@
-"""How the kernel's functions are compiled: lowered one by one, linked and optimized once, all together.
+"""How the kernel's functions are compiled: by private parts of numba, or by its public interface.
 
-numba makes each function ready to be called: it links everything that the function calls
-into it, optimizes that, and makes machine code of it; for a hundred functions that call
-each other this takes half a minute. Here a target of its own (numba's target extension)
-keeps of each function nothing but what it was lowered to, and `module` links those
-that an entry needs; `integrators.kernel.native.binary` does the rest once.
+`private` compiles in a fraction of the time, but what it is made of may be gone from the next numba. A
+version that no test has seen is tried on a small function first, and where that fails `public` takes over.
 """
 
-from functools import cached_property
-from typing import Any, cast
+import ctypes
+import warnings
+from importlib.metadata import version
+from typing import Any
 
-import llvmlite.binding as llvm
-from numba.core import codegen, cpu, registry, typed_passes, untyped_passes
-from numba.core.compiler import Compiler, CompilerBase
-from numba.core.compiler_machinery import PassManager
-from numba.core.target_extension import (
-    CPU,
-    dispatcher_registry,
-    jit_registry,
-    target_override,
-    target_registry,
+NEWEST = (0, 68)
+"""The newest numba that the tests have run with; see pyproject.toml for the oldest."""
+
+FALLBACK = (
+    "numba {version} lacks parts by which the kernel is compiled ({error}): it is compiled by numba's public "
+    "interface, which takes several times as long; `pip install 'numba<{next}'` avoids that"
 )
-from numba.core.typing import mathdecl
-from numba.core.typing.context import Context
-
-NAME = "hbvm kernel"
-OPTIONS = {
-    "nopython": True,
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "boundscheck": False,
-    "_nrt": False,  # no reference counts: machine code that needs nothing of numba once it is compiled
-}
+REFUSAL = "numba {version} cannot compile the kernel ({error}): pip install 'numba<{next}'"
 
 
-class _Library(codegen.JITCodeLibrary):
-    """What one function was lowered to."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-
-    def finalize(self) -> None:
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        return 0  # nothing is called in this process
+def _told(sentence: str, error: BaseException) -> str:
+    first = " ".join(str(error).split())[:120]
+    return sentence.format(
+        version=version("numba"),
+        error=f"{type(error).__name__}: {first}",
+        next=f"{NEWEST[0]}.{NEWEST[1] + 1}",
+    )
 
 
-class _Codegen(codegen.JITCPUCodegen):
-    _library_class = _Library
-
-    def set_env(self, env_name: str, env: Any) -> None:
-        """Environments are for functions that raise."""
+def _unseen() -> bool:
+    """Whether this numba is newer than those that the tests have run with."""
+    return tuple(int(part) for part in version("numba").split(".")[:2]) > NEWEST
 
 
-class _Processor(CPU):
-    """The processor, once more."""
-
-
-class _Types(Context):
-    """What numba knows of types, without NumPy's: each `+` would be looked up among the ufuncs too."""
-
-    def load_additional_registries(self) -> None:
-        self.install_registry(mathdecl.registry)
-
-
-class _Target(registry.CPUTarget):
-    _made: Any = None
-
-    @property
-    def target_context(self) -> Any:
-        if self._made is None:
-            self._made = cpu.CPUContext(self.typing_context, self._target_name)
-            self._made._internal_codegen = _Codegen(NAME)
-        return self._made
-
-    @cached_property
-    def _types(self) -> _Types:
-        return _Types()
-
-    @property
-    def typing_context(self) -> Any:
-        return self._types
-
-
-class _Passes(CompilerBase):
-    """What of numba's passes plain functions need: no closures, no array expressions, no object mode."""
-
-    def define_pipelines(self) -> list[PassManager]:
-        passes = PassManager(NAME)
-        for one in (
-            untyped_passes.TranslateByteCode,
-            untyped_passes.FixupArgs,
-            untyped_passes.IRProcessing,
-            untyped_passes.ReconstructSSA,
-            typed_passes.NopythonTypeInference,
-            typed_passes.PreLowerStripPhis,
-            typed_passes.NativeLowering,
-            typed_passes.NoPythonBackend,
-        ):
-            passes.add_pass(one, one.__name__)
-        passes.finalize()
-        return [passes]
-
-
-class _Function(registry.CPUDispatcher):
-    """A function that is compiled when another one or an entry needs it."""
-
-    targetdescr = cast(Any, _Target(NAME))
-
-    def compile(self, sig: Any) -> Any:
-        with target_override(NAME):
-            return super().compile(sig)
-
-
-def compiled(function: Any, passes: type[CompilerBase] = _Passes) -> Any:
-    """Decorate a function of the kernel: numba code that allocates nothing and raises nothing."""
-    return _Function(function, locals={}, targetoptions=OPTIONS, pipeline_class=passes)
-
-
-class _Rule(_Function):
-    """A function of numbers in compiled code, and of rows under construction in Python."""
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        return self.py_func(*args, **kwargs)
-
-
-def for_both_widths(function: Any) -> Any:
-    """Decorate a rule, which is compiled for one number and written out for a row of them.
-
-    It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
-    `compiled` function it is one; called by Python, where the code of lanes is written, it writes
-    instructions for `integrators.kernel.simd.values.Value`.
-    """
-    return _Rule(function, locals={}, targetoptions=OPTIONS, pipeline_class=_Passes)
-
-
-def _jit(*functions: Any, **options: Any) -> Any:
-    """Compile numba's own helpers for this target too."""
-    return compiled(functions[0], Compiler) if functions else _jit
-
-
-target_registry[NAME] = _Processor
-dispatcher_registry[_Processor] = _Function
-jit_registry[_Processor] = _jit
-
-
-def module(function: Any, kinds: tuple[Any, ...]) -> tuple[Any, str]:
-    """Compile a `compiled` function; return a module of it and all that it calls, and its name there.
+def _checked(way: Any) -> Any:
+    """Return a way to compile, if it gives the right number for a small function.
 
     Raises
     ------
-    numba.core.errors.NumbaError
-        If it cannot be compiled for these types.
+    Exception
+        Of any type, by whatever that numba lacks.
     """
-    function.compile(kinds)
-    made = function.overloads[kinds]
-    libraries = [made.library]
-    for library in libraries:
-        libraries += [one for one in library._linking_libraries if one not in libraries]
-    first, *rest = [library._final_module.clone() for library in libraries]
-    for other in rest:
-        for value in other.functions:
-            if not value.is_declaration and value.linkage == llvm.Linkage.external:
-                value.linkage = "linkonce_odr"  # several may bring the same helper
-        first.link_in(other)
-    return first, made.fndesc.llvm_func_name
+    from numba import types
+
+    from integrators.kernel.native import binary
+
+    @way.for_both_widths
+    def half(x):
+        return x * 0.5
+
+    @way.compiled
+    def summed(n):
+        total = 0.0
+        for i in range(n):
+            total += half(i * 1.0)
+        return int(total)
+
+    code = binary.emitted(way.module(summed, (types.int64,)), [(types.int64, "i64")], "i64")
+    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(binary.load(code))(9)
+    if found != 18:
+        raise ArithmeticError(f"a sum of 18 is {found}")
+    return way
+
+
+def _chosen() -> Any:
+    try:
+        from integrators.kernel.native import private
+
+        return _checked(private) if _unseen() else private
+    except Exception as error:  # a module, a name or a way to call it is gone
+        try:
+            from integrators.kernel.native import public
+
+            way = _checked(public)
+        except Exception as worse:
+            raise ImportError(_told(REFUSAL, worse)) from worse
+        warnings.warn(_told(FALLBACK, error), RuntimeWarning, stacklevel=2)
+        return way
+
+
+_way = _chosen()
+
+compiled: Any = _way.compiled
+"""Decorate a function of the kernel: numba code that allocates nothing and raises nothing."""
+
+for_both_widths: Any = _way.for_both_widths
+"""Decorate a rule, which is compiled for one number and written out for a row of them.
+
+It has no branches, and its operations are those of `integrators.kernel.simd.operations`. Called by a
+`compiled` function it is one; called by Python, where the code of lanes is written, it writes
+instructions for `integrators.kernel.simd.values.Value`.
+"""
+
+module: Any = _way.module
+"""Compile a `compiled` function; return a module of it and all that it calls, and its name there."""

@@ -1,4 +1,4 @@
-"""The kernel's bitcode beside the package: the same machine code without numba, or as if there were none."""
+"""LLVM's text of the kernel beside the package: the same machine code, or as if it were not there."""
 
 import lzma
 
@@ -12,21 +12,21 @@ ENGINE = ENGINES["ensembles"]  # the smallest
 
 
 @pytest.fixture(scope="module")
-def bitcode():
+def text():
     return ENGINE.lower()
 
 
 @pytest.fixture
-def file(bitcode, tmp_path, monkeypatch):
+def file(text, tmp_path, monkeypatch):
     monkeypatch.setattr(lowered, "FOLDER", tmp_path / "lowered")
-    lowered.write({ENGINE.key: bitcode})
+    lowered.write({ENGINE.key: text})
     (file,) = (tmp_path / "lowered").iterdir()
     return file
 
 
-def test_it_becomes_the_same_object_file(bitcode, file):
-    assert lowered.get(ENGINE.key) == bitcode
-    assert binary.build_lowered(bitcode) == binary.build(*ENGINE._compiled())
+def test_it_becomes_the_same_object_file(text, file):
+    assert lowered.get(ENGINE.key) == text
+    assert binary.build_lowered(text) == binary.build(*ENGINE._compiled())
 
 
 def test_numba_is_asked_only_where_there_is_none(file, tmp_path, monkeypatch):
@@ -42,7 +42,7 @@ def test_numba_is_asked_only_where_there_is_none(file, tmp_path, monkeypatch):
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path / "first"))
     assert ENGINE.code().address > 1000
     assert not asked
-    file.write_bytes(lzma.compress(b"no bitcode"))
+    file.write_bytes(lzma.compress(b"no text of LLVM"))
     monkeypatch.setattr(binary, "_loaded", {})
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path / "second"))
     assert ENGINE.code().address == 1
@@ -55,12 +55,13 @@ def test_what_cannot_be_read_is_not_there(file, content):
     assert lowered.get(ENGINE.key) is None
 
 
-def test_that_of_other_sources_systems_and_later_versions_is_not_there(file, bitcode, monkeypatch):
+def test_that_of_other_sources_systems_and_later_versions_is_not_there(file, text, monkeypatch):
     assert lowered.get(ENGINE.key + "0") is None
-    newer = f".{llvm.llvm_version_info[0] + 1}.xz"
-    file.rename(file.with_name(file.name.partition(".")[0] + newer))
-    assert lowered.get(ENGINE.key) is None
-    lowered.write({ENGINE.key: bitcode})  # and what lay there is gone
+    for other in (-1, 1):
+        version = f".{llvm.llvm_version_info[0] + other}.xz"
+        file = file.rename(file.with_name(file.name.partition(".")[0] + version))
+        assert lowered.get(ENGINE.key) is None
+    lowered.write({ENGINE.key: text})  # and what lay there is gone
     assert len(list(file.parent.iterdir())) == 1
     monkeypatch.setattr(llvm, "get_process_triple", lambda: "mips-unknown-linux-gnu")
     assert lowered.get(ENGINE.key) is None

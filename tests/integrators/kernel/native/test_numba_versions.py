@@ -1,0 +1,85 @@
+"""Without private parts of numba and llvmlite, and with a numba that nobody has tried."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HIDE = """
+import sys, numba
+from importlib import import_module
+from integrators.kernel.native import lowered
+from pathlib import Path
+lowered.FOLDER = Path("nowhere")  # else most of the kernel were compiled already
+def hide(part):
+    module, name = part.split(":")
+    delattr(import_module(module), name)
+"""
+NEWER = """
+import importlib.metadata
+kept = importlib.metadata.version
+importlib.metadata.version = lambda name: "0.99.0" if name == "numba" else kept(name)
+"""
+PRIVATE = "numba.core.registry:CPUTarget"  # numba itself needs it at its import only
+WAYS = "import pytest; sys.exit(pytest.main([*{options!r}, '-W', 'default', {file!r}]))"
+ROOT = Path(__file__).parents[4]
+
+
+def run(tmp_path, code, cache="cache"):
+    return subprocess.run(
+        [sys.executable, "-c", HIDE + code], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={"HBVM_BENCH_CACHE": str(tmp_path / cache), "PATH": "", "HOME": str(tmp_path)},
+    )  # fmt: skip
+
+
+def test_a_numba_that_can_do_nothing_gives_a_sentence(tmp_path):
+    hidden = f"hide({PRIVATE!r}); hide('numba.extending:register_jitable')\n"
+    done = run(tmp_path, hidden + "from integrators.kernel.native import jit")
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert "cannot compile the kernel (" in last
+    assert last.endswith("pip install 'numba<0.69'")
+
+
+def test_a_wrong_number_is_not_believed(tmp_path):
+    wrong = "import llvmlite.binding as llvm\nfrom integrators.kernel.native import binary\n"
+    wrong += (
+        "binary._entry, kept = (lambda *a: kept(*a).replace('ret i64 %z', 'ret i64 17')), binary._entry\n"
+    )
+    done = run(tmp_path, NEWER + wrong + "from integrators.kernel.native import jit")
+    assert done.returncode == 1
+    assert "a sum of 18 is 17" in done.stderr.strip().splitlines()[-1]
+
+
+@pytest.mark.parametrize(("shim", "way"), [(NEWER, "private"), (f"hide({PRIVATE!r})\n", "public")])
+def test_a_newer_numba_is_tried(tmp_path, shim, way):
+    done = run(tmp_path, shim + "from integrators.kernel.native import jit; print(jit._way.__name__)")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split(".")[-1].strip() == way
+    assert done.stderr.count("RuntimeWarning: numba ") == (way == "public")
+
+
+@pytest.mark.slow
+def test_each_way_through_the_kernel_by_the_public_interface(tmp_path):
+    options = ["-o", "addopts=", "-q", "-p", "no:cacheprovider", "-m", "portable"]
+    file = "tests/integrators/test_processors.py"
+    done = run(tmp_path, f"hide({PRIVATE!r})\n" + WAYS.format(options=options, file=file))
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert "numba's public interface" in done.stdout
+
+
+def test_machine_code_is_loaded_without_mcjit(tmp_path):
+    code = """
+import llvmlite.binding as llvm
+from integrators.kernel.native import binary
+del llvm.create_mcjit_compiler
+machine = binary._machine()
+text = "define i64 @hbvm_entry(i64 %x) { %y = mul i64 %x, 3 ret i64 %y }"
+import ctypes
+for _ in range(2):  # two of the same name
+    address = binary.load(machine.emit_object(llvm.parse_assembly(text)))
+    print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(14))
+"""
+    done = run(tmp_path, code)
+    assert done.stdout.split() == ["42", "42"], done.stderr
