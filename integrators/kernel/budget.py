@@ -15,7 +15,7 @@ from time import perf_counter
 import numpy as np
 
 import problems
-from integrators.kernel.native import binary
+from integrators.kernel.native import machine
 from integrators.kernel.native.field import assembly
 from integrators.kernel.program import HBVMProgram
 from integrators.kernel.tables import WIDE
@@ -128,7 +128,7 @@ def _say(problem: Problem, k: int, s: int, h: float) -> None:
         print(f"  product  {4 * shape.rows * lanes * modes} flops, through {s} coefficients")
     cost = measure(problem, k, s, h)
     print(f"  measured {cost.iteration:.1f} ns per iteration, {cost.iterations:.1f} iterations per step,")
-    print(f"           {cost.step:.0f} ns per step besides ({binary.processor()})")
+    print(f"           {cost.step:.0f} ns per step besides ({machine.processor()})")
 
 
 def main() -> None:

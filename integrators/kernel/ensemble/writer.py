@@ -5,7 +5,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from integrators.kernel.native import binary
+from integrators.kernel.native import machine
 from integrators.kernel.native.memory import Slot
 from integrators.kernel.simd.emit import ALIGNMENT, DOUBLE, INTEGER, splat, vector
 from integrators.kernel.simd.values import Value
@@ -33,7 +33,7 @@ class Writer:
         pointer = DOUBLE.as_pointer()
         arguments = [pointer.as_pointer(), pointer.as_pointer(), self.kind, pointer, pointer, pointer]
         self.field = ir.Function(module, ir.FunctionType(ir.IntType(32), arguments), inner)
-        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 2), binary.ENTRY)
+        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 2), machine.ENTRY)
         self.module, self.function = module, function
         self.b: Any = ir.IRBuilder(function.append_basic_block("start"))
         self.words = self.b.inttoptr(function.args[0], INTEGER.as_pointer())

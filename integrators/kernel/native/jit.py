@@ -9,6 +9,8 @@ import warnings
 from importlib.metadata import version
 from typing import Any
 
+from integrators.kernel.native import machine
+
 NEWEST = (0, 68)
 """The newest numba that the tests have run with; see pyproject.toml for the oldest."""
 
@@ -43,8 +45,6 @@ def _checked(way: Any) -> Any:
     """
     from numba import types
 
-    from integrators.kernel.native import binary
-
     @way.for_both_widths
     def half(x):
         return x * 0.5
@@ -56,8 +56,8 @@ def _checked(way: Any) -> Any:
             total += half(i * 1.0)
         return int(total)
 
-    code = binary.emitted(way.module(summed, (types.int64,)), [(types.int64, "i64")], "i64")
-    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(binary.load(code))(9)
+    code = machine.emitted(way.module(summed, (types.int64,)), [(types.int64, "i64")], "i64")
+    found = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(machine.load(code))(9)
     if found != 18:
         raise ArithmeticError(f"a sum of 18 is {found}")
     return way

@@ -13,7 +13,7 @@ from typing import Any
 from llvmlite import ir
 
 from integrators.kernel.context import EVALUATE, Context
-from integrators.kernel.native import binary, field, store
+from integrators.kernel.native import binary, field, machine, store
 from integrators.kernel.native.memory import Slot
 from integrators.kernel.simd.emit import (
     ALIGNMENT,
@@ -55,7 +55,7 @@ def compile_sweeps(system: System, what: emit.What, lanes: int, rows: int) -> bi
     """
     source = emit.source(system, what, "numba")
     modules = binary.sources(*field.SOURCES, "context", "step/fused")
-    by_columns = lanes == WIDTH or binary.many_registers()
+    by_columns = lanes == WIDTH or machine.many_registers()
     name = store.key("sweeps", source.text, str(lanes), str(rows), str(by_columns), modules)
 
     def make() -> tuple[str, bytes]:
@@ -80,7 +80,7 @@ def sweeps(inner: str, lanes: int, rows: int, by_columns: bool) -> str:
         ir.IntType(32), [pointer.as_pointer(), pointer.as_pointer(), whole, pointer, pointer, pointer]
     )
     field = ir.Function(module, status, inner)
-    sweep = ir.Function(module, SWEEP, binary.ENTRY)
+    sweep = ir.Function(module, SWEEP, machine.ENTRY)
     context, count, after = sweep.args
     b: Any = ir.IRBuilder(sweep.append_basic_block("start"))
     words = b.inttoptr(context, INTEGER.as_pointer())

@@ -43,9 +43,9 @@ def test_a_numba_that_can_do_nothing_gives_a_sentence(tmp_path):
 
 
 def test_a_wrong_number_is_not_believed(tmp_path):
-    wrong = "import llvmlite.binding as llvm\nfrom integrators.kernel.native import binary\n"
+    wrong = "import llvmlite.binding as llvm\nfrom integrators.kernel.native import machine as native\n"
     wrong += (
-        "binary._entry, kept = (lambda *a: kept(*a).replace('ret i64 %z', 'ret i64 17')), binary._entry\n"
+        "native._entry, kept = (lambda *a: kept(*a).replace('ret i64 %z', 'ret i64 17')), native._entry\n"
     )
     done = run(tmp_path, NEWER + wrong + "from integrators.kernel.native import jit")
     assert done.returncode == 1
@@ -72,13 +72,13 @@ def test_each_way_through_the_kernel_by_the_public_interface(tmp_path):
 def test_machine_code_is_loaded_without_mcjit(tmp_path):
     code = """
 import llvmlite.binding as llvm
-from integrators.kernel.native import binary
+from integrators.kernel.native import machine as native
 del llvm.create_mcjit_compiler
-machine = binary._machine()
+machine = native._machine()
 text = "define i64 @hbvm_entry(i64 %x) { %y = mul i64 %x, 3 ret i64 %y }"
 import ctypes
 for _ in range(2):  # two of the same name
-    address = binary.load(machine.emit_object(llvm.parse_assembly(text)))
+    address = native.load(machine.emit_object(llvm.parse_assembly(text)))
     print(ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(address)(14))
 """
     done = run(tmp_path, code)

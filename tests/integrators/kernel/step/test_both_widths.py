@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
-from integrators.kernel.native import binary, field
+from integrators.kernel.native import binary, field, machine
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.native.memory import aligned
 from integrators.kernel.simd.emit import ALIGNMENT, INTEGER, text_of, vector
@@ -52,7 +52,7 @@ def ends(t, y, par, out):
 def on_rows(rule):
     """Return LLVM's text of the rule on rows."""
     module, kind = ir.Module(), vector(LANES)
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 4), binary.ENTRY)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER] * 4), machine.ENTRY)
     b = ir.IRBuilder(function.append_basic_block())
     inputs, outputs = (b.inttoptr(function.args[i], kind.as_pointer()) for i in (1, 3))
 

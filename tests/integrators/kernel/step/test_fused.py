@@ -30,8 +30,8 @@ def test_fused_sweeps_make_the_same_bits(name, settings, monkeypatch):
     program = HBVMProgram(problem.system, **settings)
     assert program.contexts()[0].fused != 0
     fused = run(problem, settings, times)
-    other = not whole.binary.many_registers()
-    monkeypatch.setattr(whole.binary, "many_registers", lambda: other)
+    other = not whole.machine.many_registers()
+    monkeypatch.setattr(whole.machine, "many_registers", lambda: other)
     assert run(problem, settings, times)[0].tobytes() == fused[0].tobytes()
     monkeypatch.setattr(whole, "ROWS", 0)
     assert HBVMProgram(problem.system, **settings).contexts()[0].fused == 0

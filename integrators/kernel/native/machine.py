@@ -1,0 +1,162 @@
+"""LLVM's text made machine code of this processor, and loaded; numba is not needed."""
+
+import ctypes.util
+import gc
+import logging  # noqa: F401 -- its lock must be taken after ours at a fork: whoever compiles may log
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import llvmlite.binding as llvm
+
+ENTRY = "hbvm_entry"
+
+Made = TypeVar("Made", bytes, str)
+
+lock = threading.RLock()
+"""Held while code is compiled or loaded, and during a fork, which waits for that: LLVM's and numba's own
+locks would stay locked for ever in the child, where the thread that holds them does not exist."""
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
+_engines: list[Any] = []  # an engine owns its code: none may be collected
+
+
+def emitted(made: tuple[Any, str], arguments: Sequence[tuple[Any, str]], returns: str) -> bytes:
+    """Return the object file of what `jit.module` has returned; the rest as for `build`."""
+    with alone():
+        return optimized(entered(made, arguments, returns), object_file)
+
+
+def entered(
+    made: tuple[Any, str],
+    arguments: Sequence[tuple[Any, str]],
+    returns: str,
+    around: Callable[[str], str] | None = None,
+) -> Any:
+    """Return the module with an `ENTRY`, which alone is seen from outside."""
+    module, inner = made
+    entry = around(inner) if around else _entry(inner, [text for _, text in arguments], returns)
+    module.link_in(llvm.parse_assembly(entry))
+    for value in [*module.functions, *module.global_variables]:
+        if not value.is_declaration and value.name != ENTRY:
+            value.linkage = "internal"
+    return module
+
+
+def optimized(module: Any, emit: Callable[[Any, Any], Made]) -> Made:
+    """Return what is emitted of a module that is optimized for this processor."""
+    machine = _machine()
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return emit(machine, module)
+
+
+def object_file(machine: Any, module: Any) -> bytes:
+    """Return a module as an object file."""
+    return machine.emit_object(module)
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """Let one thread compile, and leave garbage where it is: looking for it takes a tenth of the time."""
+    with lock:
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            yield
+        finally:
+            if collecting:
+                gc.enable()
+
+
+def processor() -> str:
+    """Return LLVM's name of the processor that code is made for."""
+    return os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name()
+
+
+def features() -> str:
+    """Return the instructions that code may use, as LLVM writes them.
+
+    The variable alone decides, as it does in numba: the name of a processor does not restrict them.
+    """
+    given = os.environ.get("NUMBA_CPU_FEATURES")
+    return llvm.get_host_cpu_features().flatten() if given is None else given
+
+
+def many_registers() -> bool:
+    """Whether the processor has 32 registers of eight doubles, and not 16 of four or 32 of two."""
+    return "+avx512f" in features().split(",")
+
+
+def load(code: bytes) -> int:
+    """Put an object file into this process; return the address of its `ENTRY`."""
+    with lock:
+        _initialize()
+        if hasattr(llvm, "create_mcjit_compiler"):
+            engine: Any = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+            engine.finalize_object()
+            _engines.append(engine)
+            return engine.get_function_address(ENTRY)
+        # LLVM's successor of MCJIT takes ten times as long to begin, and so comes second.
+        name = f"{ENTRY} {len(_engines)}"
+        engine = llvm.create_lljit_compiler(use_jit_link=False)
+        image = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)
+        library = image.link(engine, name)
+        _engines.append((engine, library))
+        return library[ENTRY]
+
+
+@lru_cache(maxsize=1)
+def _initialize() -> None:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    # Fields may call pow, tan, ... of the C library, which Python need not have loaded for all to see.
+    if llvm.address_of_symbol("pow") is None and (library := ctypes.util.find_library("m")) is not None:
+        llvm.load_library_permanently(library)
+
+
+def _machine() -> Any:
+    _initialize()
+    return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
+        cpu=processor(),
+        features=features(),
+        opt=3,
+        reloc="static",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+def _entry(inner: str, kinds: Sequence[str], returns: str) -> str:
+    """Write the C function around numba's own calling convention, which returns through a pointer."""
+    vectors = [kind.startswith("<") for kind in kinds]
+    # What a pointer points to is not reached by the other arguments: values may stay in registers.
+    outer = ", ".join(
+        f"{'ptr noalias' if v or kind == 'ptr' else kind} %a{i}"
+        for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+    )
+    loads = "\n".join(
+        f"  %v{i} = load {kind}, ptr %a{i}, align 64"
+        for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+        if v
+    )
+    values = ", ".join(
+        f"{kind} %{'v' if v else 'a'}{i}" for i, (kind, v) in enumerate(zip(kinds, vectors, strict=True))
+    )
+    slot = "ptr" if returns == "void" else returns
+    result = "  ret void" if returns == "void" else f"  %z = load {returns}, ptr %result\n  ret {returns} %z"
+    return f"""
+declare i32 @"{inner}"(ptr, ptr, {", ".join(kinds)})
+define {returns} @{ENTRY}({outer}) {{
+  %result = alloca {slot}
+  %exception = alloca ptr
+{loads}
+  %status = call i32 @"{inner}"(ptr %result, ptr %exception, {values})
+{result}
+}}
+"""
