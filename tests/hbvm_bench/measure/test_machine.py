@@ -157,7 +157,7 @@ def test_results_of_several_kinds_lie_side_by_side(tmp_path):
     keep(of(ZEN5, 3.0), tmp_path)
     keep(of(ZEN4, 1.25, "henon_heiles"), tmp_path)
     page = text_in(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {archive.NAME, "README.md", "index.html"}
+    assert {path.name for path in tmp_path.iterdir()} == {archive.NAME, "README.md", "index.html", "figures"}
     assert "| problem | against | goal | znver4-256bit | znver5 |" in page
     assert (
         "| `kepler(e=0.6, t_end=3150.0)` | `Taylor(tol=1e-15)` | ≥ 2 | 2.00× reached | 3.00× reached" in page
