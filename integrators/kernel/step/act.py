@@ -4,7 +4,6 @@ from integrators.kernel.context import ACCUMULATE, ACTS, BEGIN_ANEW, BY_VALUES, 
 from integrators.kernel.native.jit import compiled
 from integrators.kernel.simd.memory import call_look
 from integrators.kernel.step.control import SHORTEST
-from integrators.kernel.step.projection import take_energy
 from integrators.kernel.step.vary import attempt
 
 ONWARD = 1.25  # times that are probably enough to see the next one
@@ -44,8 +43,6 @@ def change(ctx):
     outcome = call_look(ctx.look, ctx, ctx.look_memory)
     if outcome == DONE:
         ctx.acting = BEGIN_ANEW
-        if ctx.energy_code:
-            take_energy(ctx)  # steps end with that of the new state from here on
     return outcome
 
 
