@@ -292,12 +292,17 @@ class Context(Memory):
     error_degree = Integer()  # of the Legendre coefficient that the error is estimated by
     estimators = Array()  # b_l P_j(c_l), a row for each of GAMMA_0 .. AT_END
     estimates = Array(8, "rows")  # the coefficients GAMMA_0 .. LAST of the field, row by row
+    # Velocity by momentum of a block, and the inverse; 1 in first-order form. Blocks compare as velocities:
+    # a light body has small momenta, and is no less important.
+    speed = Array("block_count")
+    mass = Array("block_count")
     scale = Array("block_count")  # of blocks: their size in the step that is estimated,
     slope = Array("block_count")  # the largest coefficient of their field,
     gamma_error = Array("block_count")  # gamma_s, which the error is estimated by,
     gamma_last = Array("block_count")  # gamma_{k-1}, which the defect is estimated by,
     abrupt = Array("block_count")  # and the largest that does not fall off as a smooth field's do
-    steepest = Array("block_count")  # slope in each group
+    fastest = Array("block_count")  # scale in each group, as a velocity,
+    steepest = Array("block_count")  # and slope
     absolute = Array("block_count")  # the absolute tolerance of blocks, divided by the relative one
     expected = Array("block_count")  # the largest size that blocks will reach, as far as is known
     rescaled = Integer()  # > 0: errors are relative to that where it is larger than a block's own size

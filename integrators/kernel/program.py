@@ -344,8 +344,11 @@ class HBVMProgram(Compiled):
         """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
         for context in contexts:
             context.par[:] = par
+            context.speed[:] = 1.0
             if self.second:
-                context.velocity[: self.shape.rows] = self._velocity(par)
+                context.velocity[: self.shape.rows] = velocity = self._velocity(par)
+                context.speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
+            context.mass[:] = 1.0 / context.speed[:]
         contexts[0].h = self.h
         if self.kept:
             self.kept.load(contexts, y, par, t0)

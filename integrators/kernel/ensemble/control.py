@@ -109,8 +109,9 @@ class Control:
                 w.put(gap, w.array(Group.slots["gaps"]), start)
                 for name, value in zip(MEASURED, (scale, slope, gamma_error, gamma_last), strict=True):
                     w.put(value, getattr(w, name), start)
-                raise_to(tops[0], scale)
-                raise_to(tops[1], slope)
+                speed = self.speed(start)
+                raise_to(tops[0], scale * speed)
+                raise_to(tops[1], slope * speed)
 
             w.each(blocks, measure)
             top, steep = Value(b, b.load(largest)), Value(b, b.load(steepest))
@@ -119,8 +120,9 @@ class Control:
             def compare(block: Any, first: int = first, width: int = width, tops: Any = (top, steep)) -> None:
                 start = w.at(block, width, first)
                 scale, slope, gamma_error, gamma_last = (w.get(getattr(w, name), start) for name in MEASURED)
-                scale = rules.size_in_step(scale, tops[0])
-                slope = rules.slope_beside(slope, tops[1], self.number("least_slope"))
+                mass = w.one / self.speed(start)
+                scale = rules.size_in_step(scale, tops[0] * mass)
+                slope = rules.slope_beside(slope, tops[1] * mass, self.number("least_slope"))
                 for gamma, worst in ((gamma_error, error), (gamma_last, defect)):
                     raise_to(worst, where(slope > 0.0, rules.local_error(self.h, gamma, slope, scale), 0.0))
                 note(visible, rules.is_visible(self.h, gamma_error, scale))
@@ -130,6 +132,14 @@ class Control:
         self.error, self.defect = (Value(b, b.load(worst)) for worst in (error, defect))
         self.certain = b.and_(b.not_(b.load(doubtful)), b.load(changing))
         self.visible = b.load(visible)
+
+    def speed(self, d: Any) -> Value:
+        """Return the velocity by momentum of row d, as `Context.speed`."""
+        w = self.w
+        if not w.form.second:
+            return w.one
+        speed = w.get(w.velocity, d).absolute()
+        return where(speed > 0.0, speed, w.one)
 
     def coefficients(self, d: Any) -> list[Value]:
         """Return the sizes of the field's coefficients `GAMMA_0` .. `LAST` in row d."""

@@ -67,6 +67,8 @@ def load(group, lane):
     for d in range(rows):
         ctx.velocity[d] = group.all_velocity[rows * i + d]
         group.velocity[lanes * d + lane] = ctx.velocity[d]
+        speed = abs(ctx.velocity[d]) if ctx.second and ctx.velocity[d] != 0.0 else 1.0
+        ctx.speed[ctx.block[d]], ctx.mass[ctx.block[d]] = speed, 1.0 / speed
     for j in range(ctx.padded * ctx.lanes):
         ctx.values[j] = 0.0
     ctx.t0 = group.start_time
@@ -223,7 +225,7 @@ def vanishes(ctx):
     """Whether a state is so near 0 that its steps are solved to less and less of its size in lanes."""
     found = False
     for g in range(ctx.group_count):
-        found = found or 0.0 < ctx.largest[g] < SMALLEST
+        found = found or 0.0 < ctx.fastest[g] < SMALLEST
     return found
 
 

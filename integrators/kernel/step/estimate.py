@@ -222,7 +222,13 @@ def momentum(ctx, d):
 @compiled
 def own_size(ctx, b):
     """Return the size of a block in the step that is estimated, unless that is next to nothing."""
-    return size_in_step(ctx.scale[b], ctx.largest[ctx.group[b]])
+    return size_in_step(ctx.scale[b], ctx.fastest[ctx.group[b]] * ctx.mass[b])
+
+
+@compiled
+def steepest_beside(ctx, b):
+    """Return the steepest field in the group of a block, for its mass."""
+    return ctx.steepest[ctx.group[b]] * ctx.mass[b]
 
 
 @compiled
@@ -268,18 +274,18 @@ def estimate(ctx):
             ctx.abrupt[b] = greatest(ctx.gamma_error[b], ctx.gamma_last[b])
     elif doubtful:
         note_what_stays(ctx)
-    group, steepest = ctx.group, ctx.steepest
     allowed, allowed_defect, negligible = ctx.allowed_error, ctx.allowed_defect, ctx.negligible
     narrow = h <= NARROWEST * abs(ctx.t0)
     error, defect = 0.0, 0.0
     kinked = borrowed = 0
     rescaled, slopes, absolute = ctx.rescaled, ctx.slope, ctx.absolute
     for b in range(ctx.block_count):
-        slope = slope_beside(slopes[b], steepest[group[b]], ctx.least_slope)
+        steepest = steepest_beside(ctx, b)
+        slope = slope_beside(slopes[b], steepest, ctx.least_slope)
         if slope > 0.0:
             own, scale = own_size(ctx, b), block_size(ctx, b)
             gamma_error, gamma_last, high = ctx.gamma_error[b], ctx.gamma_last[b], ctx.abrupt[b]
-            if slope > slopes[b] and high <= UNSEEN * steepest[group[b]]:
+            if slope > slopes[b] and high <= UNSEEN * steepest:
                 high = 0.0
             most, most_defect = INFINITY, INFINITY
             if doubtful and high > 0.0:
@@ -310,7 +316,7 @@ def measure_blocks(ctx):
     h, doubt = abs(ctx.h), ctx.doubt
     error_decay, defect_decay = ctx.error_decay, ctx.defect_decay
     scale, slopes, gamma_error, gamma_last = ctx.scale, ctx.slope, ctx.gamma_error, ctx.gamma_last
-    group, top, steepest = ctx.group, ctx.largest, ctx.steepest
+    group, top, steepest = ctx.group, ctx.fastest, ctx.steepest
     for b in range(ctx.block_count):
         scale[b] = slopes[b] = gamma_error[b] = gamma_last[b] = ctx.abrupt[b] = 0.0
     for g in range(ctx.group_count):
@@ -331,8 +337,8 @@ def measure_blocks(ctx):
         gamma_last[b] = greatest(gamma_last[b], defect)
     for b in range(ctx.block_count):
         g = group[b]
-        top[g] = greatest(top[g], scale[b])
-        steepest[g] = greatest(steepest[g], slopes[b])
+        top[g] = greatest(top[g], scale[b] * ctx.speed[b])
+        steepest[g] = greatest(steepest[g], slopes[b] * ctx.speed[b])
     ctx.blind = 0 if changing else 1
     return doubtful
 
@@ -357,7 +363,7 @@ def log_decay(ctx):
         if steps == 3:
             last = next_coefficient(last, found[GAMMA_2], ctx.error_decay)
         if last > RESTLESS * ctx.slope[b]:
-            slope = slope_beside(ctx.slope[b], ctx.steepest[ctx.group[b]], ctx.least_slope)
+            slope = slope_beside(ctx.slope[b], steepest_beside(ctx, b), ctx.least_slope)
             if local_error(h, last, slope, size) <= RESTING * ctx.allowed_error:
                 continue
         if is_visible(h, next_coefficient(found[AT_ERROR], found[BEFORE_ERROR], ctx.error_decay), size):
