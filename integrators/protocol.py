@@ -42,6 +42,7 @@ by `offers`; without it the method still integrates. The conformance kit checks 
 12. `KeptError`: after ``USER_ERROR``, ``error`` is the exception that a function of the user raised.
 13. `Events`: ``with_events`` of a program starts steppers that look for events in their steps. Such an
     `EventStepper` has the ``search``, and ``look_to``, which searches the step ahead up to the last time.
+    `Actions`: with ``acts`` these events may change the state.
 14. `Interruptible`: another thread sets ``stop`` of a stepper to call it back from ``advance``. Events of
     many trajectories are looked for in several threads.
 15. `Batches`: ``batch`` of a program integrates many starts better than one after another, for
@@ -76,6 +77,7 @@ from problems.problem import Problem, System
 __all__ = [
     "CAPABILITIES",
     "SAMPLINGS",
+    "Actions",
     "AsHBVM",
     "Batches",
     "Checkpoints",
@@ -443,6 +445,18 @@ class EventStepper(Protocol):
         ...
 
 
+class Actions(Protocol):
+    """A program whose events may change the state (``Event(then=...)``).
+
+    Attributes
+    ----------
+    acts : bool
+        Whether they may.
+    """
+
+    acts: bool
+
+
 class Variations(Protocol):
     """A stepper that tangent vectors can follow.
 
@@ -600,7 +614,7 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients, AsHBVM,
+    Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

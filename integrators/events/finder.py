@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from integrators.events.event import Event
-from integrators.protocol import Array, Events, MethodBase, Status, offers
+from integrators.protocol import Actions, Array, Events, MethodBase, Status, offers
 from integrators.solution import Occurrences
 from problems.errors import InputError
 from problems.problem import Problem
@@ -181,11 +181,6 @@ class Ending:
         return int(np.count_nonzero(search.hits.sign * (times - self.stop) <= 0.0))
 
 
-def program_acts(program: Any) -> bool:
-    """Whether a program's trajectories can go on from a state that an event makes."""
-    return bool(getattr(program, "acts", False))
-
-
 def started_with_events(
     program: Any, method: MethodBase, problem: Problem, events: Mapping[str, Event]
 ) -> Callable[..., Any]:
@@ -197,7 +192,7 @@ def started_with_events(
         If the method cannot find events, or a function cannot be used.
     """
     acting = [name for name, event in events.items() if event.then is not None]
-    if acting and not program_acts(program):
+    if acting and not (offers(program, Actions) and program.acts):
         raise InputError(
             f"the event {acting[0]!r} changes the state, which {method!r} does not offer; use HBVM or Gauss "
             "with an adaptive step size (tol=), or leave out then=."

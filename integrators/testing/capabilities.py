@@ -11,6 +11,7 @@ from integrators.coefficients.order import order_of
 from integrators.events.event import Event
 from integrators.protocol import (
     SAMPLINGS,
+    Actions,
     AsHBVM,
     Batches,
     Checkpoints,
@@ -143,6 +144,25 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
     require(max(there) < 1e-9, f"the function vanishes at its events, but: {max(there):.1e}")
     ended = integrate(problem, method, grid, events=Event(crossing, name="crossing", terminal=True))
     require(ended.status is Status.EVENT and ended.t_stop == found.t[0], "a terminal event ends it")
+    return None
+
+
+def events_may_change_the_state(method: MethodBase, problem: Problem) -> str | None:
+    """Check that an event that leaves the state as it is changes nothing else."""
+    program: Any = method.compile(problem.system)
+    if not (offers(program, Actions) and program.acts):
+        return "its events change no state"
+    grid = irregular(problem)
+    plain = integrate(problem, method, grid)
+    level = float(plain.y[:, 0].min() + plain.y[:, 0].max()) / 2.0
+    event = Event(lambda y: y[0] - level, then=lambda y: [y[i] for i in range(problem.y0.size)], name="same")
+    solution = integrate(problem, method, grid, events=event)
+    require(solution.status is Status.FINISHED, f"it goes on after an action, but: {solution.reason}")
+    found: Any = solution.events["same"]
+    require(found.t.size > 0, "an event that happens is found")
+    require(np.array_equal(found.after, found.y), "the state after an event is what its action returns")
+    change = float(np.max(np.abs(solution.y - plain.y)))
+    require(change < BATCH_BOUND, f"an action that changes nothing changes no state, but by {change:.1e}")
     return None
 
 
@@ -297,6 +317,7 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     Checkpoints: checkpoints_continue_bit_for_bit,
     Interruptible: comes_back_when_it_is_stopped,
     Events: finds_events_beside_its_steps,
+    Actions: events_may_change_the_state,
     EventStepper: finds_events_beside_its_steps,
     Batches: batches_are_single_trajectories,
     PreparedBatches: prepared_batches_are_batches,

@@ -1,6 +1,6 @@
 """How the kernel's functions are compiled: by private parts of numba, or by its public interface.
 
-`private` compiles in a fraction of the time, but what it is made of may be gone from the next numba. A
+`private` compiles faster, but what it is made of may be gone from the next numba. A
 version that no test has seen is tried on a small function first, and where that fails `public` takes over.
 """
 
@@ -16,7 +16,7 @@ NEWEST = (0, 68)
 
 FALLBACK = (
     "numba {version} lacks parts by which the kernel is compiled ({error}): it is compiled by numba's public "
-    "interface, which takes several times as long; `pip install 'numba<{next}'` avoids that"
+    "interface, which takes longer; `pip install 'numba<{next}'` avoids that"
 )
 REFUSAL = "numba {version} cannot compile the kernel ({error}): pip install 'numba<{next}'"
 

@@ -3,8 +3,8 @@
 To lower them takes numba two thirds of a first compilation, and what comes out is the same for all
 processors of a system: only what LLVM makes of it depends on the processor at hand. A file is named by the
 key of its function (an edit of the sources has another one) and by the version of LLVM that wrote it: no
-other one promises to read it. Where there is none, numba lowers the function. Bitcode would be read some
-40 ms sooner in a first compilation of seconds, but compresses worse: 1.02 MB for the kernel, the text 0.63.
+other one promises to read it. Where there is none, numba lowers the function. Bitcode would be read a little
+sooner, but compresses worse: 1.02 MB for the kernel, the text 0.63.
 """
 
 import lzma

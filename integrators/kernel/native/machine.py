@@ -102,7 +102,7 @@ def load(code: bytes) -> int:
             engine.finalize_object()
             _engines.append(engine)
             return engine.get_function_address(ENTRY)
-        # LLVM's successor of MCJIT takes ten times as long to begin, and so comes second.
+        # LLVM's successor of MCJIT comes second: the tests of the recorded bits run with MCJIT.
         name = f"{ENTRY} {len(_engines)}"
         engine = llvm.create_lljit_compiler(use_jit_link=False)
         image = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(ENTRY)

@@ -1,6 +1,6 @@
 """The kernel's functions compiled by numba's public interface, where `private` does not work.
 
-numba optimizes and links each function by itself, which takes several times as long, and gives the text
+numba optimizes and links each function by itself, which takes longer, and gives the text
 of what it has made (``inspect_llvm``). The machine code is made of that text as of what `private` lowers.
 """
 
