@@ -404,7 +404,7 @@ class Context(Memory):
         }  # fmt: skip
         super().__init__({**numbers, **(more or {})}, {**tables, "block": shape.block, "group": shape.group})
         self.shape = shape
-        self.row_factor[:] = 1.0
+        self.row_factor[:] = self.speed[:] = self.mass[:] = 1.0
         self.kick_factor.reshape(-1, 8)[:, :4] = 1.0
 
     def read(self) -> Numbers:

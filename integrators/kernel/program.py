@@ -150,8 +150,8 @@ class HBVMProgram(Compiled):
             rows = system.dof
             block = block[:rows]
             group = group[: block[-1] + 1]
-        self._known_velocity: tuple[bytes, Array] = (b"?", np.empty(0))
-        unit = tables.unit(self.constants, self._velocity(np.full(system.n_par, np.nan)))
+        self._known_velocity: tuple[bytes, tuple[Array, Array, Array]] = (b"?", (np.empty(0),) * 3)
+        unit = tables.unit(self.constants, self._scale(np.full(system.n_par, np.nan)))
         self.fused = self._sweeps(what, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
@@ -344,25 +344,27 @@ class HBVMProgram(Compiled):
         """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
         for context in contexts:
             context.par[:] = par
-            context.speed[:] = 1.0
             if self.second:
-                context.velocity[: self.shape.rows] = velocity = self._velocity(par)
-                context.speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
-            context.mass[:] = 1.0 / context.speed[:]
+                context.velocity[: self.shape.rows], context.speed[:], context.mass[:] = self._velocity(par)
         contexts[0].h = self.h
         if self.kept:
             self.kept.load(contexts, y, par, t0)
 
-    def _velocity(self, par: Array) -> Array:
+    def _scale(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
         if not self.second:
             return np.ones(0)
+        return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
+
+    def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
+        """Return `_scale`, and what follows from it of blocks: `Context.speed` and `Context.mass`."""
         key = par.tobytes()
-        known, velocity = self._known_velocity  # read once: another thread may replace it
+        known, found = self._known_velocity  # read once: another thread may replace it
         if known != key:
-            velocity = emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
-            self._known_velocity = (key, velocity)
-        return velocity
+            velocity, speed = self._scale(par), np.ones(self.shape.group.size)
+            speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
+            self._known_velocity = key, found = key, (velocity, speed, 1.0 / speed)
+        return found
 
 
 class AdaptiveProgram(HBVMProgram):

@@ -45,7 +45,7 @@ def said(runs, words):
 
 
 def test_the_sentences_follow_from_the_verdicts(runs):
-    assert "because rounding keeps the symmetry" in said(runs, "Both methods")
+    assert "because rounding preserves the symmetry" in said(runs, "Both methods")
     astray = {key: dataclasses.replace(run, off_axis=0.1, plane=0.0) for key, run in runs.items()}
     assert said(astray, "Both methods") == "off the axis: 0.1. The plane drifts along z by up to 0"
     assert "But z itself is off" in said(runs, "Under HBVM")
