@@ -150,8 +150,9 @@ class HBVMProgram(Compiled):
             rows = system.dof
             block = block[:rows]
             group = group[: block[-1] + 1]
-        self._known_velocity: tuple[bytes, tuple[Array, Array, Array]] = (b"?", (np.empty(0),) * 3)
-        unit = tables.unit(self.constants, self._scale(np.full(system.n_par, np.nan)))
+        nothing = np.empty(0)
+        self._known_velocity = b"?", (nothing, nothing, nothing)
+        unit = tables.unit(self.constants, self._velocity_scale(np.full(system.n_par, np.nan)))
         self.fused = self._sweeps(what, rows, lanes) if unit and not self.kept else None
         self.shape = Shape(
             rows, self.second, unit, self.field.address, self.fused.address if self.fused else 0,
@@ -350,18 +351,18 @@ class HBVMProgram(Compiled):
         if self.kept:
             self.kept.load(contexts, y, par, t0)
 
-    def _scale(self, par: Array) -> Array:
+    def _velocity_scale(self, par: Array) -> Array:
         """Q' = velocity * p, of unit momenta; shape (dof,), empty in first-order form."""
         if not self.second:
             return np.ones(0)
         return emit.numpy(self.system, "velocity_scale")(0.0, np.zeros(self.system.dim), par)
 
     def _velocity(self, par: Array) -> tuple[Array, Array, Array]:
-        """Return `_scale`, and what follows from it of blocks: `Context.speed` and `Context.mass`."""
+        """Return `_velocity_scale`, and `Context.speed` and `Context.mass` of blocks."""
         key = par.tobytes()
         known, found = self._known_velocity  # read once: another thread may replace it
         if known != key:
-            velocity, speed = self._scale(par), np.ones(self.shape.group.size)
+            velocity, speed = self._velocity_scale(par), np.ones(self.shape.group.size)
             speed[self.shape.block] = np.where(velocity == 0.0, 1.0, np.abs(velocity))
             self._known_velocity = key, found = key, (velocity, speed, 1.0 / speed)
         return found
