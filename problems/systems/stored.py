@@ -68,14 +68,17 @@ def check_system(state: Mapping[str, Any], classes: Iterable[str]) -> dict[str, 
         *(f"guard:{n}" for n in guards),
     ]
     sizes = {"field": dim, "gradient": dim, "structure": dim * dim, "momentum": dim // 2}
-    sizes |= {"hamiltonian": 1, "domain": 1}
-    sizes |= {name: 1 for name in needed if ":" in name and name.partition(":")[2] not in vectors}
+    scalars = {"hamiltonian", "domain"}
+    scalars |= {name for name in needed if ":" in name and name.partition(":")[2] not in vectors}
+    sizes |= dict.fromkeys(scalars, 1)
     graph, functions = StoredGraph(state["graph"], Shape(dim, dof, n_par)), state["functions"]
     if not isinstance(functions, Mapping) or not set(needed) <= set(functions):
         refuse("it lacks a function")
     own = {name: functions[name] for name in functions if name in needed or name == "domain"}
     for name, plain in own.items():
         graph.check_function(plain, name, sizes.get(name))
+        if name in scalars and (len(plain[0][0]) != 1 or plain[1]):
+            refuse(f"{name} is not one number")
     return own
 
 
