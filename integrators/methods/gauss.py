@@ -62,7 +62,7 @@ class Gauss(MethodBase):
         With ``tol`` and nothing else but ``s``: adaptive steps that keep the long-time behaviour, because
         going back repeats them. Their density rho follows a rate w of the field,
 
-            w^4 = |(J^2)_qq|^2 + w_0^4,    J the Jacobian of the field,
+            w^4 = norm((J^2)_qq)^2 + w_0^4,    J the Jacobian of the field,
             log rho_{n+1/2} = log rho_{n-1/2} + 2 epsilon (w'/w)(y_n) / (rho_{n-1/2} + rho_{n+1/2}),
             h_{n+1/2} = epsilon / rho_{n+1/2},    log rho_{1/2} = log w(y_0) + (epsilon/2) (w'/w^2)(y_0),
 
