@@ -608,7 +608,13 @@ class AsHBVM(Protocol):
     """A method that is HBVM(k, s) for certain k and s, of which tableau and order are known."""
 
     def as_hbvm(self) -> "MethodBase":
-        """Return it as `integrators.HBVM`."""
+        """Return it as `integrators.HBVM`.
+
+        Raises
+        ------
+        problems.errors.InputError
+            Where options that HBVM does not have make other steps of it.
+        """
         ...
 
 

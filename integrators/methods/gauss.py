@@ -113,7 +113,7 @@ class Gauss(MethodBase):
                 others = f"without {', '.join(given)}" if given else "with tol and s > 1"
                 raise InputError(f"Gauss takes steps={self.steps!r} {others}: all steps follow from tol.")
         try:
-            self.as_hbvm()
+            self._hbvm()
         except InputError as error:
             raise InputError(re.sub(r"\bHBVM\b", "Gauss", str(error))) from None
 
@@ -123,7 +123,18 @@ class Gauss(MethodBase):
         return 2 * self.s
 
     def as_hbvm(self) -> HBVM:
-        """Return the HBVM that this method is."""
+        """Return the HBVM that this method is.
+
+        Raises
+        ------
+        problems.errors.InputError
+            With ``steps``, which HBVM does not have: it would take other steps.
+        """
+        if self.steps is not None:
+            raise InputError(f"{self!r} is no HBVM, which has no steps={self.steps!r}; leave steps= out.")
+        return self._hbvm()
+
+    def _hbvm(self) -> HBVM:
         return HBVM(
             k=self.s, s=self.s, h=self.h, tol=self.tol, solver=self.solver,
             max_step=self.max_step, breakpoints=self.breakpoints, max_steps=self.max_steps,
@@ -169,7 +180,7 @@ class Gauss(MethodBase):
 
             return AdaptiveProgram(
                 system, k=self.s, s=self.s, tol=self.tol, h=self.h, solver=self.solver,
-                **self.as_hbvm().control(),
+                **self._hbvm().control(),
             )  # fmt: skip
         from integrators.kernel.program import HBVMProgram  # numba is for those who integrate
 

@@ -305,7 +305,10 @@ def is_the_hbvm_that_it_names(method: MethodBase, problem: Problem) -> str | Non
     """Check that the HBVM that a method says it is has its order and its trajectory."""
     if not offers(method, AsHBVM):
         return "it is no HBVM"
-    same: Any = method.as_hbvm()  # type: ignore[attr-defined]
+    try:
+        same: Any = method.as_hbvm()  # type: ignore[attr-defined]
+    except InputError as refusal:
+        return str(refusal)
     if method.order is not None:
         require(order_of(method) == method.order, "its tableau has the order that it states")
     ours, theirs = (start(each, problem).advance(regular(problem, 5)).y for each in (method, same))

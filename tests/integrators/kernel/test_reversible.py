@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import problems
-from integrators import Gauss, Status
+from integrators import Gauss, Status, order_of
 from problems import InputError, emit
 
 TWO_PI = 2.0 * np.pi
@@ -99,6 +99,13 @@ def test_over_1e5_revolutions_the_energy_makes_a_random_walk(e):
 def test_what_cannot_be_is_said(keywords, words):
     with pytest.raises(InputError, match=words):
         Gauss(s=4, **keywords)
+
+
+def test_it_is_no_hbvm_which_would_take_other_steps():
+    method = Gauss(s=4, tol=1e-9, steps="reversible")
+    for use in (method.as_hbvm, lambda: order_of(method)):
+        with pytest.raises(InputError, match="no HBVM.*leave steps= out"):
+            use()
 
 
 @pytest.mark.parametrize("name", ["rigid_body", "charged_particle"])
