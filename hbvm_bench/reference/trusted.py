@@ -1,7 +1,7 @@
 """References by two independent computations, and how far they agree.
 
 Up to `SMALL` unknowns: heyoka's Taylor method in 128-bit arithmetic, checked by
-Gauss collocation in double-double arithmetic (`hbvm_bench.reference.collocation`); they
+Gauss collocation in double-double arithmetic (`integrators.extended.collocation`); they
 must agree to 1e-20. Above: the collocation, checked by the Taylor method in
 long double, to 1e-15. A chaotic problem has a reference as far as they agree.
 """
@@ -14,8 +14,9 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.reference import collocation, solutions
+from hbvm_bench.reference import solutions
 from hbvm_bench.reference.solutions import ReferenceFile
+from integrators.extended import collocation
 from problems.errors import InputError
 from problems.problem import Problem
 

@@ -8,8 +8,9 @@ import pytest
 
 import problems
 from hbvm_bench.campaign.identity import make_problem
-from hbvm_bench.reference import collocation, trusted
 from hbvm_bench.reference import solutions as reference
+from hbvm_bench.reference import trusted
+from integrators.extended import collocation
 from problems import emit
 from problems.catalogue import kepler, morse, pendulum
 from problems.errors import InputError

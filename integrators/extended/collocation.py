@@ -16,8 +16,8 @@ from numba import njit
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from hbvm_bench.reference.extended import compiled, minus, plus, times
 from integrators.coefficients import legendre
+from integrators.extended.arithmetic import compiled, minus, plus, times
 from problems import emit
 from problems.double_double import DD
 from problems.errors import InputError
@@ -25,7 +25,7 @@ from problems.problem import Problem
 from problems.systems.base import System
 
 Array = NDArray[np.float64]
-Numbers = NDArray[np.complex128]  # double-double, see `hbvm_bench.reference.extended`
+Numbers = NDArray[np.complex128]  # double-double, see `integrators.extended.arithmetic`
 
 STAGES = 16
 DECAY = 1e-17  # of the last Legendre coefficient; its square is the size of the error

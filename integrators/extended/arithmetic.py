@@ -3,7 +3,7 @@
 A number is an unevaluated sum hi + lo that travels as the complex number hi + i lo, so that arrays of numbers
 are arrays of complex and a double is a number whose lo is 0. `compiled` rewrites the operators of an
 emitted function as the functions below, which are the same formulas as
-`problems.double_double` for compiled scalar code. Only for references: no fused
+`problems.double_double` for compiled scalar code. No fused
 multiply-add, no fast math.
 """
 

@@ -1,0 +1,1 @@
+"""Gauss collocation in double-double arithmetic: 32 digits."""
