@@ -1,7 +1,7 @@
 """The tables of drifts on the page on adaptive steps: ``python docs/theory/reversible.py kepler 0.9 100000``.
 
 Mean energies over 20 parts of a long run, and their slope by least squares with its 95 % interval, beside
-ordinary adaptive steps and other libraries. A run that takes more than `SECONDS` of processor time ends there.
+ordinary adaptive steps and other libraries. A run that takes more than `SECONDS` of CPU time ends there.
 Then the method goes back to t = 0, and the last column says by how much it misses the start.
 """
 

@@ -104,7 +104,7 @@ def test_what_cannot_be_is_said(keywords, words):
 def test_it_is_no_hbvm_which_would_take_other_steps():
     method = Gauss(s=4, tol=1e-9, steps="reversible")
     for use in (method.as_hbvm, lambda: order_of(method)):
-        with pytest.raises(InputError, match="no HBVM.*leave steps= out"):
+        with pytest.raises(InputError, match=r"no HBVM.*leave steps= out"):
             use()
 
 
