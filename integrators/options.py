@@ -7,11 +7,11 @@ no step, and keeps what is one as a float.
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from problems import limits
+from problems import deprecated, limits
 from problems.checks import Must, at_least, checked, number, numbers, refusal
 from problems.errors import shown
 
-__all__ = ["Absolute", "Count", "Landings", "NotNegative", "Share", "Stages", "Step", "Tolerance"]
+__all__ = ["Absolute", "Breakpoints", "Count", "NotNegative", "Share", "Stages", "Step", "Tolerance"]
 
 SMALLEST = 2.0**-52
 """The smallest tolerance of a step: a smaller error cannot be told from rounding."""
@@ -76,7 +76,7 @@ Stages = Annotated[int, _Stages()]
 """A whole number from 1 on, not above what `problems.limits` allow."""
 
 
-class _Landings:
+class _Breakpoints:
     def __repr__(self) -> str:
         return "finite times"
 
@@ -91,5 +91,12 @@ class _Landings:
         return tuple(kept)
 
 
-Landings = Annotated[Sequence[float], _Landings()]
+Breakpoints = Annotated[Sequence[float], _Breakpoints()]
 """A list or array of times, kept in ascending order; of those that no step could tell apart, the first."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Landings":
+        deprecated.renamed("annotation", name, {name: "Breakpoints"}, removed_in="0.2")
+        return Breakpoints
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -70,6 +70,7 @@ from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from problems import deprecated
 from problems.checks import CheckedOptions
 from problems.errors import InputError, shown
 from problems.problem import Problem, System
@@ -105,7 +106,13 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-SAMPLINGS = ("side", "steps", "land", "dense")
+SAMPLINGS = ("partial", "steps", "stop", "dense")
+_FORMER_SAMPLINGS = {"side": "partial", "land": "stop"}
+
+
+def sampling_named(sample: Any) -> Any:
+    """Return the present name of a sampling; the former ``"side"`` and ``"land"`` warn."""
+    return deprecated.renamed("sampling", sample, _FORMER_SAMPLINGS, removed_in="0.2")
 
 
 class Status(StrEnum):
@@ -289,9 +296,9 @@ class Stepper(Protocol):
         times : ndarray, shape (n,)
             Finite, strictly monotone in the direction of integration; the
             first may be the present time.
-        sample : {"side", "steps", "land", "dense"}, optional
+        sample : {"partial", "steps", "stop", "dense"}, optional
             How states between steps are made (``None``: the method's best
-            that leaves its steps untouched, or landing where landing
+            that leaves its steps unchanged, or a stop where a stop
             costs it nothing). A method refuses what it cannot do.
 
         Returns

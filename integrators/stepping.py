@@ -17,7 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from integrators.options import Step
-from integrators.protocol import Array, Compiled, MethodBase, Samples, Stats, Status, UserError
+from integrators.protocol import (
+    Array,
+    Compiled,
+    MethodBase,
+    Samples,
+    Stats,
+    Status,
+    UserError,
+    sampling_named,
+)
 from integrators.refusals import check_parameters, check_start, check_state, check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import plan
@@ -74,7 +83,7 @@ class StepperBase:
     """A trajectory; satisfies `integrators.protocol.Stepper`.
 
     A subclass states its ``samplings`` (the default first) and implements
-    `_serve`, `_own_steps` and `_one`. One with checkpoints is a `RestorableStepper`.
+    `_serve`, `_step_states` and `_one`. One with checkpoints is a `RestorableStepper`.
 
     The *present* time ``t`` and state ``y`` are those last returned. The library
     itself may be ahead of them (an adaptive method, whose steps are not
@@ -136,11 +145,11 @@ class StepperBase:
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
-        how = self.samplings[0] if sample is None else sample
+        how = self.samplings[0] if sample is None else sampling_named(sample)
         if how not in self.samplings:
             raise unknown(f"sampling of {type(self).__name__.removesuffix('Stepper')}", how, self.samplings)
-        if how == "land" and self._is_ahead(times):
-            return self._land_on(times)
+        if how == "stop" and self._is_ahead(times):
+            return self._stop_on_samples(times)
         grid = check_times(times, self._t)
         dim = self._y.size
         if self._status is not Status.RUNNING:
@@ -149,7 +158,7 @@ class StepperBase:
         t, y = grid[:here], np.tile(self._y, (here, 1))
         ahead = grid[here:]
         if ahead.size:
-            more = self._own_steps(float(ahead[-1])) if how == "steps" else self._serve(ahead, how)
+            more = self._step_states(float(ahead[-1])) if how == "steps" else self._serve(ahead, how)
             t, y = np.concatenate([t, more[0]]), np.concatenate([y, more[1]])
             if t.size and not self._finite(float(t[-1]), y[-1]):
                 t, y = t[:-1], y[:-1]
@@ -164,12 +173,12 @@ class StepperBase:
             return False
         return math.isfinite(t := times.item()) and t != self._t and not self._status.failed
 
-    def _land_on(self, time: Array) -> Samples:
+    def _stop_on_samples(self, time: Array) -> Samples:
         """Go to one time, as `advance` does, with as little as can be around the library's own call.
 
         Short runs are timed this way, and each of NumPy's calls left out here weighs in them.
         """
-        grid, states = self._serve(time.copy(), "land")
+        grid, states = self._serve(time.copy(), "stop")
         if grid.size and not all(map(math.isfinite, states[-1].tolist())):
             self._finite(float(grid[-1]), states[-1])
             grid, states = grid[:-1], states[:-1]
@@ -198,7 +207,7 @@ class StepperBase:
         """
         raise NotImplementedError
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         """Return the steps from the present (excluded) to ``end`` (included), as `_serve` does."""
         raise NotImplementedError
 
@@ -248,17 +257,17 @@ class RestorableStepper(StepperBase):
 class FixedStepper(RestorableStepper):
     """A trajectory with steps of constant length, at the times t0 + n h with an integer n.
 
-    ``"side"`` (default)
+    ``"partial"`` (default)
         Times that are a multiple of h are ends of steps; for others a copy takes one partial
         step.
     ``"steps"``
         The steps up to the last time.
-    ``"land"``
+    ``"stop"``
         The last step before each time is shortened onto it; steps count from there then.
 
     Its state is one array, which ``program.march``, a `March`, moves on. For a library that holds the
     state itself a subclass has its own `_march`, `_state`, `_aside`, `_shorten` (unless it leaves out
-    ``"land"``), `_restart`, `_save_steps` and `_load_steps`.
+    ``"stop"``), `_restart`, `_save_steps` and `_load_steps`.
 
     Parameters
     ----------
@@ -268,7 +277,7 @@ class FixedStepper(RestorableStepper):
         A start, checked, and the stepper's own.
     """
 
-    samplings = ("side", "steps", "land")
+    samplings = ("partial", "steps", "stop")
     at_once = 1 << 14
     """Steps between two looks at Ctrl-C."""
 
@@ -300,8 +309,8 @@ class FixedStepper(RestorableStepper):
 
     def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
         self._towards(float(grid[-1]))
-        if how == "land":
-            return self._land(grid)
+        if how == "stop":
+            return self._step_to(grid)
         counts, parts = plan(grid, np.full(grid.size, self._t0), self._h)
         states = np.empty((grid.size, self._y.size))
         for i, (n, part) in enumerate(zip(counts.tolist(), parts.tolist(), strict=True)):
@@ -311,7 +320,7 @@ class FixedStepper(RestorableStepper):
                 return grid[: i + 1], states[: i + 1]
         return grid, states
 
-    def _land(self, grid: Array) -> tuple[Array, Array]:
+    def _step_to(self, grid: Array) -> tuple[Array, Array]:
         states = np.empty((grid.size, self._y.size))
         for i, t in enumerate(grid.tolist()):
             count, part = plan(grid[i : i + 1], np.array([self._t0]), self._h)
@@ -325,7 +334,7 @@ class FixedStepper(RestorableStepper):
                 return grid[: i + 1], states[: i + 1]
         return grid, states
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         self._towards(end)
         last = int(plan(np.array([end]), np.array([self._t0]), self._h)[0][0])
         times: Array = self._t0 + self._h * np.arange(self._n + 1, last + 1, dtype=np.float64)

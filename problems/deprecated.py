@@ -1,4 +1,4 @@
-"""Modules that have moved: under their former names for one minor version, with a warning."""
+"""Modules that have moved and values that were renamed: valid for one minor version, with a warning."""
 
 import sys
 import warnings
@@ -51,3 +51,28 @@ def moved(package: str, modules: Mapping[str, str], *, removed_in: str) -> None:
 def place(module: str) -> str:
     """Return the present name of a module, as files of an earlier version need it."""
     return _places.get(module, module)
+
+
+def renamed(kind: str, value: Any, names: Mapping[str, str], *, removed_in: str) -> Any:
+    """Return the present name of a value that is given by name; anything else is returned as it is.
+
+    Parameters
+    ----------
+    kind : str
+        What the value is, for the warning.
+    value : object
+        The argument as it was given.
+    names : mapping
+        Present names by former names.
+    removed_in : str
+        The version that knows the former names no more.
+    """
+    present = names.get(value) if isinstance(value, str) else None
+    if present is None:
+        return value
+    warnings.warn(
+        f"the {kind} {value!r} is now called {present!r}; the former name goes with version {removed_in}.",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return present

@@ -47,10 +47,12 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     multiple_of : float, optional
         Moves every time between the ends to the nearest multiple of this after the start, such
         as a year, which a step may divide.
-    own_steps : bool
+    at_steps : bool
         Whether samples are moved to the nearest ends of steps of a method with a fixed one, so
         that they cost it nothing in quality, and the end is that of a run without samples,
         the one that is timed.
+    own_steps : bool
+        The former name of ``at_steps``, which stored results and older campaign files have.
 
     Without step and count: the problem's own grid, or else 1000 intervals.
     """
@@ -61,9 +63,13 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     first: Positive | None = None
     also: list[Positive] = []
     multiple_of: Positive | None = None
+    at_steps: bool = False
     own_steps: bool = False
 
     def __post_init__(self) -> None:
+        if self.own_steps:
+            msgspec.structs.force_setattr(self, "at_steps", True)
+            msgspec.structs.force_setattr(self, "own_steps", False)
         if self.step is not None and self.count is not None:
             raise InputError("a grid has a step or a count, not both.")
         if self.step is not None and self.spacing != "equal":
@@ -79,7 +85,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         problem : Problem
             Has the span.
         h : float, optional
-            The method's fixed step, which ``own_steps`` asks for.
+            The method's fixed step, which ``at_steps`` asks for.
 
         Raises
         ------
@@ -89,7 +95,7 @@ class Grid(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         times, span = self._shared(problem), problem.t_end - problem.t0
         further = problem.t0 + np.copysign([t for t in self.also if t < abs(span)], span)
         times = np.union1d(times, further)[:: 1 if span > 0.0 else -1] if further.size else times
-        unit = h if self.own_steps and h else self.multiple_of
+        unit = h if self.at_steps and h else self.multiple_of
         if not unit:
             return times
         after = np.unique(np.rint(np.abs(times - problem.t0) / unit)) * unit

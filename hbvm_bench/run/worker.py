@@ -144,7 +144,7 @@ def _measure(request: Request, directory: Path) -> Result:
         (directory / COMPILED).touch()
         if (asked := resolved.case.ensemble) is not None:
             return _stored(directory, *raw.ensemble(resolved.problem, program, asked))
-        integrate = raw.solve_with_bare_end if resolved.case.grid.own_steps else raw.solve
+        integrate = raw.solve_with_bare_end if resolved.case.grid.at_steps else raw.solve
         solution = integrate(resolved.problem, resolved.method, program, grid)
     except OSError as error:
         if error.errno in DISK:

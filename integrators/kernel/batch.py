@@ -25,7 +25,7 @@ from integrators.kernel.implicit.workspace import Solver
 from integrators.kernel.pace import Pace
 from integrators.kernel.stepper import HBVMStepper
 from integrators.options import Count
-from integrators.protocol import Array, Status, Trajectories, UserError, telling
+from integrators.protocol import Array, Status, Trajectories, UserError, sampling_named, telling
 from integrators.refusals import check_batch, check_times
 from integrators.running.times import Counts, plan
 from problems.checks import checked
@@ -34,7 +34,7 @@ from problems.problem import System
 
 CHUNK = 1 << 14  # steps between two looks at Ctrl-C, at most
 JOBS = 8  # for each thread, at least, where there are so many groups: for even loads
-SAMPLINGS = ("side", "land", "dense")
+SAMPLINGS = ("partial", "stop", "dense")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,7 @@ def prepare_batch(
     threads: int = 1,
 ) -> Callable[[], Batch]:
     """Check and allocate; return what integrates every start to all times. See `HBVMProgram.batch`."""
+    sample = sampling_named(sample)
     if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
         raise unknown("sampling of a batch", sample, SAMPLINGS)
     threads = checked("a batch", "threads", threads, Count)
@@ -86,8 +87,8 @@ def prepare_batch(
         grid, np.full((n, grid.size, dim), np.nan),
         [Status.FINISHED] * n, [""] * n, np.full(n, grid[-1]), *counts,
     )  # fmt: skip
-    work = _Work(program, result, starts, parameters, t0, sample or "side", threads)
-    lanes = program.in_lanes() if work.sample == "side" else None
+    work = _Work(program, result, starts, parameters, t0, sample or "partial", threads)
+    lanes = program.in_lanes() if work.sample == "partial" else None
     if lanes is None:
         return work.all_alone
     return partial(work.run, (_Own if lanes.varying else _Fixed).of(lanes, work))

@@ -68,9 +68,9 @@ class FixedStepper(HBVMStepper):
         turn = (grid[-1] - self.t) * h < 0.0
         if turn:  # steps are counted from here
             t0, n, h = self.t, 0, -h
-        between = {"land": LAND, "dense": DENSE}.get(sample, SIDE)
+        between = {"stop": LAND, "dense": DENSE}.get(sample, SIDE)
         bases = np.full(grid.size, t0)
-        if sample == "land":
+        if sample == "stop":
             bases[1:] = grid[:-1]
         targets, parts = plan(grid, bases, h)
         if sample == "steps":

@@ -38,7 +38,7 @@ from integrators.kernel.step.rule import (
 )
 from integrators.kernel.stepper import HBVMStepper
 from integrators.kernel.varying import AdaptiveStepper
-from integrators.protocol import Array, Compiled
+from integrators.protocol import Array, Compiled, sampling_named
 from integrators.refusals import check_parameters, check_start, check_state
 from problems import emit
 from problems.analysis.sides import sides
@@ -261,7 +261,7 @@ class HBVMProgram(Compiled):
             Times asked for, strictly monotone from ``t0``.
         t0 : float
             Time of the starts.
-        sample : {"side", "land", "dense"}, optional
+        sample : {"partial", "stop", "dense"}, optional
             How states between steps are made; see `HBVMStepper`.
         threads : int
             Threads to share the trajectories among.
@@ -271,7 +271,8 @@ class HBVMProgram(Compiled):
         problems.errors.InputError
             For starts, parameters or times that cannot be used.
         """
-        program = self._program_of_lanes() if sample in (None, "side") else self
+        sample = sampling_named(sample)
+        program = self._program_of_lanes() if sample in (None, "partial") else self
         return prepare_batch(program, Y0, par, times, check_start(t0), sample, threads)()
 
     def prepare_batch(

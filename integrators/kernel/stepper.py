@@ -39,7 +39,7 @@ from integrators.kernel.pace import FEWEST, Pace
 from integrators.kernel.step.engine import steps
 from integrators.kernel.tables import Constants
 from integrators.kernel.tangent.vectors import Directions, Vectors
-from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError
+from integrators.protocol import SAMPLINGS, Array, Samples, Stats, Status, UserError, sampling_named
 from integrators.refusals import check_times, one_thread
 from integrators.running.checkpoints import Identity
 from integrators.running.times import Counts
@@ -102,13 +102,13 @@ class HBVMStepper(ABC):
 
     ``advance`` offers every sampling:
 
-    ``"side"`` (default)
+    ``"partial"`` (default)
         A partial step from the last step: order 2s,
         energy as at the steps, and the steps are untouched.
     ``"steps"``
         The steps themselves, up to the last time (and the present state, if
         the first time is the present).
-    ``"land"``
+    ``"stop"``
         The last step before each time is shortened onto it and the next begins
         there. This changes the sequence of steps, which costs a symplectic
         method (k = s) its long-time behaviour.
@@ -229,7 +229,7 @@ class HBVMStepper(ABC):
             if abs(end - self.t) <= CLOSE * float(np.spacing(abs(end))):
                 return self._status
             if not self._context.solved:  # as after samples that are ends of steps
-                made = self.advance([end], sample="side")
+                made = self.advance([end], sample="partial")
                 if made.status is not Status.FINISHED:
                     reason = f"{made.reason} Events are known up to t = {self.t!r} only."
                     search.trouble = made.status, reason, self.error
@@ -389,12 +389,13 @@ class HBVMStepper(ABC):
     @one_thread
     def advance(self, times: ArrayLike, *, sample: str | None = None) -> Samples:
         """Integrate to ``times[-1]``; see the class for the samplings and the protocol for the rest."""
+        sample = sampling_named(sample)
         if sample is not None and (not isinstance(sample, str) or sample not in SAMPLINGS):
             raise unknown("sampling", sample, SAMPLINGS)
         grid = check_times(times, self.t)
         if self._status.failed:
             return Samples(grid[:0], np.empty((0, self._dim)), self._status, self._reason)
-        return self._advance(grid, sample or "side")
+        return self._advance(grid, sample or "partial")
 
     @abstractmethod
     def _advance(self, grid: Array, sample: str) -> Samples:

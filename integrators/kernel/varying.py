@@ -51,7 +51,7 @@ class AdaptiveStepper(HBVMStepper):
 
     The present time is a sum of two doubles. ``advance`` offers every sampling of
     `HBVMStepper`, with the same meaning. The step that would pass a time asked for
-    is solved and kept; after a time reached with ``"land"`` a step of the same
+    is solved and kept; after a time reached with ``"stop"`` a step of the same
     length is tried again from there.
     """
 
@@ -98,7 +98,7 @@ class AdaptiveStepper(HBVMStepper):
         if sample == "steps":
             return self.walk(float(grid[-1]), present=bool(grid[0] == self.t))
         self._face(float(grid[-1]))
-        return self._to(grid, {"land": LAND, "dense": DENSE}.get(sample, SIDE))
+        return self._to(grid, {"stop": LAND, "dense": DENSE}.get(sample, SIDE))
 
     def _stop(self) -> float:
         """Return the next breakpoint ahead, which no step passes; infinitely far if there is none."""

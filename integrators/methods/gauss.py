@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
 from integrators.methods.hbvm import HBVM, Solver
-from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
+from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.analysis.structure import depends_on_time
 from problems.errors import InputError
@@ -94,7 +94,7 @@ class Gauss(MethodBase):
     tol: Tolerance | None = None
     solver: Solver = "auto"
     max_step: Step | None = None
-    breakpoints: Landings = ()
+    breakpoints: Breakpoints = ()
     max_steps: Count | None = None
     atol: Absolute | None = None
     steps: Steps | None = None

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from integrators.caveats import blind, unknown_kinks, unseen, unseen_in_time
-from integrators.options import Absolute, Count, Landings, Stages, Step, Tolerance
+from integrators.options import Absolute, Breakpoints, Count, Stages, Step, Tolerance
 from integrators.protocol import MethodBase, Program
 from problems.errors import InputError
 from problems.problem import Problem, System
@@ -74,7 +74,7 @@ class HBVM(MethodBase):
     the state, so that weak kinks are found as well. In time, and in fields that are code, the nodes have to
     show it: eight, or four on a formula with these, in steps that the fixed-point iteration solves.
     Kinks are not looked for with ``h`` and on Poisson systems; of a field with these, ``warnings`` say so
-    (`test_own_steps`, `test_weak_kinks`).
+    (`test_adaptive_steps`, `test_weak_kinks`).
 
     These equations do not conserve the energy of a Poisson system y' = B(y) grad H(y)
     whose structure B varies. There, with ``G_i = sum_l b_l P_i(c_l) grad H(Y_l)``,
@@ -179,7 +179,7 @@ class HBVM(MethodBase):
     tol: Tolerance | None = None
     solver: Solver = "auto"
     max_step: Step | None = None
-    breakpoints: Landings = ()
+    breakpoints: Breakpoints = ()
     max_steps: Count | None = None
     atol: Absolute | None = None
     projection: Projection | None = None

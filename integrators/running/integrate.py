@@ -30,6 +30,7 @@ from integrators.protocol import (
     UserError,
     check_problem,
     offers,
+    sampling_named,
 )
 from integrators.refusals import as_numbers, check_times
 from integrators.running.variations import follow
@@ -80,7 +81,7 @@ def integrate(
     times : array_like, shape (n,), or float, optional
         Strictly monotone times, from the problem's ``t0`` on (or back). One number is the end: 1001
         equidistant times to it. Default: the problem's own grid, or else such times to ``t_end``.
-    sample : {"side", "steps", "land", "dense"}, optional
+    sample : {"partial", "steps", "stop", "dense"}, optional
         How states between the method's steps are made; see `Stepper.advance`.
     events : Event or callable, or a sequence of them, optional
         Functions of time and state, and what happens where they vanish: see
@@ -131,6 +132,7 @@ def integrate(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
+    sample = sampling_named(sample)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     if progress is True:
@@ -279,8 +281,10 @@ def wanted_events(events: Any, sample: str | None) -> dict[str, Event]:
     """Return the events to look for, by name."""
     if isinstance(events, tuple | list) and not events:
         return {}
-    if sample == "land":
-        raise InputError("events are located on the method's steps, which sample='land' changes; use 'side'.")
+    if sample == "stop":
+        raise InputError(
+            "events are located on the method's steps, which sample='stop' changes; use 'partial'."
+        )
     return named(events)
 
 
@@ -300,7 +304,7 @@ def started(
 def _goes_by_steps(stepper: Any, sample: str | None) -> bool:
     """Whether steps can be taken between two samples, and change nothing of the samples."""
     ways = stepper.samplings if offers(stepper, Samplings) else SAMPLINGS
-    return "steps" in ways and (sample or ways[0]) != "land"
+    return "steps" in ways and (sample or ways[0]) != "stop"
 
 
 def _next_piece(

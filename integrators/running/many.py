@@ -24,6 +24,7 @@ from integrators.protocol import (
     Trajectories,
     check_problem,
     offers,
+    sampling_named,
 )
 from integrators.reduce import Reducer, Reduction
 from integrators.refusals import as_numbers, check_batch, check_times
@@ -104,7 +105,7 @@ def integrate_many(
         terminal event ends its own: what of ``times`` comes later is NaN.
     backend : {"jax"}, optional
         Integrate on JAX's default device, such as a GPU: HBVM and Gauss with a fixed step. Needs diffrax.
-    sample : {"side", "steps", "land", "dense"}, optional
+    sample : {"partial", "steps", "stop", "dense"}, optional
         As for `integrate`; trajectories then go one by one. With ``"steps"``, the ends of the steps of
         each, up to the last time: ``t`` has the shape (n, m), and NaN after the last step of each.
     reduce : mapping of str to Reduction, optional
@@ -150,6 +151,7 @@ def integrate_many(
     if method is None:
         method = registry.create("HBVM")
     check_problem(problem, method)
+    sample = sampling_named(sample)
     if not callable(progress) and not isinstance(progress, bool):
         raise InputError(f"progress={shown(progress)} must be True, False or a function of the progress.")
     system = problem.system

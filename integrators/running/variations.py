@@ -85,7 +85,7 @@ def follow(
             f"{method!r} has no variations: it does not offer the stages of its steps; use Gauss or HBVM."
         )
     if sample == "dense":
-        raise InputError("variations are those of solved steps, which sample='dense' is not; use 'side'.")
+        raise InputError("variations are those of solved steps, which sample='dense' is not; use 'partial'.")
     state, parameters = directions(problem, wanted)
     stepper.follow(state, parameters)
     return state, parameters

@@ -88,10 +88,10 @@ def samples_leave_the_steps_alone(method: MethodBase, problem: Problem) -> str |
     """Check that states made beside the steps change nothing of the steps that follow."""
     grid = irregular(problem)
     try:
-        often = start(method, problem).advance(grid, sample="side")
+        often = start(method, problem).advance(grid, sample="partial")
     except InputError:
         return "it makes no states beside its steps"
-    once = start(method, problem).advance(grid[-1:], sample="side")
+    once = start(method, problem).advance(grid[-1:], sample="partial")
     require(
         np.array_equal(often.y[-1], once.y[-1]), f"samples leave the steps of {method!r} alone, bit for bit"
     )

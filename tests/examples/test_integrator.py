@@ -141,7 +141,7 @@ def test_counters_samples_and_checkpoints_come_from_the_base(yoshida):
     samples = stepper.advance(np.array([1.0, 1.1, 2.0]))
     assert (stepper.stats.steps, stepper.stats.evaluations) == (8, 56)  # none for the sample aside
     checkpoint = stepper.checkpoint()
-    landed = program.start(problem.y0).advance(np.array([1.0, 1.1]), sample="land")
+    landed = program.start(problem.y0).advance(np.array([1.0, 1.1]), sample="stop")
     assert np.array_equal(landed.y, samples.y[:2])
     own = program.start(problem.y0).advance(np.array([2.1]), sample="steps")
     assert np.array_equal(own.t, 0.25 * np.arange(1, 9))

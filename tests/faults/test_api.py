@@ -199,16 +199,16 @@ integrate(P1, M1, times={0, 1})                              | times must be num
 integrate(P1, M1, times=(i for i in range(3)))               | times must be numbers, not <generator object
 integrate(P1, M1, times=[None, 1])                           | times must be finite numbers
 integrate(P1, M1, times=P1)                                  | times must be numbers, not
-integrate(P1, M1, smaple='side')                             | unknown argument of integrate 'smaple'; did you
+integrate(P1, M1, smaple='partial')                          | unknown argument of integrate 'smaple'; did you
 integrate()                                                  | integrate needs problem; give a value as in
 integrate(P1, M1, [0, 1], None, (), True)                    | integrate takes only problem, method, times,
 integrate(P1, M1, method=M1)                                 | integrate gets method twice, by place and by
 integrate_many(P1, M1, thread=2)                             | unknown argument of integrate_many 'thread';
 section(P1, M1, osc, cuont=2)                                | unknown argument of section 'cuont'; did you
 integrators.load('a', problme=P1)                               | unknown argument of load 'problme'; did you
-integrate(P1, M1, sample='sides')                            | unknown sampling 'sides'; did you mean 'side'
-integrate(P1, M1, sample=3)                                  | unknown sampling 3; known: dense, land, side,
-integrate(P1, M1, sample=['side'])                           | unknown sampling ['side']; did you mean
+integrate(P1, M1, sample='partail')                          | unknown sampling 'partail'; did you mean
+integrate(P1, M1, sample=3)                                  | unknown sampling 3; known: dense, partial,
+integrate(P1, M1, sample=['partial'])                        | unknown sampling ['partial']; did you mean
 integrate(P1, M1, sample=np.array([1,2]))                    | unknown sampling array([1, 2]); known: dense,
 integrate(P1, M1, events=3)                                  | an event needs a function g, not 3
 integrate(P1, M1, events='q[0]')                             | an event needs a function g, not 'q'
@@ -221,7 +221,7 @@ integrate(P1, M1, events=lambda q: [q[0], q[0]])             | event 'event' ret
 integrate(P1, M1, events=lambda q: q[3])                     | q[3] does not exist; q has the indices 0 to 0
 integrate(P1, M1, events=Event)                              | <class 'integrators.events.event.Event'>:
 integrate(P1, M1, events=np.sin)                             | <ufunc 'sin'>: event 'sin' asks for an
-integrate(P1, M1, events=osc, sample='land')                 | events are located on the method's steps,
+integrate(P1, M1, events=osc, sample='stop')                 | events are located on the method's steps,
 section(P1, M1, 3)                                           | an event needs a function g, not 3
 section(P1, M1, osc, direction=3)                            | direction=3 of an event must be 1, -1 or 0
 section(P1, M1, osc, count=0)                                | count=0 of a section must be a whole number of
@@ -306,7 +306,7 @@ M1.compile(H1).start([0, 1], None, nan)                      | t0=nan must be on
 M1.compile(H1).start([0, 1]).advance('a')                    | times must be numbers, not 'a'
 M1.compile(H1).start([0, 1]).advance([])                     | times must be a non-empty one-dimensional
 M1.compile(H1).start([0, 1]).advance([-1, 1])                | times must be strictly monotone and ahead of
-M1.compile(H1).start([0, 1]).advance([0, 1], sample=3)       | unknown sampling 3; known: dense, land, side,
+M1.compile(H1).start([0, 1]).advance([0, 1], sample=3)       | unknown sampling 3; known: dense, partial,
 """
 
 

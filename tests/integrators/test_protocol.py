@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import integrators
-from integrators import HBVM, Gauss, registry, testing
+from integrators import HBVM, Gauss, options, registry, testing
+from integrators.peers.heyoka.taylor import Taylor
 from integrators.protocol import Status
 from integrators.refusals import check_state, check_times
 from integrators.running.times import plan
@@ -74,14 +75,31 @@ def test_unknown_names_come_with_the_nearest():
         registry.create("LineIntegral", invariants=["energy"])
 
 
+@pytest.mark.parametrize(("former", "present"), [("side", "partial"), ("land", "stop")])
+@pytest.mark.parametrize("method", [HBVM(k=4, s=2, h=0.1), Taylor()], ids=["ours", "heyoka"])
+def test_former_names_of_samplings_are_the_present_ones_and_warn(former, present, method):
+    problem, times = testing.pendulum(), [0.0, 0.25, 0.5]
+    expected = integrators.integrate(problem, method, times, sample=present).y
+    with pytest.warns(DeprecationWarning, match=f"sampling '{former}' is now called '{present}'"):
+        assert np.array_equal(integrators.integrate(problem, method, times, sample=former).y, expected)
+    stepper = method.compile(problem.system).start(problem.y0, problem.par)
+    with pytest.warns(DeprecationWarning, match=f"'{present}'"):
+        assert np.array_equal(stepper.advance(np.array(times), sample=former).y, expected)
+
+
+def test_the_former_name_of_the_annotation_of_breakpoints_warns():
+    with pytest.warns(DeprecationWarning, match="'Landings' is now called 'Breakpoints'"):
+        assert options.Landings is options.Breakpoints
+
+
 def test_integrate_says_what_is_wrong_with_its_arguments():
     problem, method = testing.pendulum(), HBVM(k=4, s=2, h=0.1)
     with pytest.raises(InputError, match="problem must be a Problem"):
         integrators.integrate("pendulum", method)
     with pytest.raises(InputError, match="method must be a method such as"):
         integrators.integrate(problem, "HBVM")
-    with pytest.raises(UnknownNameError, match=r"unknown sampling 'sides'; did you mean 'side'"):
-        integrators.integrate(problem, method, sample="sides")
+    with pytest.raises(UnknownNameError, match=r"unknown sampling 'partail'; did you mean 'partial'"):
+        integrators.integrate(problem, method, sample="partail")
     with pytest.raises(InputError, match="strictly monotone"):
         integrators.integrate(problem, method, [0.0, 2.0, 1.0])
     with pytest.raises(InputError, match="finite"):
@@ -164,7 +182,7 @@ def test_times_split_into_whole_steps_and_a_part_without_rounding(t0, h, sign, n
         assert 0 < parts[0] * sign < h + close
 
 
-def test_multiples_of_the_step_are_own_steps_however_they_were_rounded():
+def test_multiples_of_the_step_are_its_steps_however_they_were_rounded():
     for h in (0.1, 0.3, 1 / 3, 0.7):
         times = np.arange(1, 100001) * h
         summed = np.linspace(0.0, 100000 * h, 100001)[1:]

@@ -202,7 +202,7 @@ class Dopri8(_EitherMethod):
     Notes
     -----
     Adaptive: the last step before each sample is shortened onto it and the next is of
-    the length the controller wanted before (``"land"``); ``"steps"`` gives the
+    the length the controller wanted before (``"stop"``); ``"steps"`` gives the
     steps that are taken without samples.
 
     Examples

@@ -134,13 +134,13 @@ class DiffraxStepper(FixedStepper):
 
 
 class AdaptiveStepper(RestorableStepper):
-    """A trajectory with steps chosen by diffrax: ``"land"`` (default), ``"steps"`` or ``"end"``.
+    """A trajectory with steps chosen by diffrax: ``"stop"`` (default), ``"steps"`` or ``"end"``.
 
-    ``"land"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain
+    ``"stop"`` goes on, after a time, with the step it would have taken; ``"end"`` is a plain
     ``diffeqsolve`` to each time, which begins anew there.
     """
 
-    samplings = ("land", "steps", "end")
+    samplings = ("stop", "steps", "end")
 
     def __init__(self, program: DiffraxProgram, y: Array, par: Array, t: float):
         super().__init__(y, t)
@@ -234,7 +234,7 @@ class AdaptiveStepper(RestorableStepper):
                 return t, y
         return end, y
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         self._towards(end)
         times, states = [self._t], [self._y]
         while times[-1] != end:

@@ -76,11 +76,11 @@ class Taylor(MethodBase):
     Notes
     -----
     The right-hand sides are the traced operations in the user's order. heyoka gives
-    the step's Taylor polynomial itself, so that a state between steps (``"side"``) is
+    the step's Taylor polynomial itself, so that a state between steps (``"partial"``) is
     what a partial step would give, bit for bit and at no loss of order, and the
     sequence of steps does not depend on the samples. The step to a sample that is far ahead
     is taken twice, for heyoka's compiled loop shortens its last one; these are counted apart,
-    in ``stats.extra["side_steps"]``. ``"land"`` shortens steps onto the samples, as
+    in ``stats.extra["side_steps"]``. ``"stop"`` shortens steps onto the samples, as
     heyoka's ``propagate_until`` does. heyoka has no count of field evaluations.
 
     Examples
@@ -100,7 +100,7 @@ class Taylor(MethodBase):
     library = "heyoka"
     citation = CITATION
     family = "taylor"
-    to_end = "land"
+    to_end = "stop"
 
     def accepts(self, problem: Problem) -> str | None:
         """Accept every system that is traced."""
@@ -251,9 +251,9 @@ def _caches(hy: Any) -> Iterator[bool]:
 
 
 class TaylorStepper(RestorableStepper):
-    """A trajectory of heyoka's; ``"side"`` (default), ``"steps"`` or ``"land"``, see `Taylor`."""
+    """A trajectory of heyoka's; ``"partial"`` (default), ``"steps"`` or ``"stop"``, see `Taylor`."""
 
-    samplings = ("side", "steps", "land")
+    samplings = ("partial", "steps", "stop")
     search: TaylorSearch | None = None
     """What keeps the events, see `look_for`."""
 
@@ -277,7 +277,7 @@ class TaylorStepper(RestorableStepper):
     def look_to(self, end: float) -> Status:
         """Keep the events up to a time in the step ahead too."""
         if self.search is not None and self._status is Status.RUNNING:
-            self._serve(np.array([end]), "side")
+            self._serve(np.array([end]), "partial")
             self.search.finish()
         return self._status
 
@@ -297,12 +297,12 @@ class TaylorStepper(RestorableStepper):
         sign = self._towards(float(grid[-1]))
         states = np.empty((grid.size, self._y.size))
         for i, t in enumerate(grid.tolist()):
-            if not (self._land(t) if how == "land" else self._pass(t, sign)):
+            if not (self._step_to(t) if how == "stop" else self._pass(t, sign)):
                 return grid[:i], states[:i]
             states[i] = self._ta.state if self._ta.time == t else self._ta.update_d_output(t)
         return grid, states
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         times, states = [self._t], [self._y]
         while self._ta.time != times[-1] or self._step() is not None:
@@ -335,7 +335,7 @@ class TaylorStepper(RestorableStepper):
         self._broken(t)
         return None
 
-    def _land(self, t: float, *, write_tc: bool = False) -> bool:
+    def _step_to(self, t: float, *, write_tc: bool = False) -> bool:
         """Go to ``t`` by a shortened last step; return whether that succeeded."""
         watch = crawl(self, self._ta.time, t)
         few = self.search is not None and self.search.terminates
@@ -365,7 +365,7 @@ class TaylorStepper(RestorableStepper):
         ta = self._ta
         while sign * (ta.time - t) < 0.0:
             if not self._stepped or abs(t - ta.time) > NEAR * abs(ta.last_h):  # else last_h is another's
-                if not self._land(t, write_tc=True):
+                if not self._step_to(t, write_tc=True):
                     return False
                 self._take_back()
             if self._step() is None:

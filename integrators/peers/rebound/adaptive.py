@@ -31,9 +31,9 @@ class AdaptiveMethod(ReboundMethod):
 
 
 class AdaptiveStepper(StepperBase):
-    """A trajectory with adaptive steps: ``"land"`` (default) or ``"steps"``."""
+    """A trajectory with adaptive steps: ``"stop"`` (default) or ``"steps"``."""
 
-    samplings = ("land", "steps")
+    samplings = ("stop", "steps")
 
     def __init__(self, program: ReboundProgram, layout: Layout, method: AdaptiveMethod, y: Array, t: float):
         super().__init__(y, t)
@@ -97,7 +97,7 @@ class AdaptiveStepper(StepperBase):
                     return grid[: i + 1], states[: i + 1]
         return grid, states
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         simulation, times, states = self._simulation, [self._t], [self._y]
         sign = self._towards(end)
         with calls(self._stats):

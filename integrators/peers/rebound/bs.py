@@ -33,7 +33,7 @@ class BS(AdaptiveMethod):
 
     Notes
     -----
-    The last step before each sample is shortened onto it (``"land"``); ``"steps"`` gives those that it takes.
+    The last step before each sample is shortened onto it (``"stop"``); ``"steps"`` gives those that it takes.
     There are no checkpoints: from one of REBOUND's files it does not go on bit for bit (9e-14 on a pendulum).
 
     Examples

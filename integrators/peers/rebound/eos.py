@@ -61,7 +61,7 @@ class EOS(CentralMethod):
 
     citation = REBOUND + CITATION
     family = "splitting"
-    to_end = "land"
+    to_end = "stop"
     counted = False
 
     @property

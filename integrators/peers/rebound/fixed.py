@@ -59,7 +59,7 @@ class Leapfrog(FixedMethod):
 
     citation = REBOUND + LEAPFROG
     family = "splitting"
-    to_end = "land"
+    to_end = "stop"
 
     def set_up(self, simulation: Any) -> None:
         """Choose the leapfrog and its order."""

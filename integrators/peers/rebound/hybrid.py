@@ -64,7 +64,7 @@ class MERCURIUS(CentralMethod):
     order = 2  # at a fixed perturbation, without encounters
     citation = REBOUND + MERCURIUS_2019
     family = "hybrid"
-    to_end = "land"
+    to_end = "stop"
     counted = False
 
     def set_up(self, simulation: Any) -> None:
@@ -106,7 +106,7 @@ class TRACE(CentralMethod):
     order = 2  # at a fixed perturbation, without encounters
     citation = REBOUND + TRACE_2024
     family = "hybrid"
-    to_end = "land"
+    to_end = "stop"
     counted = False
 
     def set_up(self, simulation: Any) -> None:

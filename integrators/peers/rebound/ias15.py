@@ -57,7 +57,7 @@ class IAS15(AdaptiveMethod):
     -----
     By default the last step before each sample is shortened onto it, which costs
     this method no quality; REBOUND goes on with the step it had before
-    (``sample="land"``). ``"steps"`` gives its steps. A watchdog, compiled and
+    (``sample="stop"``). ``"steps"`` gives its steps. A watchdog, compiled and
     called after each step, ends a simulation that no longer gets anywhere: status
     ``STALLED``, with ``stats.extra["dt_history"]``, the (t, dt) of the last 2048 steps.
 

@@ -51,7 +51,7 @@ class JANUS(FixedMethod):
 
     citation = REBOUND + CITATION
     family = "splitting"
-    to_end = "land"
+    to_end = "stop"
 
     def set_up(self, simulation: Any) -> None:
         """Choose JANUS and its options."""

@@ -66,7 +66,7 @@ class SABA(CentralMethod):
 
     citation = REBOUND + CITATION
     family = "wisdom-holman"
-    to_end = "land"
+    to_end = "stop"
     unsynchronized = True
 
     @property

@@ -151,7 +151,7 @@ class WHFast(CentralMethod):
     order = 2  # in h, at a fixed perturbation
     citation = REBOUND + WHFAST
     family = "wisdom-holman"
-    to_end = "land"
+    to_end = "stop"
     unsynchronized = True
 
     def __post_init__(self) -> None:

@@ -103,10 +103,10 @@ class ScaledProgram(ReboundProgram):
 class Stepper512(ReboundStepper):
     """A trajectory; the steps between two samples are taken in one go.
 
-    REBOUND has it end with a whole step only, so there is no ``"land"``.
+    REBOUND has it end with a whole step only, so there is no ``"stop"``.
     """
 
-    samplings = ("side", "steps")
+    samplings = ("partial", "steps")
     at_once = 1_000_000  # REBOUND's own default
 
     def _restart(self, t: float, y: Array, h: float) -> None:

@@ -87,7 +87,7 @@ class SciPyMethod(MethodBase):
     implicit: ClassVar[bool] = False  # whether it takes a Jacobian
     multistep: ClassVar[bool] = False
     library = "scipy"
-    to_end = "land"
+    to_end = "stop"
 
     def __post_init__(self) -> None:
         super().__post_init__()

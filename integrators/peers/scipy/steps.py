@@ -66,20 +66,20 @@ def _factored(matrix: Any) -> _Factored:
 class SciPyStepper(StepperBase):
     """A trajectory of one of SciPy's solvers.
 
-    ``"side"`` (default)
+    ``"partial"`` (default)
         The steps of the solver are untouched. A time between two of them is reached
         by a separate solver from the earlier one, with the same tolerances; its
         evaluations are counted apart, in ``stats.extra["side_evaluations"]``. The polynomial of a
         multistep method gives it, which is of the method's order.
     ``"steps"``
         The steps of the solver, up to the last time.
-    ``"land"``
+    ``"stop"``
         The last step before each time is shortened onto it, as `solve_ivp` does at its end.
 
     The interpolants of the Runge-Kutta methods are not offered: they are of lower order than the method.
     """
 
-    samplings = ("side", "steps", "land")
+    samplings = ("partial", "steps", "stop")
     _sparse = True  # whether the solver takes sparse Jacobians
 
     def __init__(self, program: SciPyProgram, y: Array, par: Array, t: float):
@@ -153,7 +153,7 @@ class SciPyStepper(StepperBase):
         states = np.empty((grid.size, self._y.size))
         watch = crawl(self, self._solver.t, float(grid[-1]))
         for i, t in enumerate(grid.tolist()):
-            self._bound(t if how == "land" else sign * math.inf)
+            self._bound(t if how == "stop" else sign * math.inf)
             while sign * (self._solver.t - t) < 0.0:
                 if not self._step(watch):
                     return grid[:i], states[:i]
@@ -167,7 +167,7 @@ class SciPyStepper(StepperBase):
                 return grid[: i + 1], states[: i + 1]
         return grid, states
 
-    def _own_steps(self, end: float) -> tuple[Array, Array]:
+    def _step_states(self, end: float) -> tuple[Array, Array]:
         sign = self._towards(end)
         self._bound(sign * math.inf)
         watch = crawl(self, self._solver.t, end)

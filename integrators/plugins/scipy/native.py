@@ -99,7 +99,7 @@ class NativeSteps:
             return str(self._stepper.reason)
         made = self._own()
         if not (made.t.size or made.status.failed):
-            made = self._stepper.advance(np.array([self._t_bound]), sample="side")
+            made = self._stepper.advance(np.array([self._t_bound]), sample="partial")
         if not made.t.size:
             return made.reason
         self._before, self._made = (t, y), made
@@ -118,7 +118,7 @@ class NativeSteps:
         if self._started:
             return self._stepper.take(times.size)
         self._started = True  # and turned, if it goes back
-        return self._stepper.advance(times, sample="side")
+        return self._stepper.advance(times, sample="partial")
 
     def dense_output(self) -> DenseOutput:
         """Return the states between the present one and the one before."""
@@ -176,7 +176,7 @@ class Between:
             if isinstance(self._stepper, FixedStepper):
                 made = self._stepper.single(y, t0, t)
             else:
-                made = self._stepper.advance(np.array([t]), sample="land")
+                made = self._stepper.advance(np.array([t]), sample="stop")
             return made.y[0] if made.t.size else np.full(y.size, np.nan)
 
 

@@ -15,7 +15,7 @@ WRONG = 1e-6  # of the size of a component over the span
 
 MOST_STEPS = 20_000  # a run that needs more has failed: the spans are short
 
-SAMPLINGS = (None, "land", "steps")
+SAMPLINGS = (None, "stop", "steps")
 METHODS: dict[str, Any] = {
     "HBVM()": HBVM(max_steps=MOST_STEPS),
     "HBVM(8, 7)": HBVM(k=8, s=7, tol=1e-12, max_steps=MOST_STEPS),
@@ -78,7 +78,7 @@ def _alone(case: Case, name: str, method: Any) -> Iterator[Outcome]:
     )
     if name != "HBVM()" or solution.status is not Status.FINISHED:
         return
-    if sampling != "land":
+    if sampling != "stop":
         solution = integrate(problem, method, case.times)
     try:
         states = solution(case.asked)

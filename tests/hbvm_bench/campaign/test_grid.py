@@ -1,3 +1,4 @@
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -68,11 +69,17 @@ def test_further_times_lie_within_the_span_and_all_may_be_whole_ones():
     assert np.all(np.diff(t) > 0)
 
 
-def test_samples_of_a_fixed_step_are_own_steps_backwards_too():
+def test_samples_of_a_fixed_step_are_at_its_steps_backwards_too():
     for t_end in (10.0, -10.0):
         problem = problems.load("pendulum", t_end=t_end)
-        t = Grid(count=40, own_steps=True).times(problem, 0.3)
+        t = Grid(count=40, at_steps=True).times(problem, 0.3)
         assert t[-1] == t_end
         assert np.array_equal(np.abs(t[:-1]), np.rint(np.abs(t[:-1]) / 0.3) * 0.3)
         assert np.all(np.diff(np.abs(t)) > 0)
-    assert np.array_equal(Grid(count=40, own_steps=True).times(problem), Grid(count=40).times(problem))
+    assert np.array_equal(Grid(count=40, at_steps=True).times(problem), Grid(count=40).times(problem))
+
+
+def test_stored_grids_have_the_former_name_of_at_steps():
+    stored = msgspec.convert({"count": 40, "own_steps": True}, Grid)
+    assert stored == Grid(count=40, at_steps=True)
+    assert msgspec.to_builtins(stored) == {"count": 40, "at_steps": True}

@@ -39,7 +39,7 @@ class Noting:
 class Landing(MethodBase):
     """A method that is at its best between steps, and whose library goes to an end by landing on it."""
 
-    to_end = "land"
+    to_end = "stop"
     order = 1
 
     def accepts(self, problem):
@@ -54,7 +54,7 @@ def test_a_run_goes_to_its_end_as_the_library_does():
     run = timing.Run.of(problem, Landing())
     run.until(0.5).seconds()
     run.seconds(2)
-    assert run.program.asked == ["land"] * 3
+    assert run.program.asked == ["stop"] * 3
     assert (run.t_end, run.until(0.5).t_end) == (1.0, 0.5)
     assert timing.Run.of(problem, integrators.Gauss(s=2, h=0.1)).sample is None
 
@@ -63,8 +63,8 @@ def test_making_a_stepper_is_outside_every_clock():
     problem, program = problems.load("pendulum", t_end=1.0), Noting()
     assert timing.Run.of(problem, Landing(), program).seconds(3, lambda: program.now)[0] == 1.0
     starts = np.tile(problem.y0, (4, 1))
-    assert ensemble.EnsembleRun(program, starts, problem, "land").seconds(2, lambda: program.now)[0] == 4.0
-    assert set(program.asked) == {"land"}
+    assert ensemble.EnsembleRun(program, starts, problem, "stop").seconds(2, lambda: program.now)[0] == 4.0
+    assert set(program.asked) == {"stop"}
 
 
 class Batching(Noting):

@@ -61,7 +61,7 @@ def test_every_peer_that_is_registered_is_compared():
 
 
 @pytest.mark.parametrize(("problem", "method"), list(pairs()))
-def test_the_bench_takes_the_library_s_own_steps_to_its_own_end(problem, method):
+def test_the_bench_takes_the_library_s_steps_to_its_end(problem, method):
     whole = make_problem(problem)
     if not problem.startswith(SHORT):
         spec = parse_spec(problem)

@@ -301,7 +301,7 @@ def test_the_nth_occurrence_may_be_terminal_and_others_stop_with_it():
 
 def test_events_change_nothing_of_the_samples():
     problem, times = oscillator(), np.linspace(0.0, 20.0, 37)
-    for sample in (None, "steps", "dense", "side"):
+    for sample in (None, "steps", "dense", "partial"):
         alone = integrate(problem, WHOLE, times, sample)
         watched = integrate(problem, WHOLE, times, sample, events=lambda q: q[0])
         assert np.array_equal(alone.t, watched.t)
@@ -425,7 +425,7 @@ def test_methods_without_states_inside_their_steps_refuse():
         ([lambda state: state[0]], {}, "asks for an argument 'state'"),
         ([lambda q: q], {}, "returns 1 values, not one number"),
         ([Event(len, name="a"), Event(abs, name="a")], {}, "two events have the name 'a'"),
-        ([lambda q: q[0]], {"sample": "land"}, "sample='land' changes; use 'side'"),
+        ([lambda q: q[0]], {"sample": "stop"}, "sample='stop' changes; use 'partial'"),
         ([lambda q: q[0]], {"times": [1.0, 0.5]}, "strictly monotone"),
     ],
 )

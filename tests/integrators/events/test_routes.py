@@ -48,7 +48,7 @@ def test_a_state_is_that_of_the_method_at_the_time(henon_heiles, method):
     assert np.abs(again.y - found.y).max() < 5e-15  # measured 8.9e-16
 
 
-def test_own_steps_and_work_stay_what_they_are(henon_heiles):
+def test_adaptive_steps_and_work_stay_what_they_are(henon_heiles):
     alone = integrate(henon_heiles, HBVM(), [50.0])
     made = integrate(henon_heiles, HBVM(), [50.0], events=lambda q: q[0])
     assert alone.y.tobytes() == made.y.tobytes()

@@ -31,7 +31,7 @@ def distance(found, expected):
 
 @pytest.mark.parametrize(
     ("k", "s", "form", "sample"),
-    [(18, 2, None, "side"), (8, 8, None, "land"), (16, 9, None, "dense"), (6, 2, "first", "land")],
+    [(18, 2, None, "partial"), (8, 8, None, "stop"), (16, 9, None, "dense"), (6, 2, "first", "stop")],
 )
 def test_what_goes_one_by_one_is_its_trajectories_bit_for_bit(k, s, form, sample):
     problem = problems.load("kepler", e=0.5)
@@ -242,7 +242,7 @@ OWN = {
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_trajectories_with_own_steps_in_lanes_are_those_of_integrate_up_to_the_tolerance(name):
+def test_trajectories_with_adaptive_steps_in_lanes_are_those_of_integrate_up_to_the_tolerance(name):
     problem_name, values, times, close = OWN[name]
     problem = problems.load(problem_name, **values)
     program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
@@ -260,7 +260,7 @@ def test_trajectories_with_own_steps_in_lanes_are_those_of_integrate_up_to_the_t
 
 
 @pytest.mark.parametrize("name", ["kepler", "double_pendulum"])
-def test_own_steps_in_lanes_are_the_same_bits_in_any_place_and_on_any_threads(name):
+def test_adaptive_steps_in_lanes_are_the_same_bits_in_any_place_and_on_any_threads(name):
     problem = problems.load(name)
     program = AdaptiveProgram(problem.system, k=8, s=7, tol=1e-12)
     n = 50  # lanes take up several, one after another
@@ -301,7 +301,7 @@ def test_few_lanes_are_idle_while_trajectories_of_several_jobs_are_left(monkeypa
     assert made.steps.sum() > 0.9 * width * len(calls)
 
 
-def test_own_steps_keep_the_energy_of_eccentric_orbits():
+def test_adaptive_steps_keep_the_energy_of_eccentric_orbits():
     problem = problems.load("kepler", e=0.9)
     program = AdaptiveProgram(problem.system, k=16, s=14, tol=1e-15)
     starts = problem.y0 * (1 + 1e-3 * rng.normal(size=(8, 1)))
@@ -311,7 +311,7 @@ def test_own_steps_keep_the_energy_of_eccentric_orbits():
         assert abs(after / before - 1) < 5e-13  # measured 6e-14: 2200 steps
 
 
-def test_with_own_steps_too_one_failure_leaves_the_others_alone():
+def test_with_adaptive_steps_too_one_failure_leaves_the_others_alone():
     def H(q, p, m):
         return p[0] * p[0] / 2 - q[0] * m.sqrt(q[0])
 
@@ -328,7 +328,7 @@ def test_with_own_steps_too_one_failure_leaves_the_others_alone():
     assert np.isnan(batch.y[1, alone.t.size :]).all()
 
 
-def test_a_kink_and_a_stiff_system_go_one_by_one_from_own_steps():
+def test_a_kink_and_a_stiff_system_go_one_by_one_from_adaptive_steps():
     def f(t, y, m):
         return [y[1], -y[0] - m.abs(y[0] - 0.3)]
 

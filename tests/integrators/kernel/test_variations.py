@@ -216,7 +216,7 @@ def test_they_change_nothing_of_the_trajectory():
         assert np.array_equal(plain.y, integrate(problem, method, times, variations=["y0", "t0"]).y)
 
 
-@pytest.mark.parametrize("sample", ["side", "steps", "land"])
+@pytest.mark.parametrize("sample", ["partial", "steps", "stop"])
 def test_every_way_to_sample_has_them(sample):
     problem, times = problems.load("pendulum"), np.linspace(0.0, 5.0, 4)
     exact = integrate(problem, Gauss(s=8, tol=1e-15), times, variations=["y0", "t0"])

@@ -40,7 +40,7 @@ def test_steps_of_one_length_where_they_serve() -> None:
     assert [one.seconds for one in advice.proposals] == sorted(one.seconds for one in advice.proposals)
 
 
-def test_own_steps_through_encounters() -> None:
+def test_adaptive_steps_through_encounters() -> None:
     advice = advise(_orbits(0.97, 20), 1e-8)
     assert [type(one.method).__name__ for one in advice.proposals] == ["HBVM"]
     assert "steps vary by" in advice.why

@@ -88,12 +88,12 @@ def test_energy_that_is_not_polynomial_is_conserved_in_practice_once_k_is_large(
     assert max(errors[4:]) < 1e-14
 
 
-def test_side_samples_have_the_energy_of_own_steps_and_the_polynomial_has_not(henon_heiles):
+def test_partial_steps_have_the_energy_of_steps_and_the_polynomial_has_not(henon_heiles):
     method = HBVM(k=6, s=4, h=1.0)  # 6 = 3 * 4 / 2
     between = np.arange(0.5, 50.0, 1.0)
-    side = integrators.integrate(henon_heiles, method, between, "side").errors()["energy"]
+    partial = integrators.integrate(henon_heiles, method, between, "partial").errors()["energy"]
     dense = integrators.integrate(henon_heiles, method, between, "dense").errors()["energy"]
-    assert side.max() < 5e-15  # measured 2.8e-16
+    assert partial.max() < 5e-15  # measured 2.8e-16
     assert dense.max() > 1e-6  # measured 6.7e-5
 
 

@@ -37,7 +37,7 @@ def test_gauss_has_order_2s(s, kepler, kepler_exact):
     assert Gauss(s=s, h=0.1).order == 2 * s
 
 
-@pytest.mark.parametrize(("sample", "expected"), [("side", 6), ("land", 6), ("dense", 4)])
+@pytest.mark.parametrize(("sample", "expected"), [("partial", 6), ("stop", 6), ("dense", 4)])
 def test_states_between_steps_have_order_2s_but_the_polynomial_only_s_plus_one(
     sample, expected, kepler, kepler_exact
 ):

@@ -158,7 +158,7 @@ def test_a_state_that_an_event_makes_has_its_own_energy():
     assert abs(p**2 / 2 + q + q**4 - left) < 1e-14  # 1.1e-16
 
 
-@pytest.mark.parametrize("sample", ["side", "land", "steps"])
+@pytest.mark.parametrize("sample", ["partial", "stop", "steps"])
 def test_every_sample_is_projected(sample):
     times = np.linspace(0.0, 50.0, 101)[1:]
     solution = integrate(KEPLER, projected(1e-4), times, sample=sample)

@@ -200,5 +200,5 @@ def test_a_plain_solve_that_does_not_arrive_is_run_again_under_a_watch(monkeypat
     plainly, watched = (program.start(problem.y0) for _ in range(2))
     made = plainly.advance(end, sample="end")
     assert made.status is Status.FINISHED
-    assert np.array_equal(made.y, watched.advance(end, sample="land").y)
+    assert np.array_equal(made.y, watched.advance(end, sample="stop").y)
     assert plainly.stats.steps == watched.stats.steps > 5

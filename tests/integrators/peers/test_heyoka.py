@@ -65,7 +65,7 @@ class Counting:
 
 
 @pytest.mark.parametrize("times", [1, 100, 20_000])
-@pytest.mark.parametrize("sample", ["side", "land"])
+@pytest.mark.parametrize("sample", ["partial", "stop"])
 def test_every_step_that_heyoka_takes_is_counted(sample, times):
     problem = problems.load("kepler", e=0.6)
     program = Taylor().compile(problem.system)
@@ -74,7 +74,7 @@ def test_every_step_that_heyoka_takes_is_counted(sample, times):
     stepper.advance(np.linspace(0.0, problem.t_end, times + 1)[1:], sample=sample)
     steps, aside = stepper.stats.steps, stepper.stats.extra["side_steps"]
     assert stepper._ta.taken == steps + aside
-    assert aside <= times if sample == "side" else aside == 0
+    assert aside <= times if sample == "partial" else aside == 0
     if times == 1:  # what heyoka takes alone
         alone = copy.copy(program.template)
         alone.state[:], alone.pars[:] = problem.y0, problem.par
@@ -94,7 +94,7 @@ def test_a_sample_is_what_a_partial_step_gives():
 def test_landing_and_side_agree_and_landing_takes_more_steps():
     problem = testing.two_bodies()
     grid = np.linspace(0.0, 15.0, 301)
-    side, land = (integrate(problem, Taylor(), grid, sample=how) for how in ("side", "land"))
+    side, land = (integrate(problem, Taylor(), grid, sample=how) for how in ("partial", "stop"))
     assert np.max(np.abs(side.y - land.y)) < 1e-12  # 4e-14
     assert land.stats.steps > side.stats.steps
 
@@ -154,7 +154,7 @@ def test_one_time_is_landed_on_as_several_are():
     program = Taylor().compile(problem.system)
     one, same = (program.start(problem.y0, problem.par) for _ in range(2))
     end = np.array([30.0])
-    landed, listed = one.advance(end, sample="land"), same.advance([30.0], sample="land")
+    landed, listed = one.advance(end, sample="stop"), same.advance([30.0], sample="stop")
     assert np.array_equal(landed.y, listed.y)
     assert (one.t, one.status, landed.status) == (30.0, same.status, Status.FINISHED)
     assert np.array_equal(one.y, landed.y[0])
@@ -162,8 +162,8 @@ def test_one_time_is_landed_on_as_several_are():
     assert np.array_equal(one.y, same.y)
     assert landed.t.tolist() == [30.0]
     with pytest.raises(InputError, match="finite"):
-        one.advance(np.array([np.inf]), sample="land")
-    assert one.advance(np.array([30.0]), sample="land").t.tolist() == [30.0]
+        one.advance(np.array([np.inf]), sample="stop")
+    assert one.advance(np.array([30.0]), sample="stop").t.tolist() == [30.0]
 
 
 def test_a_start_at_rest_that_heyoka_cannot_leave_is_a_status():

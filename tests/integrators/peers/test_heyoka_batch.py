@@ -85,7 +85,7 @@ def test_the_others_reach_every_time_after_one_met_a_pole(dead):
     times = np.linspace(0.0, 50.0, 26)
     batch = program.batch(starts, times=times)
     for i in range(n):
-        single = program.start(starts[i], problem.par).advance(times, sample="land")
+        single = program.start(starts[i], problem.par).advance(times, sample="stop")
         assert batch.status[i] is (Status.NOT_FINITE if i in dead else Status.FINISHED)
         reached = single.t.size
         assert reached < times.size if i in dead else reached == times.size

@@ -286,7 +286,7 @@ def test_rebound_s_warnings_are_kept_and_not_raised():
     assert "Kepler solver" in solution.stats.extra["messages"][0]
 
 
-def test_own_steps_end_before_the_last_time():
+def test_adaptive_steps_end_before_the_last_time():
     stepper = IAS15().compile(testing.two_bodies().system).start(testing.two_bodies().y0)
     samples = stepper.advance([0.0, 10.0], sample="steps")
     assert samples.t[0] == 0.0

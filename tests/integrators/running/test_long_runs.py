@@ -119,12 +119,12 @@ class TestResume:
         times = np.sort(np.random.default_rng(3).uniform(0.1, 4.0, 60)) if many else [4.0]
         whole = integrate(problem, method, times=times)
         assert whole.status is Status.FINISHED
-        lands = getattr(method.compile(problem.system).start(problem.y0), "samplings", [""])[0] == "land"
+        lands = getattr(method.compile(problem.system).start(problem.y0), "samplings", [""])[0] == "stop"
         if not many and lands:
             return  # a method that lands on every time is not looked at between
         assert_same(broken_and_resumed(path, problem, method, times=times), whole)
 
-    @pytest.mark.parametrize("sample", ["steps", "land", "dense", "side"])
+    @pytest.mark.parametrize("sample", ["steps", "stop", "dense", "partial"])
     @pytest.mark.parametrize(
         "method",
         [HBVM(), HBVM(k=6, s=3, h=0.03), LineIntegral(k=6, s=3, h=0.03, invariants=["energy"])],

@@ -44,7 +44,7 @@ def first(t: Array, holds: NDArray[np.bool_]) -> float | None:
     return float(t[np.argmax(holds)]) if holds.any() else None
 
 
-def own_steps(problem: Problem, method: MethodBase, y0: Array, span: float) -> tuple[Array, Array, Stepper]:
+def step_states(problem: Problem, method: MethodBase, y0: Array, span: float) -> tuple[Array, Array, Stepper]:
     """Return the times (n,) and states (n, dim) at the steps of a method, with the start, and its stepper."""
     stepper = method.compile(problem.system).start(y0, problem.par, 0.0)
     samples = stepper.advance(np.array([span]), sample="steps")

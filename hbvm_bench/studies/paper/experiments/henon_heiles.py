@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.experiments.departure import departure, first, own_steps
+from hbvm_bench.studies.paper.experiments.departure import departure, first, step_states
 from integrators import integrate
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
@@ -66,7 +66,7 @@ def start(t_end: float = T_END, gap: float = GAP, direction: float = START[2]) -
 def orbit(method: MethodBase, offset: int = 0, t_end: float = T_END) -> Orbit:
     """Integrate from the start, ``offset`` last bits away."""
     problem = start(t_end)
-    t, y, stepper = own_steps(problem, method, neighbour(problem.y0, offset), t_end)
+    t, y, stepper = step_states(problem, method, neighbour(problem.y0, offset), t_end)
     gone = np.flatnonzero(np.abs(y[:, :2]).max(axis=1) > GONE)
     if gone.size:
         t, y = t[: gone[0] + 1], y[: gone[0] + 1]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hbvm_bench.studies.paper.experiments.departure import departure, own_steps
+from hbvm_bench.studies.paper.experiments.departure import departure, step_states
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM
 from integrators.protocol import Array, MethodBase, Program
@@ -119,7 +119,7 @@ def fates(method: MethodBase, gaps: Sequence[float], span: float = SPAN) -> list
 
 def orbit(method: MethodBase, c: float, span: float = SPAN) -> Path:
     """Return the times and states at the steps of the orbit from (0, c), up to its departure."""
-    t, y, _ = own_steps(PROBLEM, method, np.array([0.0, c]), span)
+    t, y, _ = step_states(PROBLEM, method, np.array([0.0, c]), span)
     far = np.flatnonzero(_departed(y))
     return (t[: far[0]], y[: far[0]]) if far.size else (t, y)
 

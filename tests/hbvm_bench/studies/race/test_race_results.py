@@ -117,7 +117,7 @@ def test_a_race_without_any_valid_run_has_no_figure(race):
     assert work_precision(void, looks([])) is None
 
 
-def test_fixed_and_own_steps_are_rows_of_their_own_and_the_faster_counts(race):
+def test_fixed_and_adaptive_steps_are_rows_of_their_own_and_the_faster_counts(race):
     own = record("HBVM(tol=1e-14)", 0.0005, 5e-14, 5e-11)
     both = replace(race, records=[*race.records, own])
     rows = {row[0]: row[1] for row in tables.fastest(both).rows}

@@ -73,7 +73,7 @@ def test_a_fixed_step_divides_the_span(key):
             assert abs(steps - round(steps)) < 1e-6
 
 
-def test_samples_of_a_fixed_step_are_own_steps_and_end_at_the_end():
+def test_samples_of_a_fixed_step_are_at_its_steps_and_end_at_the_end():
     case = cases("henon_heiles")[1]
     resolved = resolve(case)
     h = getattr(resolved.method, "h", 0.0)

@@ -48,7 +48,7 @@ def test_order_2s(k, s, names):
     assert LineIntegral(k=k, s=s, h=0.1, invariants=names).order == 2 * s
 
 
-@pytest.mark.parametrize(("sample", "expected"), [("side", 6), ("land", 6), ("dense", 4)])
+@pytest.mark.parametrize(("sample", "expected"), [("partial", 6), ("stop", 6), ("dense", 4)])
 def test_states_between_steps_have_order_2s_but_the_polynomial_only_s_plus_one(sample, expected):
     problem = problems.load("kepler", e=0.3)
     order = measured_order(

@@ -54,7 +54,7 @@ def test_sitnikov_at_full_precision():
     assert np.abs(solution.y - other.y).max() <= 1e-9  # measured 9.5e-12
 
 
-def test_own_steps_do_not_depend_on_the_times_asked_for():
+def test_adaptive_steps_do_not_depend_on_the_times_asked_for():
     problem = problems.load("kepler", e=0.6, t_end=20.0)
     program = LineIntegral(k=12, s=4, tol=1e-8, invariants=NAMES).compile(problem.system)
     ends = []
@@ -126,7 +126,7 @@ def test_steps_do_not_outgrow_the_iteration_where_fast_modes_are_at_rest():
     assert solution.stats.rejections <= 10  # measured 4
 
 
-@pytest.mark.parametrize("sample", ["side", "steps"])
+@pytest.mark.parametrize("sample", ["partial", "steps"])
 def test_steps_that_have_collapsed_are_a_status_with_time_and_reason(monkeypatch, sample):
     monkeypatch.setattr("integrators.running.watchdog.CRAWL_STEPS", 8000)
 

@@ -156,7 +156,7 @@ def test_any_other_error_is_the_users_to_see():
         with pytest.raises(LookupError, match="no such table"):  # nothing is reached that could be kept
             integrate(problem, method)
         last = 8.0
-        for sample in ("side", "steps", "land"):
+        for sample in ("partial", "steps", "stop"):
             times.clear()
             made = integrate(problem, method, np.linspace(0.0, 9.0, 91), sample=sample)
             assert made.status is Status.USER_ERROR

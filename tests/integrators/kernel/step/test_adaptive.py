@@ -42,7 +42,7 @@ def test_energy_stays_at_round_off_over_1000_revolutions_and_gauss_drifts_at_the
     assert lengths.max() > 3 * lengths.min()
     # Landing on each of these times makes them the steps of Gauss too.
     times = loose.t[: np.searchsorted(loose.t, 50 * 2 * np.pi)]
-    same = integrators.integrate(problem, Gauss(s=4, h=1e6), times, sample="land")
+    same = integrators.integrate(problem, Gauss(s=4, h=1e6), times, sample="stop")
     assert same.stats.extra["partial_steps"] == times.size - 1
     assert same.errors()["energy"].max() > 1e-6  # measured 6.1e-4
 
@@ -72,13 +72,13 @@ def test_states_between_steps_have_the_energy_of_the_steps_and_the_polynomial_ha
     times = np.linspace(0.0, problem.t_end, 777)
     side, dense = (
         integrators.integrate(problem, HBVM(k=20, s=4, tol=1e-6), times, sample=how).errors()["energy"].max()
-        for how in ("side", "dense")
+        for how in ("partial", "dense")
     )
     assert side < 1e-14  # measured 1.2e-15
     assert dense > 1e-9  # measured 4.3e-4
 
 
-def test_own_steps_do_not_depend_on_the_times_asked_for():
+def test_adaptive_steps_do_not_depend_on_the_times_asked_for():
     problem = kepler(5)
     program = HBVM().compile(problem.system)
     few, many = (program.start(problem.y0, problem.par, 0.0) for _ in range(2))
@@ -102,8 +102,8 @@ def test_steps_add_up_to_the_times_they_are_at():
 def test_backwards_returns_to_the_start():
     problem = kepler(3)
     stepper = HBVM().compile(problem.system).start(problem.y0, problem.par, 0.0)
-    end = stepper.advance([problem.t_end], sample="land").y[-1]
-    back = stepper.advance([0.0], sample="land").y[-1]
+    end = stepper.advance([problem.t_end], sample="stop").y[-1]
+    back = stepper.advance([0.0], sample="stop").y[-1]
     assert np.abs(end - problem.y0).max() < 1e-12  # measured 2.2e-14
     assert np.abs(back - problem.y0).max() < 1e-12  # measured 2.5e-14
 
@@ -112,7 +112,7 @@ def test_pieces_equal_the_whole_with_every_sampling():
     problem = kepler(2)
     program = HBVM(tol=1e-9).compile(problem.system)
     times = np.linspace(0.3, problem.t_end, 40)
-    for sample in ("side", "land", "dense"):
+    for sample in ("partial", "stop", "dense"):
         whole = program.start(problem.y0, problem.par, 0.0).advance(times, sample=sample)
         stepper = program.start(problem.y0, problem.par, 0.0)
         parts = [stepper.advance(part, sample=sample).y for part in np.array_split(times, 7)]
@@ -304,7 +304,7 @@ def test_steps_that_have_collapsed_are_a_status_with_time_and_reason():
         return [1.0 + 0.5 * m.sin(1e9 * t)]
 
     problem = Problem(VectorField(f, dim=1), y0=[0.0], t_end=1e6)
-    for sample in ("side", "steps"):
+    for sample in ("partial", "steps"):
         found = integrators.integrate(problem, HBVM(tol=1e-10), [0.0, 1e6], sample=sample)
         assert found.status is Status.STALLED
         assert "the steps have collapsed" in found.reason

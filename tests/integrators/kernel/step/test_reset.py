@@ -29,7 +29,7 @@ def test_nothing_of_the_trajectory_before_remains(name):
     program, h = method.compile(problem.system), method.h
     other = problem.y0 * 1.05
     used = program.start(problem.y0, problem.par, 3.0)
-    used.advance([3.0 + 40.3 * h], sample="land")
+    used.advance([3.0 + 40.3 * h], sample="stop")
     used.take(60)
     for count in (1, 3, 60):
         new = program.start(problem.y0, problem.par, 0.0)

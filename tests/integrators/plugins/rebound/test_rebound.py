@@ -202,7 +202,7 @@ def test_the_largest_error_of_a_step_is_the_users() -> None:
     ],
     ids=str,
 )
-def test_own_steps_pass_an_encounter(method: HBVM | Gauss, energy: float) -> None:
+def test_adaptive_steps_pass_an_encounter(method: HBVM | Gauss, energy: float) -> None:
     simulation = eccentric(0.01)
     install(simulation, method)
     before = simulation.energy()

@@ -53,7 +53,7 @@ def pulse():
     return Problem(VectorField(field, dim=2, name="pulse"), y0=[1.0, 0.0], t_end=20.0), exact
 
 
-@pytest.mark.parametrize("sample", [None, "land", "steps"])
+@pytest.mark.parametrize("sample", [None, "stop", "steps"])
 @pytest.mark.parametrize("method", [HBVM(), HBVM(tol=1e-8), Gauss(s=4, tol=1e-10)], ids=repr)
 def test_a_pulse_between_breakpoints_is_not_stepped_over(method, sample):
     problem, exact = pulse()
@@ -73,8 +73,8 @@ def test_breakpoints_hold_on_the_way_back_and_are_read_from_a_command_line():
     method = HBVM(**spec.arguments)
     assert repr(method) == "HBVM(tol=3e-16, max_step=2.0, breakpoints=(3.0, 3.005), max_steps=500)"
     stepper = method.compile(problem.system).start(problem.y0, problem.par, 0.0)
-    stepper.advance([20.0], sample="land")
-    back = stepper.advance([0.0], sample="land").y[-1]
+    stepper.advance([20.0], sample="stop")
+    back = stepper.advance([0.0], sample="stop").y[-1]
     assert np.abs(back - problem.y0).max() < 1e-12  # measured 6e-16
 
 
@@ -391,7 +391,7 @@ def test_times_one_ulp_apart_lose_nothing():
     first = t0 + np.linspace(0.5, 25.0, 50)
     times = np.sort(np.concatenate([first, np.nextafter(first, np.inf)]))
     solution = integrators.integrate(
-        Problem(OSCILLATOR, y0=[1.0, 0.0], t0=t0, t_end=t0 + 30.0), HBVM(), times, sample="land"
+        Problem(OSCILLATOR, y0=[1.0, 0.0], t0=t0, t_end=t0 + 30.0), HBVM(), times, sample="stop"
     )
     exact = np.column_stack([np.cos(times - t0), -np.sin(times - t0)])
     assert np.abs(solution.y - exact).max() < 4e-7  # measured 1.2e-7, an ulp of t: such times count as one
