@@ -15,13 +15,14 @@ import psutil
 
 import integrators.registry
 from hbvm_bench.campaign.identity import version_of
-from hbvm_bench.measure import machine
+from hbvm_bench.measure import machine, timing
 from hbvm_bench.measure.timing import calibrate
 from problems.errors import InputError
 
 State = Literal["ok", "note", "bad"]
 
 SYSTEM = Path("/sys/devices/system/cpu")
+STAT = Path("/proc/stat")
 CALIBRATIONS = 60  # of about 10 ms
 LARGEST_SCATTER = 0.05  # ninth decile over the first one, less 1
 LEAST_SHARE = 0.97  # of a core while calibrating
@@ -121,12 +122,15 @@ def cores() -> Finding:
 
 def load() -> Finding:
     """Return how many processes want to run now, besides this one, and on average over a minute."""
+    last = f"{psutil.getloadavg()[0]:.2f} in all over the last minute"
     looks: list[int] = []
     for _ in range(LOOKS):
         time.sleep(PAUSE)
-        looks.append(max(_running() - 1, 0))
+        if (running := _running()) is None:
+            return Finding("load", "note", f"not visible now, {last}")
+        looks.append(max(running - 1, 0))
     others = int(median(looks))
-    words = f"{others} other processes want to run, {os.getloadavg()[0]:.2f} in all over the last minute"
+    words = f"{others} other processes want to run, {last}"
     return _judged("load", words, others > 0, "wait for the end of what else runs")
 
 
@@ -164,6 +168,8 @@ def vectors() -> Finding:
 
 def virtual() -> Finding:
     """Return whether this is a virtual machine, whose host may take its cores away."""
+    if not machine.flags():
+        return Finding("machine", "note", "not visible whether it is virtual")
     if "hypervisor" in machine.flags():
         return Finding("machine", "note", "virtual: other work of the host shows as steal time only")
     return Finding("machine", "ok", "not virtual, as far as it tells")
@@ -173,11 +179,12 @@ def steadiness(measure: Callable[[], float] = calibrate) -> list[Finding]:
     """Time the calibration loop again and again on one core, and tell how steady that is."""
     with machine.staying_on_a_core():
         measure()  # compiled now
-        stolen, wall, busy = psutil.cpu_times().steal, time.perf_counter(), time.process_time()
+        stolen, wall, busy = timing.stolen(), time.perf_counter(), time.process_time()
         taken = [measure() for _ in range(CALIBRATIONS)]
         wall, busy = time.perf_counter() - wall, time.process_time() - busy
-        stolen = psutil.cpu_times().steal - stolen
-    return [scatter(taken), share(busy / wall), steal(stolen / wall)]
+        stolen = timing.stolen() - stolen
+    told = [steal(stolen / wall)] if hasattr(psutil.cpu_times(), "steal") else []
+    return [scatter(taken), share(busy / wall), *told]
 
 
 def scatter(taken: Sequence[float]) -> Finding:
@@ -213,10 +220,10 @@ def _quota() -> float | None:
     return int(granted) / int(period) if granted.isdigit() and period.isdigit() else None
 
 
-def _running() -> int:
-    """Return the number of runnable processes, this one among them."""
-    lines = _read(Path("/proc/stat")).splitlines()
-    return next((int(line.split()[1]) for line in lines if line.startswith("procs_running")), 1)
+def _running() -> int | None:
+    """Return the number of runnable processes, this one among them, where the system tells."""
+    lines = _read(STAT).splitlines()
+    return next((int(line.split()[1]) for line in lines if line.startswith("procs_running")), None)
 
 
 def _read(path: Path) -> str:

@@ -7,10 +7,12 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+import psutil
+
 from problems.errors import InputError
 
 VENDORS = {"AuthenticAMD": "AMD", "GenuineIntel": "Intel"}
-VECTORS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "SSE2"))
+VECTORS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("avx", "AVX"), ("sse2", "SSE2"), ("neon", "NEON"))
 
 MEASURED = ("vector_bits", "clock_ghz")
 """What `describe` measures: it may differ from one look at a processor to the next."""
@@ -25,6 +27,7 @@ AVX2 = (
     "Without AVX-512 in all that numba compiles: our code, and the forces and fields handed to REBOUND "
     "and SciPy."
 )
+BINDS = hasattr(psutil.Process, "cpu_affinity")  # to cores: Linux and Windows do
 FEATURES, NAME = "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME"
 
 
@@ -35,15 +38,14 @@ def describe(*, measure: bool = False) -> dict[str, str | int]:
     """
     from llvmlite import binding
 
-    vendor = _cpu().get("vendor_id", "")
+    features = binding.get_host_cpu_features()
     described: dict[str, str | int] = {
         "processor": _processor(),
-        "family": f"{VENDORS.get(vendor, vendor)} family {_cpu().get('cpu family', '?')}, "
-        f"model {_cpu().get('model', '?')}",
+        **_family(),
         "llvm_processor": binding.get_host_cpu_name(),
         "cores": len(cores()),
-        "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
-        "vector_instructions": next((name for flag, name in VECTORS if flag in flags()), "none known"),
+        "memory_gib": round(psutil.virtual_memory().total / 2**30),
+        "vector_instructions": next((name for flag, name in VECTORS if features.get(flag)), "none known"),
         "system": f"{platform.system()} {platform.machine()}",
         "python": f"{platform.python_implementation()} {platform.python_version()}",
     }
@@ -132,8 +134,17 @@ def restricted_to_avx2() -> dict[str, str]:
 
 
 def cores() -> list[int]:
-    """Return the numbers of the cores this process may use."""
-    return sorted(os.sched_getaffinity(0))
+    """Return the numbers of the cores this process may use; all, where the system binds none (macOS)."""
+    process = psutil.Process()
+    if BINDS:
+        return sorted(process.cpu_affinity() or [])
+    return list(range(os.cpu_count() or 1))
+
+
+def bind(numbers: Iterable[int]) -> None:
+    """Keep this process on some cores, where the system does that."""
+    if BINDS:
+        psutil.Process().cpu_affinity(list(numbers))
 
 
 @contextmanager
@@ -146,22 +157,22 @@ def leaving_a_core() -> Iterator[int | None]:
     core = max(mine, default=None)
     others = set(mine) - {core}
     if others:
-        os.sched_setaffinity(0, others)
+        bind(others)
     try:
         yield core
     finally:
-        os.sched_setaffinity(0, mine)
+        bind(mine)
 
 
 @contextmanager
 def staying_on_a_core() -> Iterator[None]:
     """Keep this process on one core, the last one it may use."""
     mine = cores()
-    os.sched_setaffinity(0, {mine[-1]})
+    bind(mine[-1:])
     try:
         yield
     finally:
-        os.sched_setaffinity(0, mine)
+        bind(mine)
 
 
 def flags() -> set[str]:
@@ -178,6 +189,14 @@ def _cpu() -> dict[str, str]:
         return {}
     lines = (line.partition(":") for line in text.partition("\n\n")[0].splitlines())
     return {name.strip(): value.strip() for name, _, value in lines}
+
+
+def _family() -> dict[str, str]:
+    """Return what x86-64 calls family and model; nothing of others, or where the system does not tell."""
+    vendor, family, model = (_cpu().get(name) for name in ("vendor_id", "cpu family", "model"))
+    if vendor is None:
+        return {}
+    return {"family": f"{VENDORS.get(vendor, vendor)} family {family}, model {model}"}
 
 
 def _processor() -> str:

@@ -268,8 +268,13 @@ def _compilation(run: Timeable) -> Compile:
 def busy() -> tuple[float, float, float, float]:
     """Return, in seconds, the busy and steal time of all cores, our own, and the wall clock's."""
     all_, own = psutil.cpu_times(), os.times()
-    spent = all_.user + all_.nice + all_.system + all_.irq + all_.softirq
-    return spent, all_.steal, own.user + own.system, own.elapsed
+    spent = sum(getattr(all_, name, 0.0) for name in ("user", "nice", "system", "irq", "softirq"))
+    return spent, stolen(), own.user + own.system, time.monotonic()
+
+
+def stolen() -> float:
+    """Return the steal time of all cores in seconds; 0 where the system does not tell it."""
+    return getattr(psutil.cpu_times(), "steal", 0.0)
 
 
 def load_between(before: tuple[float, ...], after: tuple[float, ...]) -> Load | None:

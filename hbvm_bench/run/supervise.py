@@ -18,12 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import psutil
-
 from hbvm_bench.campaign.file import Limits
-from hbvm_bench.run import warm
+from hbvm_bench.measure import memory
+from hbvm_bench.run import ending, warm
 from hbvm_bench.run.warm import Fork
-from hbvm_bench.run.worker import kibibytes
 
 Cause = Literal["exit", "compiling", "timeout", "memory", "stopped"]
 POLL = 0.02  # seconds, at first
@@ -87,15 +85,21 @@ class Fresh:
                 stdout=out,
                 stderr=out,
                 env={**os.environ, **environment},
-                start_new_session=True,  # a Ctrl-C at the terminal reaches the runner only
+                **ending.APART,
             )
         finally:
             os.close(out)
         self.pid = self._process.pid
-        self._handle = os.pidfd_open(self.pid)
+        # it says that the process has ended while its number cannot be given to another one yet
+        self._handle = os.pidfd_open(self.pid) if hasattr(os, "pidfd_open") else None
 
     def wait(self, seconds: float | None = None) -> int | None:
         """Return its exit code, or ``None`` where it still runs after so many seconds."""
+        if self._handle is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(seconds)
+                self.kill()
+            return self._process.returncode
         ended, _, _ = select.select([self._handle], [], [], seconds)
         if not ended:
             return None
@@ -105,8 +109,7 @@ class Fresh:
 
     def kill(self) -> None:
         """Kill it and what it has started."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.pid, signal.SIGKILL)
+        ending.kill(self.pid)
 
 
 _children: set[Fresh | Fork] = set()
@@ -140,7 +143,7 @@ def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> 
         while code is None and cause == "exit":
             peak = max(peak, _peak_gib(child.pid))
             if time.monotonic() - walked > WALK:
-                peak, walked = max(peak, _together_gib(child.pid)), time.monotonic()
+                peak, walked = max(peak, memory.together_gib(child.pid)), time.monotonic()
             if begun is None and compiled is not None and compiled.exists():
                 begun = time.monotonic()
             if warm.stopping.is_set():
@@ -162,7 +165,7 @@ def watch(child: Fresh | Fork, limits: Limits, compiled: Path | None = None) -> 
             _children.discard(child)
     reader.join(timeout=5.0)
     return Ended(
-        code=-signal.SIGKILL if code is None else code,
+        code=ending.KILLED if code is None else code,
         cause="stopped" if warm.stopping.is_set() else cause,
         seconds=time.monotonic() - start,
         peak_gib=peak,
@@ -191,25 +194,5 @@ def _drain(output: int, kept: deque[bytes]) -> None:
 
 
 def _peak_gib(pid: int) -> float:
-    sizes = kibibytes(pid)
-    resident = sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)  # what was swapped out is eaten, too
-    return max(sizes.get("VmHWM", 0), resident) / 2**20
-
-
-def _together_gib(session: int) -> float:
-    """Return what the processes of a session hold together; memory that they share counts once."""
-    members = [one for one in psutil.process_iter() if _session_of(one.pid) == session]
-    return sum(map(_share_gib, members)) if len(members) > 1 else 0.0
-
-
-def _session_of(pid: int) -> int | None:
-    with contextlib.suppress(OSError):
-        return os.getsid(pid)
-    return None
-
-
-def _share_gib(process: psutil.Process) -> float:
-    with contextlib.suppress(psutil.Error):  # it has just ended
-        memory = process.memory_full_info()
-        return (memory.pss + memory.swap) / 2**30
-    return 0.0
+    held = memory.of(pid)
+    return max(held.peak, held.resident + held.swapped) / 2**20  # what was swapped out is eaten, too

@@ -19,7 +19,7 @@ from hbvm_bench.campaign.identity import Resolved, of_method, resolve, versions_
 from hbvm_bench.campaign.spec import parse_spec
 from hbvm_bench.measure import machine
 from hbvm_bench.reference import solutions
-from hbvm_bench.run import supervise, warm
+from hbvm_bench.run import ending, supervise, warm
 from hbvm_bench.run.supervise import Ended
 from hbvm_bench.run.worker import COMPILED, ENVIRONMENT, NO_ROOM, REPLY, STALE, Request
 from hbvm_bench.store import records
@@ -169,7 +169,7 @@ def start(
     path, compiled = scratch / "request.json", scratch / COMPILED
     path.write_bytes(msgspec.json.encode(request))
     ended = None
-    if loads is not None:
+    if loads is not None and warm.possible():
         with contextlib.suppress(OSError), warm.nest(ENVIRONMENT) as nest:
             child = nest.start(path, *loads)
             ended = supervise.watch(child, request.limits, compiled)
@@ -217,7 +217,7 @@ def _result(scratch: Path, ended: Ended, limits: Limits) -> tuple[Result, bytes]
         return Result(outcome="timeout", status=COMPILING, reason=reason), b""
     if ended.cause == "memory":
         return failed("killed", f"used more than {limits.memory_gib:g} GiB of memory")
-    if ended.code == -9:
+    if ended.code == ending.KILLED:
         return failed("killed", "ended by signal SIGKILL from outside, perhaps for want of memory")
     if ended.code != 0:
         return failed("crashed", f"the process {ended.words}")

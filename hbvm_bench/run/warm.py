@@ -9,7 +9,8 @@ another one: what it finds there was loaded, and no more.
 ``multiprocessing``'s fork server is not used. It forks only from a process that has imported, never from
 one that has loaded compiled code: a case of about 100 steps took 0.40 s with it, 0.07 s here and 1.36 s in a
 fresh interpreter (medians of 12 in a row, beside other work). It also cannot be replaced where it is stopped,
-and has one environment and one set of cores for all that it starts.
+and has one environment and one set of cores for all that it starts. Where a system lacks what a nest needs
+(`possible`) every case begins with nothing.
 
 A warm process is asked over a socket::
 
@@ -35,13 +36,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hbvm_bench.run import worker
+from hbvm_bench.measure import machine, memory
+from hbvm_bench.run import ending, worker
 
 DONE = b"done"
 LONGEST = 2**16  # bytes of a message: a path
 PATIENCE = 60.0  # seconds for an interpreter to start on a busy machine
 LOOK = 0.2  # seconds between two looks whether the run was stopped meanwhile
 GRACE = 5.0  # seconds for a warm process to say how a case ended, or to end itself; a stopped one never does
+TASKS = Path("/proc/self/task")  # the threads of a process, which Linux tells
 GROWTH = 2**18  # KiB that a process may have grown by and still be forked from
 
 
@@ -132,13 +135,13 @@ class Fork:
             said = b""
         self.lost = not said
         if self.lost:  # what it has started is left to this process
-            _kill_session(self.pid)
+            ending.kill(self.pid)
         os.close(self._handle)
         if said == DONE and self._keep is not None:
             self._keep(self._socket)
             return 0
         self._socket.close()
-        return int(said) if said else -signal.SIGKILL  # with the process that would have said it
+        return int(said) if said else ending.KILLED  # with the process that would have said it
 
     def kill(self) -> None:
         """Kill it; what it has started is killed by the process that it is a fork of."""
@@ -161,6 +164,11 @@ def _until_answered(asked: socket.socket) -> None:
             raise TimeoutError("the warm process does not answer")
 
 
+def possible() -> bool:
+    """Whether this system has what a nest needs: else every case has a process that begins with nothing."""
+    return hasattr(os, "fork") and hasattr(os, "pidfd_open") and TASKS.is_dir()
+
+
 @contextmanager
 def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
     """Yield a nest that nobody else uses, one that is there or a new one; after an error it is ended.
@@ -168,7 +176,7 @@ def nest(environment: Mapping[str, str]) -> Iterator[Nest]:
     ``environment`` is added to the one that it inherits.
     """
     whole = {**os.environ, **environment}
-    place = whole, Path.cwd(), os.sched_getaffinity(0)
+    place = whole, Path.cwd(), machine.cores()
     with _lock:
         found = next((one for one in _idle if one.place == place), None)
         if found is not None:
@@ -208,7 +216,7 @@ def _new(environment: Mapping[str, str], place: object) -> Nest:
 
 def main(asked: socket.socket) -> None:
     """Be a warm process: what returns from `_fork` is the process of a case, which may become one itself."""
-    cores, size, first = os.sched_getaffinity(0), _resident(), True
+    cores, size, first = machine.cores(), _resident(), True
     while True:
         parent, path, runner = _fork(asked)
         code = _code(path, parent, first)
@@ -216,7 +224,7 @@ def main(asked: socket.socket) -> None:
         sys.stderr.flush()
         if code or not (first and _is_alone() and _resident() - size < GROWTH):
             os._exit(code)
-        os.sched_setaffinity(0, cores)
+        machine.bind(cores)
         for stream in (1, 2):  # its output has ended
             os.dup2(0, stream)
         gc.collect()
@@ -240,7 +248,7 @@ def _fork(asked: socket.socket) -> tuple[int, Path, socket.socket]:
             path, handles, _, _ = socket.recv_fds(asked, LONGEST, 2)
             if not path:  # the runner has ended, or needs it no more
                 for pid, _ in running.values():
-                    _kill_session(pid)
+                    ending.kill(pid)
                 os._exit(0)
             runner, out = socket.socket(fileno=handles[0]), handles[1]
             gate, opens = os.pipe()
@@ -266,15 +274,10 @@ def _fork(asked: socket.socket) -> tuple[int, Path, socket.socket]:
 
 
 def _bury(pid: int, runner: socket.socket) -> None:
-    _kill_session(pid)  # before its number may be given to another one
+    ending.kill(pid)  # before its number may be given to another one
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     with runner, contextlib.suppress(OSError):
         runner.send(str(code).encode())
-
-
-def _kill_session(pid: int) -> None:
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(pid, signal.SIGKILL)
 
 
 def _code(path: Path, parent: int, first: bool) -> int:
@@ -292,12 +295,12 @@ def _code(path: Path, parent: int, first: bool) -> int:
 
 def _is_alone() -> bool:
     """Whether this process has one thread and no children: others would not be there in a fork."""
-    tasks = list(Path("/proc/self/task").iterdir())
+    tasks = list(TASKS.iterdir())
     return len(tasks) == 1 and not (tasks[0] / "children").read_text(encoding="ascii")
 
 
 def _resident() -> int:
-    return worker.kibibytes(os.getpid())["VmRSS"]
+    return memory.of(os.getpid()).resident
 
 
 if __name__ == "__main__":

@@ -5,12 +5,8 @@ request and leaves the store alone; whatever happens to it, the runner that
 started it says what.
 """
 
-import contextlib
-import ctypes
 import errno
 import os
-import resource
-import signal
 import sys
 import traceback
 import warnings
@@ -23,9 +19,10 @@ import numpy as np
 from hbvm_bench.campaign import own
 from hbvm_bench.campaign.file import Case, Limits, TimingPlan
 from hbvm_bench.campaign.identity import Resolved, fixed_step, resolve
-from hbvm_bench.measure import batch, ensemble, raw, timing
+from hbvm_bench.measure import batch, ensemble, machine, memory, raw, timing
 from hbvm_bench.measure.raw import Series
 from hbvm_bench.measure.timing import Run, Timeable
+from hbvm_bench.run import ending
 from hbvm_bench.store.files import atomic
 from hbvm_bench.store.records import Result, Timing
 from hbvm_bench.store.store import NAME, encode_series
@@ -37,7 +34,6 @@ REPLY = "reply.json"
 COMPILED = "compiled"  # the file that says that compiling has ended
 NO_ROOM = 73  # the exit code for a full disk, which is no fault of the case
 DISK = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
-LARGEST_FILE = 2**32  # bytes: a worker gone wild does not fill the disk
 STALE = "the sources or versions changed while the run was under way; start it again."
 Found = Literal["nothing", "libraries", "code"]
 ENVIRONMENT = {
@@ -92,9 +88,9 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
     """
     request = msgspec.json.decode(path.read_bytes(), type=Request)
     own.learn(request.beside)
-    limit_and_die_with(parent)
+    ending.limit_and_die_with(parent)
     if request.core is not None:
-        os.sched_setaffinity(0, {request.core})
+        machine.bind([request.core])
     # complex states are no states, and their real parts are not either
     warnings.simplefilter("error", np.exceptions.ComplexWarning)
     try:
@@ -108,19 +104,6 @@ def work(path: Path, parent: int, found: Found = "nothing") -> None:
         if getattr(error.__cause__ or error, "errno", None) in DISK:
             sys.exit(NO_ROOM)
         raise
-
-
-def limit_and_die_with(parent: int) -> None:
-    """Leave no core and no huge file behind, end first where memory is short, and with this parent."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
-    if sys.platform == "linux":
-        with contextlib.suppress(OSError):  # short of memory the system ends this process, not the runner
-            Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
-        pr_set_pdeathsig = 1
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
-        if os.getppid() != parent:  # it died while this process was starting
-            sys.exit(1)
 
 
 def _measured(request: Request, directory: Path, parent: int, found: Found) -> Result:
@@ -177,19 +160,9 @@ def _peak_gib(parent: int, found: Found) -> float:
     """Return the largest resident memory, with the pages of libraries that a fork has not touched."""
     untouched = 0
     if found != "nothing":
-        theirs, ours = (kibibytes(pid).get("RssFile", 0) for pid in (parent, os.getpid()))
+        theirs, ours = (memory.of(pid).files for pid in (parent, os.getpid()))
         untouched = theirs - ours
-    return (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + max(untouched, 0)) / 2**20
-
-
-def kibibytes(pid: int) -> dict[str, int]:
-    """Return what the system says of the memory of a process, such as ``VmRSS``; nothing if it has ended."""
-    try:
-        status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return {}
-    words = (line.split() for line in status.splitlines() if line.endswith(" kB"))
-    return {name.rstrip(":"): int(size) for name, size, _ in words}
+    return (memory.own_peak() + max(untouched, 0)) / 2**20
 
 
 def _time(request: Request, plan: TimingPlan, directory: Path) -> list[Timing]:

@@ -12,17 +12,15 @@ A file is complete or not there, so that the store is also the cache: a rerun
 does what is missing. Nothing is pickled.
 """
 
-import fcntl
 import hashlib
 import io
 import math
-import os
 import re
 import shlex
 import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -38,7 +36,7 @@ from hbvm_bench.campaign.spec import Spec, parse_spec
 from hbvm_bench.reference import solutions
 from hbvm_bench.store.files import atomic, ensure_writable, write_json
 from hbvm_bench.store.records import SCHEMA, Outcome, Reading, Record, Result, decoded
-from problems import limits
+from problems import limits, locks
 from problems.errors import InputError
 
 INDEX = "campaign.json"
@@ -118,10 +116,9 @@ class Store:
         problems.errors.InputError
             If another run is writing there.
         """
-        handle = os.open(self.directory, os.O_RDONLY)
-        try:
+        with ExitStack() as stack:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                stack.enter_context(locks.held(self.directory, wait=False))
             except BlockingIOError:
                 raise InputError(
                     f"another run is writing to {str(self.directory)!r}; "
@@ -130,8 +127,6 @@ class Store:
             except OSError:  # a file system without locks; two runs there repeat work but harm nothing
                 pass
             yield
-        finally:
-            os.close(handle)
 
     def load(self, case_id: str) -> Record | None:
         """Return the record of a case, or ``None`` if it is missing or unreadable."""

@@ -17,12 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
+from problems import locks
 from problems.errors import InputError
-
-try:
-    import fcntl
-except ImportError:  # not a Unix: processes that start together all compile
-    fcntl = None
 
 VARIABLE = "HBVM_BENCH_CACHE"
 
@@ -72,21 +68,12 @@ def directory() -> Path:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Let one process at a time through, or all of them where nothing can be locked.
-
-    The lock belongs to the process that holds it and ends with it, however it ends; the file stays.
-    """
-    handle = None
-    try:
+    """Let one process at a time through, or all of them where nothing can be locked; see `problems.locks`."""
+    with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # a folder that can only be read, a file system without locks
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-            if fcntl is not None:
-                fcntl.flock(handle, fcntl.LOCK_EX)
+            stack.enter_context(locks.held(path, wait=True))
         yield
-    finally:
-        if handle is not None:
-            os.close(handle)
 
 
 def versions() -> str:

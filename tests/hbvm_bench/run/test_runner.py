@@ -14,7 +14,7 @@ import pytest
 
 from hbvm_bench.campaign.file import Case, Grid, Limits, TimingPlan
 from hbvm_bench.campaign.identity import resolve
-from hbvm_bench.measure import reading
+from hbvm_bench.measure import memory, reading
 from hbvm_bench.run import executors, loop, supervise, timing_pass, warm
 from hbvm_bench.run import task as execute
 from hbvm_bench.store.store import Store
@@ -132,7 +132,7 @@ def test_memory_of_processes_that_it_starts_counts_too():
 
 def test_all_processes_are_walked_over_once_in_a_second_only(monkeypatch):
     walks = []
-    monkeypatch.setattr(supervise.psutil, "process_iter", lambda: walks.append(time.monotonic()) or [])
+    monkeypatch.setattr(memory.psutil, "process_iter", lambda: walks.append(time.monotonic()) or [])
     supervise.watch(supervise.Fresh([sys.executable, "-c", "import time; time.sleep(1.6)"], {}), GENEROUS)
     assert len(walks) == 1  # one at every poll would be more than ten
 

@@ -1,0 +1,146 @@
+"""The bench without the calls that only Linux or Unix has: each is hidden, and its substitute runs."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from hbvm_bench.campaign.file import Case, Grid, Limits
+from hbvm_bench.measure import doctor, machine, memory, timing
+from hbvm_bench.run import ending, supervise, warm
+from hbvm_bench.store.store import Store
+from tests.elsewhere import elsewhere
+from tests.hbvm_bench.conftest import SHORT, run_case
+
+
+@pytest.fixture
+def hidden(monkeypatch):
+    """Hide the calls of Linux from this process, which starts the others and watches them."""
+    for name in ("fork", "pidfd_open", "killpg", "getsid", "sched_getaffinity", "sched_setaffinity"):
+        monkeypatch.delattr(os, name)
+    monkeypatch.setattr(machine, "BINDS", False)
+    monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
+    monkeypatch.setattr(memory, "resource", None)
+    monkeypatch.setattr(ending, "resource", None)
+
+
+def all_end(processes):
+    """Whether processes end within ten seconds; psutil's way to wait for them needs what is hidden."""
+    deadline = time.monotonic() + 10
+    while any(one.is_running() and one.status() != psutil.STATUS_ZOMBIE for one in processes):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+@pytest.mark.parametrize(
+    ("method", "outcome", "reason"),
+    [
+        ("Steady()", "ok", ""),
+        ("Endless()", "timeout", "did not end within 2 s"),
+        ("Hungry()", "killed", "used more than 0.6 GiB of memory"),
+        ("Exiting(code=3)", "crashed", "the process ended with exit code 3"),
+    ],
+)
+@pytest.mark.usefixtures("hidden", "toys")
+def test_a_case_has_a_process_that_begins_with_nothing_and_its_limits_hold(tmp_path, method, outcome, reason):
+    store = Store(tmp_path)
+    store.prepare()
+    asked = Case(problem=SHORT, method=method, grid=Grid(count=4))
+    record = run_case(asked, str(store.directory), Limits(wall_seconds=2, memory_gib=0.6))
+    assert (record.result.outcome, record.result.reason) == (outcome, reason)
+    assert (
+        0.02 < record.peak_memory_gib < 1.2
+    )  # measured 0.04; it eats 30 MiB every 10 ms and is looked at every 20 ms
+    assert not warm.possible()
+
+
+@pytest.mark.usefixtures("hidden")
+def test_memory_of_descendants_counts_and_they_are_killed():
+    eat = "x = bytearray(300 << 20); import time; time.sleep(20)"
+    start = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {eat!r}])"
+    child = supervise.Fresh([sys.executable, "-c", start], {})
+    while not (descendants := psutil.Process(child.pid).children()):
+        time.sleep(0.02)
+    ended = supervise.watch(child, Limits(wall_seconds=15, memory_gib=0.2))
+    assert ended.cause == "memory"
+    assert 0.2 < ended.peak_gib < 0.6  # measured 0.31
+    assert all_end(descendants)
+
+
+def test_a_worker_ends_with_its_parent_where_the_system_does_not_see_to_it():
+    worker = (
+        "import os, time; from hbvm_bench.run import ending;"
+        "ending._prctl, ending.LOOK = lambda: None, 0.1; ending.limit_and_die_with(os.getppid());"
+        "print(os.getpid(), flush=True); time.sleep(60)"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", f"import subprocess, sys; subprocess.run([sys.executable, '-c', {worker!r}])"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with parent, parent.stdout:
+        process = psutil.Process(int(parent.stdout.readline()))
+        time.sleep(0.5)  # five looks
+        assert process.is_running()
+        parent.kill()
+        assert all_end([process])
+
+
+def test_psutil_tells_the_memory_that_the_system_tells(monkeypatch):
+    told = memory.of(os.getpid())
+    monkeypatch.setattr(memory, "PROCESSES", Path("nowhere"))
+    assert memory.of(os.getpid()).resident == pytest.approx(told.resident, rel=0.1)
+    monkeypatch.setattr(memory, "resource", None)
+    assert memory.own_peak() >= 0.9 * told.resident
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    assert memory.of(ended.pid) == memory.Memory()
+
+
+def test_where_no_core_can_be_bound_all_are_used(monkeypatch):
+    monkeypatch.setattr(machine, "BINDS", False)
+    before = psutil.Process().cpu_affinity()
+    assert machine.cores() == list(range(os.cpu_count()))
+    with machine.staying_on_a_core(), machine.leaving_a_core() as core:
+        assert core == machine.cores()[-1]
+        assert psutil.Process().cpu_affinity() == before
+
+
+def test_what_the_system_does_not_tell_is_no_finding_of_good_news(monkeypatch):
+    times = type("Times", (), {"user": 1.0, "system": 2.0, "idle": 3.0})()  # as on macOS and Windows
+    monkeypatch.setattr(psutil, "cpu_times", lambda: times)
+    monkeypatch.setattr(doctor, "STAT", Path("nowhere"))
+    monkeypatch.setattr(machine, "_cpu", dict)
+    assert timing.busy()[:2] == (3.0, 0.0)
+    assert [one.what for one in doctor.steadiness(lambda: 0.01)] == ["calibration", "share"]
+    assert [(one.state, one.found[:11]) for one in (doctor.load(), doctor.virtual())] == [
+        ("note", "not visible")
+    ] * 2
+    assert "family" not in machine.describe()
+
+
+@pytest.mark.slow
+def test_a_campaign_with_times_and_a_report_where_all_of_it_is_missing(tmp_path):
+    environment = elsewhere(tmp_path)
+    seen = subprocess.run(
+        [sys.executable, "-c", "import os; print(hasattr(os, 'fork'))"],
+        env=environment, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert seen.stdout == "False\n"
+    command = [sys.executable, "-W", "error", "-m", "hbvm_bench.cli", "run", "-p", "kepler(t_end=3.0)"]
+    command += ["-m", "Gauss(s=2, h=0.1)", "-m", "HBVM()", "--quick"]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path / "run"), "--report", str(tmp_path / "report")],
+        env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    store = Store(tmp_path / "run")
+    records = [store.load(path.stem) for path in store.cases.glob("*.json")]
+    assert [len(record.timing.rounds) for record in records] == [3, 3]
+    assert "Gauss(s=2, h=0.1)" in (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
