@@ -55,7 +55,9 @@ by `offers`; without it the method still integrates. The conformance kit checks 
     last ``advance``.
 18. `Gradients`: a stepper can ``record`` its solved steps, and their ``adjoint`` follows these backwards.
     With this and `Checkpoints`, `integrators.gradient` works.
-19. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
+19. `DoubleDouble`: ``start_pairs`` of a program begins from states with twice the digits of a double; what
+    the samples of such a `LowParts` stepper leave out is its ``low``.
+20. `AsHBVM`: ``as_hbvm`` of a method returns the HBVM(k, s) that it is; `integrators.order_of` and the
     plugins then know its coefficients.
 """
 
@@ -83,11 +85,13 @@ __all__ = [
     "Batches",
     "Checkpoints",
     "Destination",
+    "DoubleDouble",
     "EventStepper",
     "Events",
     "Gradients",
     "Interruptible",
     "KeptError",
+    "LowParts",
     "MethodBase",
     "PieceSize",
     "PreparedBatches",
@@ -611,6 +615,34 @@ class PieceSize(Protocol):
     piece: int
 
 
+class DoubleDouble(Protocol):
+    """A program whose states have twice the digits of a double, unevaluated sums of two."""
+
+    def start_pairs(self, pairs: Array, par: Array | None = None, t0: float = 0.0) -> Any:
+        """Return a stepper, with `LowParts`, at ``t0``.
+
+        Parameters
+        ----------
+        pairs : ndarray, shape (dim, 2)
+            The state: the nearest doubles, and what these leave out.
+        par, t0
+            As for `Program.start`.
+        """
+        ...
+
+
+class LowParts(Protocol):
+    """A stepper whose samples are states rounded to doubles.
+
+    Attributes
+    ----------
+    low : ndarray, shape (m, dim), or None
+        What the samples of the last ``advance`` leave out.
+    """
+
+    low: Array | None
+
+
 class AsHBVM(Protocol):
     """A method that is HBVM(k, s) for certain k and s, of which tableau and order are known."""
 
@@ -627,7 +659,8 @@ class AsHBVM(Protocol):
 
 CAPABILITIES: tuple[type, ...] = (
     Samplings, Destination, KeptError, Checkpoints, Interruptible, EventStepper,
-    Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients, AsHBVM,
+    Events, Actions, Batches, PreparedBatches, Threads, PieceSize, TimeLimit, Variations, Gradients,
+    DoubleDouble, LowParts, AsHBVM,
 )  # fmt: skip
 """All of them."""
 

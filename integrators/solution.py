@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,14 +24,17 @@ from integrators.plain import (
     unpacked_method,
     unpacked_problem,
 )
-from integrators.protocol import Array, MethodBase, Program, Stats, Status
+from integrators.protocol import Array, DoubleDouble, MethodBase, Program, Stats, Status
 from integrators.refusals import as_numbers
+from problems.analysis import invariants
 from problems.checks import File, checked_arguments, readable
+from problems.double_double import DD
 from problems.errors import InputError, MissingLibraryError, printable, shown
 from problems.problem import Problem
 
 FORMAT = 1  # of files
 ROUNDING = 1e-14  # relative to its largest size, how far a component may be from a sample that is met
+EXACT_BITS = 2200  # of the sum of any two doubles
 FAR, MOST_AT_ONCE = 4, 1024  # intervals between samples: not gone through for nothing, and at a time
 
 
@@ -95,6 +98,10 @@ class Solution:
         Tangent vectors at these times, where they were asked for: columns in the order of what was asked.
     directions : tuple of ndarray, or None
         Their parts in the state at the start, (dim, m), and in the parameters, (n_par, m).
+    low : ndarray, shape (n, dim), or None
+        What ``y`` leaves out of the states, where they have twice the digits of a double; see `pairs`.
+    start : ndarray, shape (dim, 2), or None
+        The state that these began from, in pairs.
     error : Exception or None
         What a function of the user raised, where ``status`` is ``USER_ERROR``.
 
@@ -121,6 +128,8 @@ class Solution:
     error: Exception | None = None
     variations: Array | None = None
     directions: tuple[Array, Array] | None = None
+    low: Array | None = None
+    start: Array | None = None
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return the states at any times that the trajectory covers.
@@ -177,8 +186,35 @@ class Solution:
         rows = self._at(t)[..., self.problem.system.dim :]
         return rows.reshape(*rows.shape[:-1], *self.directions[0].shape)
 
+    def pairs_at(self, t: ArrayLike) -> Array:
+        """Return the states at any times that the trajectory covers in pairs, as a call returns doubles.
+
+        Parameters
+        ----------
+        t : array_like
+            Times of any shape and order, between the problem's ``t0`` and the last one reached.
+
+        Returns
+        -------
+        ndarray, shape (..., dim, 2)
+
+        Raises
+        ------
+        problems.errors.InputError
+            As for states; and for a solution that has doubles only.
+        """
+        self._check_digits()
+        rows = self._at(t)
+        return np.stack(np.split(rows, 2, axis=-1), axis=-1)
+
+    def _check_digits(self) -> None:
+        if self.low is None:
+            raise InputError(
+                "the solution has doubles only; integrate with Gauss(s=, h=, precision='double-double')."
+            )
+
     def _at(self, t: ArrayLike) -> Array:
-        """Return the states at times and, where there are any, the variations; shape (..., dim (1 + n))."""
+        """Return the states at times with, where there are any, variations or low parts; shape (..., m)."""
         times, dim = as_numbers("t", t), self.problem.system.dim
         before = self.t.size == 0 or self.t[0] != self.problem.t0
         at = np.concatenate([[self.problem.t0][: int(before)], self.t])
@@ -187,6 +223,9 @@ class Solution:
             first = self.directions[0][np.newaxis][: int(before)]
             vectors = np.concatenate([first, self.variations])
             states = np.concatenate([states, vectors.reshape(len(vectors), -1)], axis=1)
+        if self.low is not None and self.start is not None:
+            first = self.start[np.newaxis, :, 1][: int(before)]
+            states = np.concatenate([states, np.concatenate([first, self.low])], axis=1)
         end = float(at[-1])
         at, states = self._with_actions(at, states)
         if not self.status.failed and (self.t_stop - end) * (end - self.problem.t0) >= 0.0:
@@ -216,7 +255,7 @@ class Solution:
             reached = states[:0]
             if goals.size:
                 start = float(at[group[0]])
-                stepper: Any = self._program.start(states[group[0], :dim], self.problem.par, start)
+                stepper = self._begun(states[group[0]], start)
                 if self.directions is not None:
                     stepper.follow(states[group[0], dim:].reshape(dim, -1), self.directions[1])
                 advanced = stepper.advance(sign * goals)
@@ -228,6 +267,8 @@ class Solution:
                 reached = advanced.y
                 if self.directions is not None:
                     reached = np.concatenate([reached, stepper.variations.reshape(len(reached), -1)], axis=1)
+                if self.low is not None:
+                    reached = np.concatenate([reached, stepper.low], axis=1)
             goals, reached = np.append(ends[0], goals), np.concatenate([states[group[:1]], reached])
             # As long as the samples are met the method goes on from where it is, else from them.
             met = (np.abs((reached[np.searchsorted(goals, ends)] - states[group])[:, :dim]) <= close).all(
@@ -241,6 +282,14 @@ class Solution:
         own = wanted == sign * at[sample]
         found[own] = states[sample[own]]
         return found[places.reshape(times.shape)]
+
+    def _begun(self, row: Array, t: float) -> Any:
+        """Return a stepper at a state, which may have low parts behind it."""
+        dim, program = self.problem.system.dim, self._program
+        if self.low is None:
+            return program.start(row[:dim], self.problem.par, t)
+        pairs = np.stack([row[:dim], row[dim:]], axis=1)
+        return cast("DoubleDouble", program).start_pairs(pairs, self.problem.par, t)
 
     def _with_actions(self, at: Array, states: Array) -> tuple[Array, Array]:
         """Return samples, and the states that events' actions have made in between, in order."""
@@ -303,7 +352,52 @@ class Solution:
 
     def errors(self) -> dict[str, Array]:
         """Return the errors of the invariants along the trajectory, relative where that has a meaning."""
-        return self.problem.errors(self.y, self.t)
+        return self._errors(slice(None))
+
+    def _errors(self, which: Any) -> dict[str, Array]:
+        problem = self.problem
+        if self.low is None or self.start is None:
+            return problem.errors(self.y[which], self.t[which])
+        states, begin = DD(self.y[which], self.low[which]), (problem.t0, DD(*self.start.T))
+        return invariants.errors(problem.system, problem.par, states, self.t[which], start=begin)
+
+    @property
+    def pairs(self) -> Array:
+        """The states with twice the digits of a double, as unevaluated sums; shape (n, dim, 2).
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a solution that has doubles only.
+
+        Examples
+        --------
+        >>> import problems
+        >>> from integrators import Gauss, integrate
+        >>> method = Gauss(s=12, h=0.05, precision="double-double")
+        >>> solution = integrate(problems.load("kepler", e=0.6), method, [10.0])
+        >>> solution.pairs.shape, bool(solution.errors()["energy"].max() < 1e-29)
+        ((1, 4, 2), True)
+        """
+        self._check_digits()
+        return np.stack([self.y, np.asarray(self.low)], axis=-1)
+
+    def to_mpmath(self) -> NDArray[Any]:
+        """Return the states as numbers of mpmath, exactly; shape (n, dim).
+
+        Raises
+        ------
+        problems.errors.InputError
+            For a solution that has doubles only.
+        """
+        import mpmath  # for those who need it
+
+        numbers = np.empty(self.y.shape, dtype=object)
+        with mpmath.workprec(EXACT_BITS):
+            for place in np.ndindex(self.y.shape):
+                high, low = self.pairs[place].tolist()
+                numbers[place] = mpmath.mpf(high) + low
+        return numbers
 
     def guards(self) -> dict[str, Array]:
         """Return the quantities that a symmetry keeps at exactly zero, by name."""
@@ -352,7 +446,7 @@ class Solution:
             return []
         every = -(-self.t.size // LOOKED_AT)
         places = np.unique(np.append(np.arange(0, self.t.size, every), self.t.size - 1))
-        errors = self.problem.errors(self.y[places], self.t[places])
+        errors = self._errors(places)
         largest = ", ".join(f"{name} {float(error.max()):.1e}" for name, error in errors.items())
         where = f" at {places.size} of the states" if every > 1 else ""
         return [f"largest errors{where}: {largest}"] if errors else []
@@ -407,6 +501,8 @@ class Solution:
             arrays["variations"] = self.variations
         if self.directions is not None:
             arrays["directions_state"], arrays["directions_parameters"] = self.directions
+        if self.low is not None and self.start is not None:
+            arrays |= {"low": self.low, "start": self.start}
         for name, found in self.events.items():
             arrays |= {
                 f"event_{key}:{name}": value for key, value in vars(found).items() if value is not None
@@ -479,6 +575,8 @@ def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], prob
         events={name: occurrences(name, arrays, dim) for name in words["events"]},
         variations=_variations(arrays, n, dim),
         directions=_directions(arrays, dim, problem.par.size),
+        low=doubles(arrays["low"], (n, dim), "low") if "low" in arrays else None,
+        start=doubles(arrays["start"], (dim, 2), "start") if "start" in arrays else None,
         error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
         reason=of_type(str, words["reason"]),
         t_stop=of_type(float, words["t_stop"]),

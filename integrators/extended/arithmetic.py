@@ -14,8 +14,12 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from problems import double_double
+
+Numbers = NDArray[np.complex128]
+"""Arrays of numbers."""
 
 _SPLITTER = 134217729.0  # 2**27 + 1
 
@@ -87,7 +91,7 @@ def sqrt(a):
     return value
 
 
-def _numbers(fractions: list[Fraction]) -> np.ndarray:
+def _numbers(fractions: list[Fraction]) -> Numbers:
     return np.array([complex(*double_double._parts(fraction, 2)) for fraction in fractions])
 
 

@@ -1,4 +1,4 @@
-"""Gauss collocation in double-double arithmetic: a second opinion on reference solutions.
+"""Gauss collocation in double-double arithmetic, with steps that it chooses: a second opinion on references.
 
 Nothing is shared with the Taylor method that makes the references but the traced
 vector field: other method, other arithmetic, other code. The step follows the
@@ -6,9 +6,7 @@ Legendre coefficients of the field: the last of s is of the size h^{s-1}, the
 error of the step about its square.
 """
 
-import hashlib
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,20 +14,16 @@ from numba import njit
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from integrators.coefficients import legendre
-from integrators.extended.arithmetic import compiled, minus, plus, times
-from problems import emit
-from problems.double_double import DD
+from integrators.extended.arithmetic import Numbers, minus, plus, times
+from integrators.extended.step import SOLVED, ends_of_projection, field_of, solver, tables, weighted
 from problems.errors import InputError
 from problems.problem import Problem
 from problems.systems.base import System
 
 Array = NDArray[np.float64]
-Numbers = NDArray[np.complex128]  # double-double, see `integrators.extended.arithmetic`
 
 STAGES = 16
 DECAY = 1e-17  # of the last Legendre coefficient; its square is the size of the error
-MOST_ITERATIONS = 200
 
 
 def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Numbers:
@@ -55,13 +49,13 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Numbers:
         If the iteration does not converge, or the step shrinks to nothing; for functions that
         double-double arithmetic does not have.
     """
-    advance, tables = _program(problem.system), _tables(STAGES)
+    advance, numbers = _program(problem.system), (*tables(STAGES), ends_of_projection(STAGES))
     y, par = problem.y0.astype(complex), problem.par.astype(complex)
     out = np.empty((len(at), y.size), complex)
     t, h = float(problem.t0), 0.0
     for i, end in enumerate(np.asarray(at, dtype=np.float64).tolist()):
         try:
-            code, h = advance(t, end, h, y, par, *tables, decay)
+            code, h = advance(t, end, h, y, par, *numbers, decay)
         except NumbaError:
             raise InputError(
                 f"the field of {problem!r} has a function or a table that is not to be had in double-double."
@@ -73,37 +67,25 @@ def integrate(problem: Problem, at: Array, *, decay: float = DECAY) -> Numbers:
     return out
 
 
-@cache
-def _tables(s: int) -> list[Numbers]:
-    """Return nodes and weights (s,), coefficients (s, s), and b_l P_j(c_l) for the first and last two j."""
-    made = legendre.tables(s, s)
-    integrals, projection = (DD(table.hi, table.lo) for table in (made.integrals, made.projection))
-    matrix = DD(np.zeros((s, s)))
-    for j in range(s):
-        matrix = matrix + integrals[:, j, None] * projection[j]
-    found = made.nodes, made.weights, matrix, projection[[0, -2, -1]]
-    return [one.hi + 1j * one.lo for one in found]
-
-
 _programs: dict[str, Callable[..., Any]] = {}
 
 
 def _program(system: System) -> Callable[..., Any]:
     """Return the compiled integrator of a system."""
-    made = emit.source(system, "field", "numba", limit=0)
-    key = hashlib.sha256(made.text.encode()).hexdigest()
+    key, field = field_of(system)
     if key not in _programs:
-        _programs[key] = _integrator(compiled(made.text, made.name))
+        _programs[key] = _integrator(field)
     return _programs[key]
 
 
 def _integrator(field: Any) -> Any:
+    solve = solver(field)
+
     @njit
     def advance(t, end, h, y, par, nodes, weights, matrix, projection, decay):
         s, dim = len(nodes), len(y)
         slope = np.zeros((s, dim), np.complex128)
         new = np.zeros((s, dim), np.complex128)
-        stage = np.zeros(dim, np.complex128)
         direction = 1.0 if end > t else -1.0
         if h == 0.0:
             h = direction * 1e-3 * abs(end - t)
@@ -115,29 +97,8 @@ def _integrator(field: Any) -> Any:
             after = end if last else t + step
             step = after - t
             exact = minus(after, t)  # from one double to the next
-            field(complex(t), y, par, new[0])
-            for i in range(s):
-                slope[i] = new[0]
-            before, change = np.inf, np.inf
-            for _ in range(MOST_ITERATIONS):
-                for i in range(s):
-                    for d in range(dim):
-                        stage[d] = plus(y[d], times(_weighted(matrix[i], slope[:, d]), exact))
-                    field(plus(t, times(exact, nodes[i])), stage, par, new[i])
-                change, size = 0.0, 1e-300
-                for d in range(dim):
-                    for i in range(s):
-                        gap = new[i, d] - slope[i, d]
-                        change = max(change, abs(gap.real + gap.imag))
-                        size = max(size, abs(new[i, d].real))
-                slope[:] = new
-                change /= size
-                if not change < np.inf:
-                    break
-                if change < 1e-33 or (change < 1e-27 and change >= 0.5 * before):
-                    break
-                before = change
-            if not change < 1e-27:
+            _, change = solve(complex(t), y, par, exact, nodes, matrix, slope, new)
+            if not change < SOLVED:
                 if abs(step) < 1e-12 * abs(end):
                     return 1, h
                 h = 0.25 * step
@@ -149,7 +110,7 @@ def _integrator(field: Any) -> Any:
                 h = step * factor
                 continue
             for d in range(dim):
-                y[d] = plus(y[d], times(_weighted(weights, slope[:, d]), exact))
+                y[d] = plus(y[d], times(weighted(weights, slope[:, d]), exact))
             t = after
             if not last:
                 h = step * factor
@@ -159,20 +120,11 @@ def _integrator(field: Any) -> Any:
 
 
 @njit
-def _weighted(weights, values):
-    """Return the sum of weights times values."""
-    total = complex(0.0)
-    for i in range(len(weights)):
-        total = plus(total, times(weights[i], values[i]))
-    return total
-
-
-@njit
 def _decay(slope, projection):
     """Return the largest of the last two Legendre coefficients relative to the largest of the first."""
     top, tail = 1e-300, 0.0
     for d in range(slope.shape[1]):
-        top = max(top, abs(_weighted(projection[0], slope[:, d]).real))
+        top = max(top, abs(weighted(projection[0], slope[:, d]).real))
         for j in range(1, 3):
-            tail = max(tail, abs(_weighted(projection[j], slope[:, d]).real))
+            tail = max(tail, abs(weighted(projection[j], slope[:, d]).real))
     return tail / top

@@ -24,6 +24,7 @@ CITATION = """\
 
 
 Steps = Literal["reversible"]
+Precision = Literal["double", "double-double"]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -74,6 +75,12 @@ class Gauss(MethodBase):
         and a close encounter with another time scale than the first steps is not controlled by ``tol``.
         For positions and momenta, by a formula without the time; its sums are written out, so for a few
         bodies. Fixed-point iteration.
+    precision : {"double", "double-double"}
+        ``"double-double"``: every number of a step is an unevaluated sum of two doubles, with 32 digits; with
+        ``s`` and ``h`` alone. Some hundred times slower. ``h``, the times and the parameters are the doubles
+        given; ``integrate(..., start=)`` takes more digits of the start, and `Solution.pairs` and
+        `Solution.to_mpmath` return those of the states. One trajectory, without events and variations, and
+        a formula of ``sqrt, sin, cos, tan, exp, log, abs`` and arithmetic. Fixed-point iteration.
 
     Raises
     ------
@@ -98,6 +105,7 @@ class Gauss(MethodBase):
     max_steps: Count | None = None
     atol: Absolute | None = None
     steps: Steps | None = None
+    precision: Precision = "double"
 
     library = "hbvm-bench"
     citation = CITATION
@@ -107,6 +115,11 @@ class Gauss(MethodBase):
         super().__post_init__()
         if self.h is None and self.tol is None:
             raise InputError("Gauss needs a step h, or a tolerance tol for an adaptive step size.")
+        if self.precision != "double":
+            allowed = {"s", "h", "precision"} | ({"solver"} if self.solver == "fixed_point" else set())
+            if others := [name for name in self.options() if name not in allowed]:
+                words = f"with s and h alone; leave out {', '.join(others)}."
+                raise InputError(f"Gauss takes precision={self.precision!r} {words}")
         if self.steps is not None:
             given = [name for name in self.options() if name not in ("s", "tol", "steps")]
             if self.tol is None or given or self.s == 1:
@@ -128,10 +141,12 @@ class Gauss(MethodBase):
         Raises
         ------
         problems.errors.InputError
-            With ``steps``, which HBVM does not have: it would take other steps.
+            With ``steps`` or ``precision``, which HBVM does not have: it would take other steps.
         """
-        if self.steps is not None:
-            raise InputError(f"{self!r} is no HBVM, which has no steps={self.steps!r}; leave steps= out.")
+        for name in ("steps", "precision"):
+            if name in self.options():
+                value = self.options()[name]
+                raise InputError(f"{self!r} is no HBVM, which has no {name}={value!r}; leave {name}= out.")
         return self._hbvm()
 
     def _hbvm(self) -> HBVM:
@@ -142,10 +157,12 @@ class Gauss(MethodBase):
         )  # fmt: skip
 
     def accepts(self, problem: Problem) -> str | None:
-        """Accept every system; with reversible steps those with a formula without the time."""
+        """Accept every system; with reversible steps or in double-double those with certain formulas."""
         return self._refusal(problem.system)
 
     def _refusal(self, system: System) -> str | None:
+        if self.precision != "double":
+            return self._lacking(system)
         if self.steps is None:
             return None
         if not system.traced:
@@ -154,6 +171,15 @@ class Gauss(MethodBase):
             return "reversible steps need positions and momenta; leave out steps='reversible'."
         if depends_on_time(system):
             return "reversible steps need a field without the time; leave out steps='reversible'."
+        return None
+
+    def _lacking(self, system: System) -> str | None:
+        if not system.traced:
+            return "double-double needs a formula, and its field is code; leave out precision=."
+        from integrators.extended.program import lacking  # numba is for those who integrate
+
+        if (name := lacking(system)) is not None:
+            return f"its formula has {name}, which is not to be had in double-double; leave out precision=."
         return None
 
     def caveat(self, problem: Problem) -> str | None:
@@ -171,6 +197,10 @@ class Gauss(MethodBase):
         return made
 
     def _compiled(self, system: System) -> Any:
+        if self.precision != "double" and self.h is not None:
+            from integrators.extended.program import DoubleDoubleProgram
+
+            return DoubleDoubleProgram(system, self, s=self.s, h=self.h)
         if self.tol is not None and self.steps is not None:
             from integrators.kernel.program import ReversibleProgram
 

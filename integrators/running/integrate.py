@@ -6,7 +6,7 @@ from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,7 @@ from integrators.protocol import (
     Array,
     Checkpoints,
     Destination,
+    DoubleDouble,
     KeptError,
     MethodBase,
     Program,
@@ -33,6 +34,7 @@ from integrators.protocol import (
     sampling_named,
 )
 from integrators.refusals import as_numbers, check_times
+from integrators.running.digits import check_digits, pairs
 from integrators.running.variations import follow
 from integrators.running.watch import SOON, Bar, Report, Watch, both, identity, read
 from integrators.solution import Solution
@@ -62,6 +64,7 @@ def integrate(
     events: Event | Callable[..., Any] | Sequence[Event | Callable[..., Any]] = (),
     *,
     variations: Any = None,
+    start: Any = None,
     progress: bool | Report = False,
     checkpoint: File | None = None,
     every_seconds: NotNegative = SECONDS,
@@ -94,6 +97,9 @@ def integrate(
         ``solution.variations`` has them at the samples. They are the exact derivatives of the steps that
         are taken, with the steps' lengths held fixed; ``"t0"`` begins with minus the field at the start.
         `Solution.variations_at` has them at any time. For HBVM and Gauss, and problems with a formula.
+    start : array_like, shape (dim,) or (dim, 2), optional
+        The problem's start with more digits than doubles have, for ``Gauss(..., precision="double-double")``:
+        numbers of mpmath, or pairs of doubles. Rounded to doubles it must be the problem's.
     progress : bool or callable, optional
         True: a bar on the terminal, if there is one. A function: it is called about ten times a second
         with an `integrators.Progress`.
@@ -138,7 +144,7 @@ def integrate(
     if progress is True:
         with Bar() as bar:
             return integrate(
-                problem, method, times, sample, events, variations=variations,
+                problem, method, times, sample, events, variations=variations, start=start,
                 progress=bar, checkpoint=checkpoint, every_seconds=every_seconds, resume=resume,
             )  # fmt: skip
 
@@ -149,16 +155,22 @@ def integrate(
     acting = any(event.then is not None for event in wanted.values())
     if acting and variations is not None:
         raise InputError("variations do not go on past an event with then=; leave out one of them.")
+    digits = check_digits(program, method, start, events=bool(wanted), variations=variations is not None)
+    begin = None if not digits else pairs(problem.y0 if start is None else start, problem)
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
-        belongs = identity(problem, method, grid, sample, wanted, variations)
+        belongs = identity(problem, method, grid, sample, wanted, variations, begin)
         path = None if checkpoint is None else Path(checkpoint)
         earlier = None if resume is None else Path(resume)
         if earlier is not None and (earlier != path or earlier.exists()):
             kept = read(earlier, belongs)
         watch = Watch(problem.t0, end, progress or None, path, every_seconds, belongs)
 
-    stepper = started(program, method, problem, wanted, problem.y0, problem.par, problem.t0, end)
+    if begin is None:
+        stepper = started(program, method, problem, wanted, problem.y0, problem.par, problem.t0, end)
+    else:
+        stepper = cast("DoubleDouble", program).start_pairs(begin, problem.par, problem.t0)
+    lows = None if begin is None else [np.empty((0, problem.system.dim))]
     if (checkpoint is not None or resume is not None) and not offers(stepper, Checkpoints):
         raise InputError(f"{method!r} has no checkpoints; leave out checkpoint= and resume=.")
     if grid.size and offers(stepper, Destination):
@@ -176,6 +188,7 @@ def integrate(
         t, y, made = [kept["t"]], [kept["y"]], kept["made"]
         here, status, reason, before = kept["here"], kept["status"], kept["reason"], kept["stats"]
         vectors = None if vectors is None else [kept["variations"]]
+        lows = None if lows is None else [kept["low"]]
         lost = kept.get("losses", lost)
         if wanted:
             stepper.search.load(kept["search"])
@@ -198,6 +211,8 @@ def integrate(
                 y.append(samples.y)
                 if vectors is not None:
                     vectors.append(stepper.variations)
+                if lows is not None:
+                    lows.append(stepper.low)
                 made += count if sample == "steps" else samples.t.size
             if watch is not None:
                 stats = replace(stepper.stats) if before is None else both(before, stepper.stats)
@@ -206,11 +221,13 @@ def integrate(
                 if watch.keeps:
                     t, y = [np.concatenate(t)], [np.concatenate(y)]
                     vectors = None if vectors is None else [np.concatenate(vectors)]
+                    lows = None if lows is None else [np.concatenate(lows)]
                     watch.keep(
                         {"stepper": stepper.checkpoint(), "t": t[0], "y": y[0], "made": made, "here": here}
                         | {"status": status, "reason": reason, "stats": stats, "losses": lost}
                         | ({"search": stepper.search.save()} if wanted else {})
                         | ({} if vectors is None else {"variations": vectors[0]})
+                        | ({} if lows is None else {"low": lows[0]})
                     )
                 watch.look(here, stats.steps)
         if wanted and grid.size and status is Status.FINISHED:
@@ -222,6 +239,7 @@ def integrate(
     failed = status not in (Status.FINISHED, Status.INTERRUPTED) and status.failed
     if failed and vectors is None and stepper.t != problem.t0 and not any(part.size for part in t):
         t, y = [np.array([stepper.t])], [stepper.y[np.newaxis]]  # the last state that was reached
+        lows = None if lows is None else [np.zeros_like(y[0])]
 
     error = stepper.error if status is Status.USER_ERROR and offers(stepper, KeptError) else None
     if error is not None and stepper.t == problem.t0:  # nothing is reached that could be kept
@@ -241,6 +259,8 @@ def integrate(
         y=np.concatenate(y),
         variations=None if vectors is None else np.concatenate(vectors),
         directions=directions,
+        low=None if lows is None else np.concatenate(lows),
+        start=begin,
         status=status,
         reason=reason,
         t_stop=float(reached[-1]) if status is Status.FINISHED and reached.size else here,

@@ -28,6 +28,7 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer, Reduction
 from integrators.refusals import as_numbers, check_batch, check_times
+from integrators.running.digits import check_digits
 from integrators.running.integrate import SECONDS
 from integrators.running.pieces import (
     Gathered,
@@ -166,6 +167,8 @@ def integrate_many(
             "variations= needs integrate's own way; leave out backend, events, reduce and 'steps'."
         )
     program: Any = _program(system, method, backend)
+    if check_digits(program, method, None):
+        raise InputError(f"{method!r} integrates one trajectory at a time: use integrate.")
     if variations is not None:  # what cannot be is said before anything is integrated
         follow_vectors(
             program.start(problem.y0, problem.par, problem.t0), method, problem, variations, sample

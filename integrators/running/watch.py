@@ -148,9 +148,10 @@ def identity(
     sample: str | None,
     events: Mapping[str, Any],
     variations: Any = None,
+    begin: Any = None,
 ) -> dict[str, str]:
     """Return what a checkpoint belongs to, by name, as texts."""
-    start = np.concatenate([[problem.t0], problem.y0])
+    start = np.concatenate([[problem.t0], problem.y0 if begin is None else begin.ravel()])
     return {
         "problem": repr(problem),
         "system": emit.fingerprint(problem.system),

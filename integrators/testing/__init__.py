@@ -25,6 +25,7 @@ from integrators.testing.capabilities import (
     finds_events_beside_its_steps,
     is_the_hbvm_that_it_names,
     keeps_the_error_of_a_user_s_function,
+    pairs_hold_twice_the_digits,
     prepared_batches_are_batches,
     samplings_are_as_stated,
     tangents_follow_and_change_nothing,
@@ -101,6 +102,7 @@ CHECKS: tuple[Check, ...] = (
     comes_back_after_its_time,
     tangents_follow_and_change_nothing,
     adjoints_are_what_tangents_say,
+    pairs_hold_twice_the_digits,
     is_the_hbvm_that_it_names,
 )
 

@@ -16,11 +16,13 @@ from integrators.protocol import (
     Batches,
     Checkpoints,
     Destination,
+    DoubleDouble,
     Events,
     EventStepper,
     Gradients,
     Interruptible,
     KeptError,
+    LowParts,
     MethodBase,
     PieceSize,
     PreparedBatches,
@@ -53,6 +55,9 @@ FEW = 64  # steps of a record
 ADJOINT_BOUND = 1e-9
 """Largest relative difference between a gradient by tangent vectors and by the adjoint of the same steps
 (measured: 1e-15)."""
+
+MOVED = 1e-12
+"""Largest change of the end by a quarter of a rounding error at the start, relative to the state."""
 
 EVENT_BOUND = 1e-9
 """Largest value of an event's function where it is said to vanish."""
@@ -144,7 +149,7 @@ def finds_events_beside_its_steps(method: MethodBase, problem: Problem) -> str |
     there = [
         abs(float(y[0]) - level - 1e-3 * (t - problem.t0)) for t, y in zip(found.t, found.y, strict=True)
     ]
-    require(max(there) < 1e-9, f"the function vanishes at its events, but: {max(there):.1e}")
+    require(max(there) < EVENT_BOUND, f"the function vanishes at its events, but: {max(there):.1e}")
     ended = integrate(problem, method, grid, events=Event(crossing, name="crossing", terminal=True))
     require(ended.status is Status.EVENT and ended.t_stop == found.t[0], "a terminal event ends it")
     return None
@@ -301,6 +306,30 @@ def the_size_of_a_piece_is_a_count(method: MethodBase, problem: Problem) -> str 
     return None
 
 
+def pairs_hold_twice_the_digits(method: MethodBase, problem: Problem) -> str | None:
+    """Check that pairs are normalised, that a start comes back, and that its low part moves the end."""
+    program: Any = method.compile(problem.system)
+    if not offers(program, DoubleDouble):
+        return "its states are doubles"
+    grid = regular(problem, 4)[1:] * 0.25 + 0.75 * problem.t0
+    ends = []
+    for share in (0.0, 0.25):
+        pairs = np.stack([problem.y0, share * np.spacing(problem.y0)], axis=1)
+        stepper = program.start_pairs(pairs, problem.par, problem.t0)
+        require(offers(stepper, LowParts), "what start_pairs starts has low parts")
+        here = stepper.advance(np.array([problem.t0]))
+        require(np.array_equal(np.stack([here.y[0], stepper.low[0]], axis=1), pairs), "a start is a sample")
+        made = stepper.advance(grid)
+        require(stepper.low.shape == made.y.shape, "low has the shape of the samples")
+        nearest = np.abs(stepper.low) <= 0.5 * np.spacing(np.abs(made.y))
+        require(bool(nearest.all()), "samples are the nearest doubles")
+        ends.append((made.y[-1], stepper.low[-1]))
+    moved = (ends[1][0] - ends[0][0]) + (ends[1][1] - ends[0][1])
+    miss, size = float(np.max(np.abs(moved))), float(np.max(np.abs(problem.y0)))
+    require(0.0 < miss < MOVED * size, f"the low part of a start moves the end, but by {miss:.1e}")
+    return None
+
+
 def is_the_hbvm_that_it_names(method: MethodBase, problem: Problem) -> str | None:
     """Check that the HBVM that a method says it is has its order and its trajectory."""
     if not offers(method, AsHBVM):
@@ -332,6 +361,8 @@ CHECK_OF: dict[type, Callable[[MethodBase, Problem], str | None]] = {
     TimeLimit: comes_back_after_its_time,
     Variations: tangents_follow_and_change_nothing,
     Gradients: adjoints_are_what_tangents_say,
+    DoubleDouble: pairs_hold_twice_the_digits,
+    LowParts: pairs_hold_twice_the_digits,
     AsHBVM: is_the_hbvm_that_it_names,
 }
 """Which check a capability has."""

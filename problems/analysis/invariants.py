@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from problems import double_double
 from problems.calculus.function import Function
-from problems.double_double import DD
+from problems.double_double import DD, as_dd
 from problems.errors import InputError, shown
 from problems.systems.base import System
 from problems.systems.lagrangian import Lagrangian
@@ -36,7 +36,7 @@ _OPERATIONS: dict[str, Callable[..., DD]] = {name: f.double_double for name, f i
 }
 
 
-def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]:
+def evaluate(function: Function, t: ArrayLike, y: Array | DD, par: Array) -> list[DD]:
     """Evaluate a function in double-double.
 
     Parameters
@@ -45,7 +45,7 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
         From `System.function`.
     t : array_like
         One time, or one per state.
-    y : ndarray, shape (dim, n)
+    y : ndarray or DD, shape (dim, n)
         States, one per column.
     par : ndarray, shape (n_par,) or (n_par, n)
         Parameters, of all states or of each.
@@ -58,7 +58,8 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
     lengths = [len(node.data) for node in reachable(function.roots) if node.op == "sum"]
     largest = max([1, *lengths, *(len(loop) for loop, _ in function.loops)])
     columns = max(1, _BLOCK // largest)
-    n = y.shape[1]
+    y = as_dd(y)
+    n = y.hi.shape[1]
     times = np.broadcast_to(np.asarray(t, dtype=np.float64), (n,))
     own = par if par.ndim == 2 else par[:, np.newaxis]
     blocks = [slice(low, low + columns) for low in range(0, max(n, 1), columns)]
@@ -73,9 +74,9 @@ def evaluate(function: Function, t: ArrayLike, y: Array, par: Array) -> list[DD]
 
 
 class _Interpreter:
-    def __init__(self, t: Array, y: Array, par: Array) -> None:
-        self.inputs = {"t": t[np.newaxis, :], "y": y, "par": par}
-        self.n = y.shape[1]
+    def __init__(self, t: Array, y: DD, par: Array) -> None:
+        self.inputs = {"t": as_dd(t[np.newaxis, :]), "y": y, "par": as_dd(par)}
+        self.n = y.hi.shape[1]
         self.known: dict[int, DD] = {}
 
     def outputs(self, function: Function) -> list[DD]:
@@ -115,7 +116,7 @@ class _Interpreter:
         if node.op == "symbol":
             space, place = node.data
             rows = self.inputs[space]
-            return DD(rows[place if isinstance(place, int) else place.values(node.loop)])
+            return rows[place if isinstance(place, int) else place.values(node.loop)]
         if node.op == "index":
             return DD(node.data.values(node.loop).astype(np.float64)[:, np.newaxis])
         if node.op == "sum":
@@ -139,7 +140,13 @@ class _Interpreter:
         return DD(hi[0], lo[0])
 
 
-def _states(system: System, y: ArrayLike) -> Array:
+def _states(system: System, y: ArrayLike | DD) -> DD:
+    if isinstance(y, DD):
+        return DD(_doubles(system, y.hi), _doubles(system, y.lo))
+    return DD(_doubles(system, y))
+
+
+def _doubles(system: System, y: ArrayLike) -> Array:
     try:
         states = np.asarray(y, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
@@ -149,7 +156,7 @@ def _states(system: System, y: ArrayLike) -> Array:
     return np.atleast_2d(states)
 
 
-def _along(function: Function, par: Array, states: Array, t: ArrayLike | None) -> list[DD]:
+def _along(function: Function, par: Array, states: DD, t: ArrayLike | None) -> list[DD]:
     if t is None:
         if any(node.flags & T for node in function.roots):
             raise InputError(
@@ -159,10 +166,11 @@ def _along(function: Function, par: Array, states: Array, t: ArrayLike | None) -
     try:
         times = np.asarray(t, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"t must be {len(states)} times, not {shown(t)}.") from error
-    if times.ndim > 1 or (times.ndim == 1 and times.size != len(states)):
-        raise InputError(f"t must be {len(states)} times, one per state, not of shape {times.shape}.")
-    return evaluate(function, times, np.ascontiguousarray(states.T), par)
+        raise InputError(f"t must be {len(states.hi)} times, not {shown(t)}.") from error
+    if times.ndim > 1 or (times.ndim == 1 and times.size != len(states.hi)):
+        raise InputError(f"t must be {len(states.hi)} times, one per state, not of shape {times.shape}.")
+    columns = DD(np.ascontiguousarray(states.hi.T), np.ascontiguousarray(states.lo.T))
+    return evaluate(function, times, columns, par)
 
 
 def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
@@ -176,15 +184,16 @@ def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) ->
 
 
 def errors(
-    system: System, par: Array, y: ArrayLike, t: ArrayLike | None, *, start: tuple[float, Array]
+    system: System, par: Array, y: ArrayLike | DD, t: ArrayLike | None, *, start: tuple[float, Array | DD]
 ) -> dict[str, Array]:
     """Return how far the invariants are from those at ``start``, see `problems.problem.Problem.errors`."""
     from problems.analysis import wide  # which loads mpmath
 
-    states = _states(system, y)
+    states, begin = _states(system, y), _states(system, start[1])
+    t0, y0 = start[0], begin.hi[0]
     found: dict[str, Array] = {}
     for name, function in system.invariants.items():
-        first = _along(function, par, np.atleast_2d(start[1]), start[0])
+        first = _along(function, par, begin, t0)
         values = _along(function, par, states, t)
         gaps = np.stack([(now - before).rounded() for now, before in zip(values, first, strict=True)])
         size = np.array([value.rounded()[0] for value in first])
@@ -192,15 +201,15 @@ def errors(
         unit = largest if 0.0 < largest < np.inf else 1.0  # so that no square under- or overflows
         with np.errstate(all="ignore"):
             errors = np.linalg.norm(gaps / unit, axis=0) / (np.linalg.norm(size / unit) or 1.0)
-        before = [] if _SMALLEST <= largest <= _LARGEST else wide.evaluate(function, *start, par)
+        before = [] if _SMALLEST <= largest <= _LARGEST else wide.evaluate(function, t0, y0, par)
         # A sum that rounding leaves at 0 is 0; what has become too small for doubles is not.
         lost = any(value != 0 and not _SMALLEST <= abs(value) <= _LARGEST for value in before)
-        again = np.isfinite(states).all(axis=1) & (lost | ~np.isfinite(errors))
+        again = np.isfinite(states.hi).all(axis=1) & (lost | ~np.isfinite(errors))
         if again.any():
-            times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states))
-            before = before or wide.evaluate(function, *start, par)
+            times = np.broadcast_to(np.asarray(0.0 if t is None else t, dtype=np.float64), len(states.hi))
+            before = before or wide.evaluate(function, t0, y0, par)
             for i in np.flatnonzero(again):
-                errors[i] = wide.relative(wide.evaluate(function, float(times[i]), states[i], par), before)
+                errors[i] = wide.relative(wide.evaluate(function, float(times[i]), states.hi[i], par), before)
         found[name] = errors
     return found
 
@@ -225,7 +234,7 @@ def velocity(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> A
         return np.stack([value.rounded() for value in _along(system.velocity, par, states, t)], axis=1)
     if not system.separable or system.dof is None:
         return None
-    momenta = states[:, system.dof :]
+    momenta = states.hi[:, system.dof :]
     return np.stack([(c * momenta[:, i]).rounded() for i, c in enumerate(_scale(system, par))], axis=1)
 
 

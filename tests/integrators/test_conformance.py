@@ -23,6 +23,7 @@ NEED_NOT_APPLY = (
     testing.failure_is_a_status,
     testing.the_size_of_a_piece_is_a_count,
     testing.events_may_change_the_state,
+    testing.pairs_hold_twice_the_digits,
 )
 
 

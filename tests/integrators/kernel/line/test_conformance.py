@@ -23,6 +23,7 @@ NEED_NOT_APPLY = (
     testing.tangents_follow_and_change_nothing,
     testing.adjoints_are_what_tangents_say,
     testing.events_may_change_the_state,
+    testing.pairs_hold_twice_the_digits,
 )
 
 

@@ -1,0 +1,103 @@
+"""A step of Gauss collocation in double-double arithmetic, by fixed-point iteration."""
+
+import hashlib
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from integrators.coefficients import legendre
+from integrators.extended.arithmetic import Numbers, compiled, plus, times
+from problems import emit
+from problems.double_double import DD
+from problems.systems.base import System
+
+MOST_ITERATIONS = 200
+SMALLEST = 1e-33  # relative change of the field at the stages that ends the iteration ...
+SOLVED = 1e-27  # ... and the largest at which it may stagnate
+
+
+@cache
+def tables(s: int) -> tuple[Numbers, Numbers, Numbers]:
+    """Return nodes and weights, (s,), and coefficients, (s, s)."""
+    made = legendre.tables(s, s)
+    integrals, projection = _dd(made.integrals), _dd(made.projection)
+    matrix = DD(np.zeros((s, s)))
+    for j in range(s):
+        matrix = matrix + integrals[:, j, None] * projection[j]
+    return _numbers(made.nodes), _numbers(made.weights), _numbers(matrix)
+
+
+def ends_of_projection(s: int) -> Numbers:
+    """Return b_l P_j(c_l) for the first and the last two j, (3, s)."""
+    return _numbers(_dd(legendre.tables(s, s).projection)[[0, -2, -1]])
+
+
+def _dd(table: Any) -> DD:
+    return DD(table.hi, table.lo)
+
+
+def _numbers(table: Any) -> Numbers:
+    return table.hi + 1j * table.lo
+
+
+def field_of(system: System) -> tuple[str, Any]:
+    """Return a digest of a system's field, and the field for numbers: ``field(t, y, par, out)``."""
+    made = emit.source(system, "field", "numba", limit=0)
+    key = hashlib.sha256(made.text.encode()).hexdigest()
+    if key not in _fields:
+        _fields[key] = compiled(made.text, made.name)
+    return key, _fields[key]
+
+
+_fields: dict[str, Any] = {}
+
+
+@njit
+def weighted(weights, values):
+    """Return the sum of weights times values."""
+    total = complex(0.0)
+    for i in range(len(weights)):
+        total = plus(total, times(weights[i], values[i]))
+    return total
+
+
+def solver(field: Any) -> Any:
+    """Return what solves the stage equations of a step.
+
+    ``solve(t, y, par, step, nodes, matrix, slope, new)`` takes a time, a state, parameters and the length of
+    the step, all of them numbers; ``slope`` and ``new``, of shape (s, dim), are room. It returns the
+    iterations, and the relative change by the last of them; the field at the stages is then in ``slope``.
+    """
+
+    @njit
+    def solve(t, y, par, step, nodes, matrix, slope, new):
+        s, dim = len(nodes), len(y)
+        stage = np.zeros(dim, np.complex128)
+        field(t, y, par, new[0])
+        for i in range(s):
+            slope[i] = new[0]
+        before, change, count = np.inf, np.inf, 0
+        for _ in range(MOST_ITERATIONS):
+            count += 1
+            for i in range(s):
+                for d in range(dim):
+                    stage[d] = plus(y[d], times(weighted(matrix[i], slope[:, d]), step))
+                field(plus(t, times(step, nodes[i])), stage, par, new[i])
+            change, size = 0.0, 1e-300
+            for d in range(dim):
+                for i in range(s):
+                    gap = new[i, d] - slope[i, d]
+                    change = max(change, abs(gap.real + gap.imag))
+                    size = max(size, abs(new[i, d].real))
+            slope[:] = new
+            change /= size
+            if not change < np.inf:
+                break
+            if change < SMALLEST or (change < SOLVED and change >= 0.5 * before):
+                break
+            before = change
+        return count, change
+
+    return solve

@@ -1,0 +1,83 @@
+"""States with twice the digits of a double: what a user gives, and what does not go together with them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from integrators.protocol import Array, DoubleDouble, MethodBase, Program, offers
+from problems.double_double import two_sum
+from problems.errors import InputError, shown
+from problems.problem import Problem
+
+BITS = 300  # in which the difference of a number and its nearest double is exact enough
+
+
+def pairs(start: Any, problem: Problem) -> Array:
+    """Return a start as pairs, shape (dim, 2): the problem's doubles, and what these leave out.
+
+    Parameters
+    ----------
+    start : array_like
+        Numbers of mpmath, or doubles, (dim,); or pairs of doubles, (dim, 2).
+    problem : Problem
+        Whose start they are, with more digits.
+
+    Raises
+    ------
+    problems.errors.InputError
+        For anything else, and where the problem does not start at the nearest doubles.
+    """
+    dim = problem.system.dim
+    try:
+        numbers: NDArray[Any] = np.array(start, dtype=object)
+        if numbers.shape == (dim, 2):
+            high, low = two_sum(*numbers.astype(np.float64).T)
+        else:
+            high = numbers.astype(np.float64)
+            low = np.array([_left_out(x, double) for x, double in zip(numbers, high.tolist(), strict=True)])
+    except (TypeError, ValueError, OverflowError):
+        high, low = np.empty(0), np.empty(0)
+    if high.shape != (dim,) or not np.isfinite(high + low).all():
+        raise InputError(
+            f"start must be {dim} finite numbers, of mpmath or doubles, or {dim} pairs of doubles, "
+            f"not {shown(start)}."
+        )
+    if (different := np.flatnonzero(high != problem.y0)).size:
+        i = int(different[0])
+        raise InputError(
+            f"start[{i}] rounds to {float(high[i])!r}, but the problem starts at {float(problem.y0[i])!r}; "
+            "make the problem with the same numbers."
+        )
+    return np.stack([high, low], axis=1)
+
+
+def _left_out(number: Any, nearest: float) -> float:
+    """Return a number minus the nearest double."""
+    import mpmath  # for those who need it
+
+    with mpmath.workprec(BITS):
+        return float(mpmath.mpf(number) - nearest)
+
+
+def check_digits(
+    program: Program, method: MethodBase, start: Any, *, events: bool = False, variations: bool = False
+) -> bool:
+    """Return whether a program is one of double-double arithmetic, and refuse what does not go with it.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With the name of what to leave out.
+    """
+    if offers(program, DoubleDouble):
+        for name, given in (("events", events), ("variations", variations)):
+            if given:
+                raise InputError(f"{method!r} has no {name}; leave out {name}= or precision=.")
+        return True
+    if start is not None:
+        raise InputError(
+            f"{method!r} calculates with doubles; leave out start=, or use Gauss(s=, h=, "
+            "precision='double-double')."
+        )
+    return False
