@@ -114,7 +114,7 @@ class DoubleDoubleStepper(RestorableStepper):
     """A trajectory whose states have twice the digits of a double.
 
     The steps end at t0 + n h exactly, and a partial step leads to every other time, also to one that is
-    the end of a step but for rounding. With ``"land"`` the steps count from such a time on.
+    the end of a step but for rounding. With ``"stop"`` the steps count from such a time on.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class DoubleDoubleStepper(RestorableStepper):
         What the samples of the last ``advance``, doubles, leave out.
     """
 
-    samplings = ("side", "land")
+    samplings = ("partial", "stop")
 
     def __init__(self, program: DoubleDoubleProgram, y: Numbers, par: Array, t: float):
         super().__init__(y.real.copy(), t)
@@ -168,7 +168,7 @@ class DoubleDoubleStepper(RestorableStepper):
                 state = self._here.copy()
                 if not self._take(self._time(self._n), 0, 1, part, state):
                     break
-                if how == "land":
+                if how == "stop":
                     self._stats.steps += 1
                     self._base, self._n, self._here = complex(t), 0, state
             self._served.append(state.copy())

@@ -55,8 +55,8 @@ def test_times_are_the_doubles_that_are_given():
     assert max(miss(problem, found, i) for i in range(3)) < 1e-29  # measured: 8.8e-31
     back = integrate(problem, method(16, 0.1), [-0.3, -7.0])
     assert max(miss(problem, back, i) for i in range(2)) < 1e-29
-    landed = integrate(problem, method(16, 0.1), [0.3, 1.0 / 3.0, 7.0], sample="land")
-    assert max(miss(problem, landed, i) for i in range(3)) < 1e-29  # measured: 2.3e-30
+    stopped = integrate(problem, method(16, 0.1), [0.3, 1.0 / 3.0, 7.0], sample="stop")
+    assert max(miss(problem, stopped, i) for i in range(3)) < 1e-29  # measured: 2.3e-30
 
 
 def test_quadratic_invariants_stay_to_32_digits_and_the_energy_with_short_steps():
