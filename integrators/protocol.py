@@ -712,6 +712,9 @@ class MethodBase(CheckedOptions):
     order = cast("int | None", None)  # without an annotation, with which it would be an option
     """Order of convergence, an int; ``None`` where it varies with the tolerance."""
 
+    precision = cast("Any", "double")
+    """Of the numbers that it calculates with; programs of another one are `DoubleDouble`."""
+
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if "compile" in vars(cls):

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from integrators.protocol import Array, DoubleDouble, MethodBase, Program, offers
+from integrators.protocol import Array, MethodBase
 from problems.double_double import two_sum
 from problems.errors import InputError, shown
 from problems.problem import Problem
@@ -60,24 +60,19 @@ def _left_out(number: Any, nearest: float) -> float:
         return float(mpmath.mpf(number) - nearest)
 
 
-def check_digits(
-    program: Program, method: MethodBase, start: Any, *, events: bool = False, variations: bool = False
-) -> bool:
-    """Return whether a program is one of double-double arithmetic, and refuse what does not go with it.
+def check_digits(method: MethodBase, *, events: bool, variations: bool) -> None:
+    """Refuse what does not go together with states of so many digits, or needs them.
 
     Raises
     ------
     problems.errors.InputError
         With the name of what to leave out.
     """
-    if offers(program, DoubleDouble):
-        for name, given in (("events", events), ("variations", variations)):
-            if given:
-                raise InputError(f"{method!r} has no {name}; leave out {name}= or precision=.")
-        return True
-    if start is not None:
+    if method.precision == "double":
         raise InputError(
             f"{method!r} calculates with doubles; leave out start=, or use Gauss(s=, h=, "
             "precision='double-double')."
         )
-    return False
+    for name, given in (("events", events), ("variations", variations)):
+        if given:
+            raise InputError(f"{method!r} has no {name}; leave out {name}= or precision=.")

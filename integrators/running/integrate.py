@@ -155,8 +155,10 @@ def integrate(
     acting = any(event.then is not None for event in wanted.values())
     if acting and variations is not None:
         raise InputError("variations do not go on past an event with then=; leave out one of them.")
-    digits = check_digits(program, method, start, events=bool(wanted), variations=variations is not None)
-    begin = None if not digits else pairs(problem.y0 if start is None else start, problem)
+    begin = None
+    if start is not None or method.precision != "double":
+        check_digits(method, events=bool(wanted), variations=variations is not None)
+        begin = pairs(problem.y0 if start is None else start, problem)
     watch, kept = None, None
     if progress or checkpoint is not None or resume is not None:
         belongs = identity(problem, method, grid, sample, wanted, variations, begin)

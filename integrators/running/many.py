@@ -28,7 +28,6 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer, Reduction
 from integrators.refusals import as_numbers, check_batch, check_times
-from integrators.running.digits import check_digits
 from integrators.running.integrate import SECONDS
 from integrators.running.pieces import (
     Gathered,
@@ -167,7 +166,7 @@ def integrate_many(
             "variations= needs integrate's own way; leave out backend, events, reduce and 'steps'."
         )
     program: Any = _program(system, method, backend)
-    if check_digits(program, method, None):
+    if method.precision != "double":
         raise InputError(f"{method!r} integrates one trajectory at a time: use integrate.")
     if variations is not None:  # what cannot be is said before anything is integrated
         follow_vectors(
