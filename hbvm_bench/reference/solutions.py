@@ -268,6 +268,16 @@ def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "rea
     problems.errors.InputError
         If the computation does not reach the last time.
     """
+    integrator, real = taylor_integrator(problem, tolerance, precision)
+    outcome = integrator.propagate_grid(np.array([real(float(time)) for time in times]))
+    states = outcome[-1]
+    if len(states) != len(times):
+        raise InputError(f"the reference of {problem!r} stopped before its end time: {outcome[0]}.")
+    return [[Decimal(str(value)) for value in row] for row in states]
+
+
+def taylor_integrator(problem: Problem, tolerance: str, precision: str = "real128") -> tuple[Any, Any]:
+    """Return heyoka's integrator of a problem, at its start, and the type of its numbers; see `taylor`."""
     try:
         import heyoka as hy
     except ImportError:
@@ -285,11 +295,7 @@ def taylor(problem: Problem, times: Array, tolerance: str, precision: str = "rea
         high_accuracy=True,
         compact_mode=problem.system.dim > 40,
     )
-    outcome = integrator.propagate_grid(np.array([real(float(time)) for time in times]))
-    states = outcome[-1]
-    if len(states) != len(times):
-        raise InputError(f"the reference of {problem!r} stopped before its end time: {outcome[0]}.")
-    return [[Decimal(str(value)) for value in row] for row in states]
+    return integrator, real
 
 
 class _Numbers(ast.NodeTransformer):

@@ -9,6 +9,7 @@ import problems
 from integrators import Gauss, integrate, periodic
 from integrators.dynamics import continued
 from problems import Hamiltonian, InputError, Problem, VectorField
+from problems.double_double import two_sum
 
 MIRROR = [1, -1, -1, 1]
 
@@ -30,15 +31,42 @@ def test_arenstorf_s_orbits(loops):
     assert abs(whole.period - found.period) < 1e-12
 
 
-def test_the_figure_eight_has_the_published_multipliers():
+# Angles of the figure eight's multipliers over 2 pi, from the differences of the second test; they do not
+# depend on scale. Its linear stability: C. Simo, Contemporary Mathematics 292 (2002), 209-228.
+ANGLES = 0.008422724708, 0.298092529005
+
+
+def angles_of(monodromy):
+    return np.angle(np.linalg.eigvals(monodromy)) / (2 * np.pi)
+
+
+def test_the_figure_eight_is_linearly_stable():
     found = periodic(problems.load("figure_eight"), period=6.32)
     assert found.converged, found.reason
     assert abs(np.abs(found.multipliers) - 1.0).max() < 1e-5  # eight of them are 1, in blocks
-    angles = np.angle(found.multipliers) / (2 * np.pi)
-    # These eight digits: C. Simo, Contemporary Mathematics 292 (2002), 209-228. They do not depend on scale.
-    for angle in (0.00842272, 0.29809253):
-        assert np.abs(angles - angle).min() < 1e-8
-        assert np.abs(angles + angle).min() < 1e-8
+    for angle in (*ANGLES, *(-angle for angle in ANGLES)):
+        assert np.abs(angles_of(found.monodromy) - angle).min() < 1e-11  # measured: 4e-13
+
+
+@pytest.mark.slow
+def test_the_figure_eights_monodromy_matrix_is_that_of_differences_in_double_double():
+    found = periodic(problems.load("figure_eight"), period=6.32)
+    program = Gauss(s=16, h=1 / 32, precision="double-double").compile(found.problem.system)
+
+    def end(change):
+        pairs = np.stack(two_sum(found.y0, change), axis=1)
+        stepper = program.start_pairs(pairs, found.problem.par)
+        return stepper.advance([found.period]).y[0], stepper.low[0]
+
+    columns = []
+    for change in 1e-10 * np.eye(12):
+        (high, low), (other_high, other_low) = end(change), end(-change)
+        columns.append(((high - other_high) + (low - other_low)) / 2e-10)
+    matrix = np.stack(columns, axis=1)
+    # measured: 2.6e-15 of the largest
+    assert np.abs(matrix - found.monodromy).max() < 1e-13 * np.abs(matrix).max()
+    for angle in ANGLES:
+        assert np.abs(angles_of(matrix) - angle).min() < 1e-11
 
 
 def spatial(q, p, par, m):
