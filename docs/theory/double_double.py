@@ -1,7 +1,8 @@
 """The table of speeds on the page on round-off: ``python docs/theory/double_double.py``.
 
-Gauss in double-double arithmetic, heyoka's Taylor method in 128 bits and Gauss in doubles take turns, the first
-two at settings that make them about as accurate. Errors are differences from heyoka with a tighter tolerance.
+Gauss in double-double arithmetic, heyoka's Taylor method in 128 bits and Gauss in doubles take turns, the
+first two at settings that make them about as accurate. Errors are differences from heyoka
+with a tighter tolerance.
 """
 
 from statistics import median
