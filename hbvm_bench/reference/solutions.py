@@ -9,9 +9,9 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Context, Decimal
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ from problems.systems.base import System
 Array = NDArray[np.float64]
 
 TOLERANCE = "1e-28"
+UNIT_ROUNDOFF = 2.0**-53
+"""The largest relative change of a number that is rounded to a double."""
 LONG = "long"  # the folder of those for long spans, whose two computations agree on fewer digits
 
 
@@ -43,12 +45,21 @@ class Reference:
         The states are ``high + low``.
     provenance : dict of str
         What computed it, and what a second computation says.
+    condition : ndarray, shape (n,) or (0,)
+        Condition number of the positions at each time, where it is known; see
+        `hbvm_bench.reference.condition`.
     """
 
     t: Array
     high: Array
     low: Array
     provenance: dict[str, str]
+    condition: Array = field(default_factory=partial(np.empty, 0))
+
+    def condition_at(self, time: float) -> float | None:
+        """Return the condition number of the positions at one of its times; ``None`` where it has none."""
+        there = np.flatnonzero(self.t == time)
+        return float(self.condition[there[0]]) if self.condition.size and there.size else None
 
 
 class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, dict=True):
@@ -66,6 +77,8 @@ class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         The times, doubles in hexadecimal.
     y : list of list of str
         The states in decimal.
+    condition : list of float
+        Condition number of the positions at each time; empty where it is not known.
     """
 
     problem: str
@@ -74,6 +87,7 @@ class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     provenance: dict[str, str]
     t: list[str]
     y: list[list[str]]
+    condition: list[float] = []
 
     @cached_property
     def reference(self) -> Reference:
@@ -81,7 +95,8 @@ class ReferenceFile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
         exact = [[Decimal(value) for value in row] for row in self.y]
         high = np.array([[float(value) for value in row] for row in exact])
         low = np.array([[float(_CONTEXT.subtract(v, Decimal(float(v)))) for v in row] for row in exact])
-        return Reference(np.array([float.fromhex(t) for t in self.t]), high, low, self.provenance)
+        times = np.array([float.fromhex(t) for t in self.t])
+        return Reference(times, high, low, self.provenance, np.array(self.condition))
 
     @cached_property
     def digest(self) -> str:
@@ -133,8 +148,10 @@ def know(text: str) -> None:
         If it is none.
     """
     found = msgspec.json.decode(text, type=ReferenceFile)
-    if len(found.reference.t) != len(found.y):
-        raise ValueError("a reference must have one state for each of its times")
+    if len(found.reference.t) != len(found.y) or len(found.condition) not in (0, len(found.y)):
+        raise ValueError(
+            "a reference must have one state, and no or one condition number, for each of its times"
+        )
     said = found.provenance
     key = (*found.start, *found.parameters, said["field"], float(said["t_end"]).hex())
     _known.set({**_known.get(), key: found})
@@ -179,8 +196,14 @@ def _of_name(name: str) -> list[ReferenceFile]:
     return [read(path) for place in places for path in sorted(place.glob(f"{name}*.json"))]
 
 
-def of(problem: Problem, times: Array, states: list[list[str]], made: dict[str, str]) -> ReferenceFile:
-    """Return the reference of a problem: states as text at some times, and how they were made."""
+def of(
+    problem: Problem,
+    times: Array,
+    states: list[list[str]],
+    made: dict[str, str],
+    condition: Array | None = None,
+) -> ReferenceFile:
+    """Return the reference of a problem: states as text at some times, how made, and their condition."""
     return ReferenceFile(
         problem=repr(problem),
         start=start(problem),
@@ -188,6 +211,7 @@ def of(problem: Problem, times: Array, states: list[list[str]], made: dict[str, 
         provenance=made | {"field": emit.fingerprint(problem.system), "t_end": repr(float(problem.t_end))},
         t=hexadecimal(times),
         y=states,
+        condition=[] if condition is None else [float(f"{value:.2g}") for value in condition.tolist()],
     )
 
 
@@ -219,7 +243,14 @@ def difference(stored: ReferenceFile, fresh: ReferenceFile) -> Decimal:
 
 def encode(stored: ReferenceFile) -> str:
     """Return the text of a reference file, one state a line."""
-    order = ("problem", "provenance", "start", "parameters", "t")
+    order = (
+        "problem",
+        "provenance",
+        "start",
+        "parameters",
+        "t",
+        *(["condition"] if stored.condition else []),
+    )
     lines = [f'"{key}": {_text(getattr(stored, key))}' for key in order]
     rows = ",\n".join(f"  {_text(row)}" for row in stored.y)
     return "{" + ",\n".join([*lines, f'"y": [\n{rows}\n]']) + "}\n"

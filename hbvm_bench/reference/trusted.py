@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hbvm_bench.reference import solutions
+from hbvm_bench.reference.condition import conditions
 from hbvm_bench.reference.solutions import ReferenceFile
 from integrators.extended import collocation
 from problems.errors import InputError
@@ -142,6 +143,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             f"t = {float(opinions.times[1])!r}; ask for less with until=."
         )
     horizon = "the whole interval" if opinions.times[kept - 1] == problem.t_end else "this horizon"
+    states = np.array(opinions.states[:kept]).astype(float)
     text = str if problem.system.dim <= SMALL else _few_digits
     return solutions.of(
         problem,
@@ -157,6 +159,7 @@ def make(problem: Problem, until: float | None = None, at: Array | None = None) 
             "heyoka": version("heyoka"),
             "python": platform.python_version(),
         },
+        conditions(problem, opinions.times[:kept], states) if problem.system.dim <= SMALL else None,
     )
 
 

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from hbvm_bench.campaign.identity import make_problem
 from hbvm_bench.measure.metrics import METRICS
+from hbvm_bench.reference import solutions
 from hbvm_bench.report import provenance, words
 from hbvm_bench.report.archived import PLACE
 from hbvm_bench.report.document import (
@@ -28,7 +29,7 @@ from hbvm_bench.report.page import DRAWN_CASES, Results, block
 from hbvm_bench.report.problem import ProblemPart, part
 from hbvm_bench.store import archive
 from hbvm_bench.store.records import Record
-from hbvm_bench.summaries import goals, laws, needs, outcomes
+from hbvm_bench.summaries import accuracies, goals, laws, needs, outcomes
 from hbvm_bench.summaries.points import by_family, family_of
 from hbvm_bench.summaries.rows import Task, by, columns, tasks
 from hbvm_bench.summaries.table import Table
@@ -80,6 +81,31 @@ def goals_reached(results: Results) -> Table | None:
     """Return what the campaigns asked for, and what was measured; ``None`` where they asked for nothing."""
     found = [one for run in results.runs for one in goals.verdicts(run.index.campaign, results.records)]
     return goals.table(found) if found else None
+
+
+@block
+def times_at_accuracies(results: Results) -> list[Table]:
+    """Return the times at several position errors, of each campaign that has any."""
+    made = (accuracies.table(run.index.campaign, run.records) for run in results.runs)
+    return [one for one in made if one is not None]
+
+
+@block
+def conditions(results: Results) -> list[Table]:
+    """Return how far doubles determine the positions at the ends, where the references say so."""
+    rows = []
+    for one in _parts(results):
+        known = solutions.find(one.problem)
+        if known is not None and (number := known.condition_at(one.problem.t_end)) is not None:
+            least = number * solutions.UNIT_ROUNDOFF
+            rows.append((one.ranked.problem, f"{one.problem.t_end:g}", f"{number:.1e}", f"{least:.1e}"))
+    note = (
+        "The condition number is the largest relative change of a position at the end over a relative "
+        "change of the state at the worst time before, to within a factor of about 2. The last column is "
+        "this number times 1.1e-16: how far that position moves where one state on the way is rounded."
+    )
+    head = ("problem", "end", "condition number", "rounded once")
+    return [Table("How far doubles determine the positions", head, rows, note, words=(0,))] if rows else []
 
 
 @block

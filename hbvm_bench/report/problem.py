@@ -212,6 +212,11 @@ def _truth(problem: Problem, known: Reference | None) -> Items | None:
     said = [f"Reference: {made.get('method', '')}{version}{check}"]
     if "agreement" in made:
         said.append(f"The two agree to {made['agreement']}")
+    if (number := known.condition_at(problem.t_end)) is not None:
+        said.append(
+            f"Condition number of the positions at the end: {number:.1e}. A state that is rounded to doubles "
+            f"at the worst time changes them by {number * solutions.UNIT_ROUNDOFF:.1e}"
+        )
     floor = problem.errors(known.high, known.t)
     shown = [name for name in ("energy", "angular_momentum") if name in floor]
     if least := ", ".join(f"{name.replace('_', ' ')} {np.max(floor[name]):.1e}" for name in shown):

@@ -61,6 +61,7 @@ def _energy(q, p, par, m):
 def cr3bp(
     *,
     loops: Literal[4, 3, 2] = 4,
+    speed: float | None = None,
     mu: Annotated[float, Must("a number between 0 and 1", lambda mu: 0 < mu < 1)] | None = None,
     t_end: float | None = None,
 ) -> Problem:
@@ -74,6 +75,9 @@ def cr3bp(
     ----------
     loops : {4, 3, 2}
         Which orbit.
+    speed : float, optional
+        Velocity at the start, perpendicular to the axis; by default that of the periodic orbit. Others
+        may pass the Moon much more closely.
     mu : float, optional
         The Moon's share of the mass, 0 < mu < 1; by default the one for which
         the orbit is periodic: 0.012277471, and 1/82.45 for 2 loops.
@@ -96,6 +100,6 @@ def cr3bp(
     return Problem(
         system,
         q0=[orbit.x, 0.0],
-        p0=[0.0, orbit.speed + orbit.x],
+        p0=[0.0, (orbit.speed if speed is None else speed) + orbit.x],
         t_end=orbit.period if t_end is None else t_end,
     )

@@ -1,6 +1,7 @@
 """Three equal masses that chase each other along a figure eight, from the start found by C. Simo."""
 
 from problems.catalogue import _gravity as gravity
+from problems.checks import Positive
 from problems.entry import Expected, entry
 from problems.picture import Orbits
 from problems.problem import Problem
@@ -22,7 +23,7 @@ PERIOD = 6.3259140097821386327
     picture=Orbits(span=PERIOD, points=600),
     expected=Expected(h=0.05, energy=5e-16, default=2e-15),
 )
-def figure_eight(*, t_end: float = 100 * PERIOD) -> Problem:
+def figure_eight(*, momentum: Positive = 1.0, t_end: float = 100 * PERIOD) -> Problem:
     """Return three equal masses that chase each other along a figure eight; G = 1.
 
     Tests a stable periodic orbit without a dominant mass: after a period every
@@ -30,6 +31,9 @@ def figure_eight(*, t_end: float = 100 * PERIOD) -> Problem:
 
     Parameters
     ----------
+    momentum : float
+        Factor of all momenta at the start, > 0. Any other than 1 perturbs the orbit: with 0.8 two bodies
+        come within 0.0024 of each other.
     t_end : float
         End of the integration; 100 periods by default.
 
@@ -39,7 +43,7 @@ def figure_eight(*, t_end: float = 100 * PERIOD) -> Problem:
         State: positions in the plane body by body, then momenta. Invariants:
         energy, linear momentum (0), angular momentum (0).
     """
-    (x, y), (u, v) = POSITION, VELOCITY
+    (x, y), (u, v) = POSITION, [momentum * w for w in VELOCITY]
     return Problem(
         gravity.hamiltonian((1.0, 1.0, 1.0), name="figure_eight", dimension=2),
         q0=[x, y, -x, -y, 0.0, 0.0],
