@@ -42,24 +42,35 @@ def test_numba_is_asked_only_where_there_is_none(file, tmp_path, monkeypatch):
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path / "first"))
     assert ENGINE.code().address > 1000
     assert not asked
-    file.write_bytes(lzma.compress(b"no text of LLVM"))
+    lowered.write({ENGINE.key: "no text of LLVM"})
     monkeypatch.setattr(binary, "_loaded", {})
     monkeypatch.setenv("HBVM_BENCH_CACHE", str(tmp_path / "second"))
     assert ENGINE.code().address == 1
     assert asked
 
 
-@pytest.mark.parametrize("content", [b"", b"no archive"])
+@pytest.mark.parametrize("content", [b"", b"no archive", lzma.compress(b"no archive")])
 def test_what_cannot_be_read_is_not_there(file, content):
     file.write_bytes(content)
     assert lowered.get(ENGINE.key) is None
 
 
+def test_a_broken_archive_is_as_if_it_were_not_there(file):
+    file.write_bytes(file.read_bytes()[:-1000])
+    assert lowered.get(ENGINE.key) is None
+
+
+def test_each_text_of_an_archive_is_found(file):
+    texts = {"first": "a" * 1000, "second": "b", "third": "c" * 10**6}
+    lowered.write(texts)
+    assert {key: lowered.get(key) for key in reversed(texts)} == texts
+
+
 def test_that_of_other_sources_systems_and_later_versions_is_not_there(file, text, monkeypatch):
     assert lowered.get(ENGINE.key + "0") is None
-    for other in (-1, 1):
-        version = f".{llvm.llvm_version_info[0] + other}.xz"
-        file = file.rename(file.with_name(file.name.partition(".")[0] + version))
+    version = llvm.llvm_version_info[0]
+    for other in (version - 1, version + 1):
+        file = file.rename(file.with_name(f"{llvm.get_process_triple()}.{other}.tar.xz"))
         assert lowered.get(ENGINE.key) is None
     lowered.write({ENGINE.key: text})  # and what lay there is gone
     assert len(list(file.parent.iterdir())) == 1
