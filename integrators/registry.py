@@ -5,11 +5,13 @@ nothing is imported until its name is asked for.
 """
 
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from integrators.protocol import MethodBase
 from problems.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "hbvm_bench.integrators"
 
@@ -70,8 +72,10 @@ def create(name: str, **options: Any) -> MethodBase:
 
 
 @cache
-def _entries() -> dict[str, list[EntryPoint]]:
+def _entries() -> "dict[str, list[EntryPoint]]":
     """Return what offers each name: one entry point, or several that clash, which only this name minds."""
+    from importlib.metadata import EntryPoint, entry_points  # an eighth of what importing us would take
+
     found = {
         name: [EntryPoint(name, f"{module}:{name}", GROUP)]
         for module, own in BUILT_IN.items()

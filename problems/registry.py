@@ -9,8 +9,7 @@ import functools
 import inspect
 import pkgutil
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +19,17 @@ from problems.entry import Entry
 from problems.errors import InputError, shown, unknown
 from problems.problem import Problem
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
 GROUP = "hbvm_bench.problems"
 
 
 @functools.cache
-def _entries() -> dict[str, list[EntryPoint]]:
+def _entries() -> "dict[str, list[EntryPoint]]":
     """Return what is offered under each name, different things only."""
+    from importlib.metadata import EntryPoint, entry_points  # which takes long to import
+
     own = [EntryPoint(name, f"{catalogue.__name__}.{name}:{name}", GROUP) for name in built_in()]
     found: dict[str, list[EntryPoint]] = {}
     for point in (*own, *entry_points(group=GROUP)):

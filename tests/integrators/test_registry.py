@@ -14,7 +14,7 @@ def offered(monkeypatch):
 
     def offer(**values):
         made = [EntryPoint(name, value, registry.GROUP) for name, value in values.items()]
-        monkeypatch.setattr(registry, "entry_points", lambda group: made)
+        monkeypatch.setattr("importlib.metadata.entry_points", lambda group: made)
         registry._entries.cache_clear()
 
     yield offer

@@ -41,7 +41,7 @@ def offer(name, value, distribution):
 def offered(monkeypatch):
     """Offer problems of made-up distributions, and forget them afterwards."""
     entries = []
-    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: entries)
     registry._entries.cache_clear()
     yield entries
     registry._entries.cache_clear()
