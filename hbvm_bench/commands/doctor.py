@@ -15,7 +15,6 @@ from hbvm_bench.commands.listing import as_json as run_as_json
 from hbvm_bench.commands.run import as_typed, carry_out
 from hbvm_bench.measure import doctor as examining
 from hbvm_bench.report import terminal
-from integrators.kernel.ahead import compile_ahead
 from problems.errors import InputError
 
 UNHEALTHY = 1
@@ -100,5 +99,7 @@ def _print(findings: dict[str, list[examining.Finding]]) -> None:
 
 def warm() -> None:
     """Compile the kernel ahead, once for a machine: the first result then takes a second."""
+    from integrators.kernel.ahead import compile_ahead
+
     for name, seconds in compile_ahead(os.cpu_count() or 1).items():
         print(f"{name}: " + ("compiled before" if seconds is None else f"compiled in {seconds:.1f} s"))

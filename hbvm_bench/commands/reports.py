@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from hbvm_bench.gallery import compile_times, pages
 from hbvm_bench.store.archive import opened
 from hbvm_bench.store.files import ensure_writable
 from problems.errors import InputError
@@ -66,6 +65,8 @@ def gallery(
     ] = False,
 ) -> None:
     """Write the pages on problems and engines, with formulas and pictures, from the problems themselves."""
+    from hbvm_bench.gallery import compile_times, pages
+
     ensure_writable(directory)
     if times:
         path = directory / "compile_times.md"

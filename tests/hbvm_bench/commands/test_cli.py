@@ -181,3 +181,14 @@ def test_output_into_a_closed_pipe_is_no_error():
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, env=os.environ, check=False)
     assert done.stdout.strip() == "0"
     assert "Traceback" not in done.stderr
+
+
+def test_help_imports_neither_what_compiles_nor_what_draws():
+    code = (
+        "import sys; from hbvm_bench.cli import main; code = main(['--help'])\n"
+        "slow = {'matplotlib', 'llvmlite', 'numba', 'scipy', 'mpmath', 'jinja2'}\n"
+        "print(code, sorted(set(sys.modules) & slow))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.splitlines()[-1] == "0 []"
+    assert "automatic" in found.stdout  # every command is there
