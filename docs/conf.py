@@ -7,6 +7,11 @@ import time
 from importlib.metadata import version as installed
 from pathlib import Path
 
+import numpydoc.xref
+
+import integrators
+import problems
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = (
@@ -56,7 +61,15 @@ autosummary_generate = True
 autodoc_typehints = "none"  # numpydoc's sections have the types in words
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
-numpydoc_xref_param_type = False
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"  # but for our own classes
+numpydoc.xref.DEFAULT_LINKS.clear()  # to the glossaries of others: the site is built without a network
+numpydoc_xref_aliases = {
+    name: f"{package.__name__}.{name}"
+    for package in (problems, integrators)
+    for name in package.__all__
+    if isinstance(getattr(package, name), type)
+}
 
 # --- looks: everything the pages need lies beside them ---
 html_theme = "pydata_sphinx_theme"
