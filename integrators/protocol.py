@@ -533,7 +533,7 @@ class Gradients(Protocol):
     def adjoint(self, *, parameters: bool) -> Any:
         """Return what follows records backwards.
 
-        ``begin(gradient)`` sets the derivatives with respect to the last state, ``follow(records)`` goes
+        ``begin(gradient)`` sets the derivatives with respect to a last state, ``follow(records)`` goes
         back to the state before the first of some steps; ``gradient`` are the derivatives with respect to
         that state, and with ``parameters`` those with respect to these.
         """

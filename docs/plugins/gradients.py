@@ -62,7 +62,7 @@ def loss(y: Any) -> Any:
 
 def native(problem: Problem, method: Any) -> tuple[Callable[[], Array], float]:
     """Return what calculates the gradient, and bytes."""
-    kept = Recorded(method.compile(problem.system), problem, END).kept
+    kept = Recorded(method.compile(problem.system), problem, [END]).kept
     return lambda: integrators.gradient(problem, method, loss, ["w"])[1]["w"], kept
 
 

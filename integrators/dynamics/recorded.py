@@ -4,21 +4,32 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from integrators.protocol import Array, Checkpoints, Gradients, Program, Samples, Status, offers
+from integrators.protocol import Array, Checkpoints, Destination, Gradients, Program, Samples, Status, offers
+from integrators.refusals import check_times
 from problems.errors import InputError
 from problems.problem import Problem
 
 MEMORY = 2**28  # bytes for recorded stages, about
-SEGMENT = 4096  # steps that are recorded at a time, at most
+FIRST, SEGMENT = 64, 4096  # steps that are recorded at a time, at first and at most
 
 
 @dataclass
 class _Segment:
-    """Some steps, from a checkpoint on; their records, unless these were given up."""
+    """Some steps towards a time, from a checkpoint on; their records, unless these were given up."""
 
     start: Any
+    end: float
     steps: int
+    records: Any
+
+
+@dataclass
+class _Sample:
+    """The partial step from the last step to a sample; the steps go on beside it."""
+
+    number: int
     records: Any
 
 
@@ -31,8 +42,8 @@ class Recorded:
         Of `integrators.HBVM` or `integrators.Gauss`, on a traced system.
     problem : Problem
         Where it begins.
-    end : float
-        Time of the end.
+    times : array_like, shape (m,)
+        Times of samples, strictly monotone from the start on.
     y0 : ndarray, shape (dim,), optional
         Another start than the problem's,
     par : ndarray, shape (n_par,), optional
@@ -43,10 +54,10 @@ class Recorded:
 
     Attributes
     ----------
-    y : ndarray, shape (dim,)
-        The end.
+    y : ndarray, shape (m, dim)
+        The samples.
     steps : int
-        Steps to it.
+        Steps to the last of them.
     kept : int
         Bytes of the records that were kept.
     solver : str
@@ -55,14 +66,14 @@ class Recorded:
     Raises
     ------
     problems.errors.InputError
-        If the method has no adjoint, or the trajectory does not reach the end.
+        For times that cannot be, if the method has no adjoint, or the trajectory does not reach the end.
     """
 
     def __init__(
         self,
         program: Program,
         problem: Problem,
-        end: float,
+        times: ArrayLike,
         *,
         y0: Array | None = None,
         par: Array | None = None,
@@ -72,30 +83,53 @@ class Recorded:
         stepper: Any = program.start(start, values, problem.t0)
         if not (offers(stepper, Gradients) and offers(stepper, Checkpoints)):
             raise InputError("a method whose steps have no adjoint has no gradients; use Gauss or HBVM.")
-        self._stepper, self._end, self._segments = stepper, end, list[_Segment]()
+        self._stepper, self._parts = stepper, list[_Segment | _Sample]()
+        self._memory, self._held, self._oldest = memory, 0.0, 0
         size = stepper.recorder(1).bytes
-        self._length = int(max(1, min(memory // (2 * size), SEGMENT)))
-        room = max(1, int(memory // (size * self._length)))
-        while True:
-            start = stepper.checkpoint()
-            records = self._record(self._length)
-            self._segments.append(_Segment(start, len(records), records))
-            if len(self._segments) > room:
-                self._segments[-1 - room].records = None
-            if len(records) < self._length:
-                break
-        last = stepper.recorder(1)
-        stepper.record(last)
-        self.y = self._made(stepper.advance(np.array([end]))).y[0]
-        self._segments.append(_Segment(None, len(last), last))
-        self.steps = sum(segment.steps for segment in self._segments)
+        self._longest = int(max(1, min(memory // (2 * size), SEGMENT)))
+        grid = check_times(times, problem.t0)
+        self.y = np.empty((grid.size, problem.system.dim))
+        if offers(stepper, Destination):
+            stepper.destination = float(grid[-1])
+        for i, time in enumerate(grid.tolist()):
+            self._go(time)
+            here, last = stepper.checkpoint(), stepper.recorder(1)
+            stepper.record(last)
+            self.y[i] = self._made(stepper.advance(np.array([time]))).y[0]
+            self._parts.append(_Sample(i, last))
+            stepper.restore(here)  # the steps go on as if there were no sample
+        segments = [part for part in self._parts if isinstance(part, _Segment)]
+        self.steps = sum(segment.steps for segment in segments) + len(self._parts[-1].records)
         self.solver = stepper.stats.solver
-        self.kept = size * sum(segment.steps for segment in self._segments if segment.records)
+        self.kept = size * sum(segment.steps for segment in segments if segment.records)
 
-    def _record(self, most: int) -> Any:
+    def _go(self, time: float) -> None:
+        """Take the steps that end before a time, or at it."""
+        capacity = min(FIRST, self._longest)
+        while True:
+            start = self._stepper.checkpoint()
+            records = self._record(capacity, time)
+            if len(records):
+                self._parts.append(_Segment(start, time, len(records), records))
+                self._held += records.bytes
+                self._forget()
+            if len(records) < capacity:
+                return
+            capacity = min(2 * capacity, self._longest)
+
+    def _forget(self) -> None:
+        """Give up the oldest records, as long as all of them take too much memory."""
+        while self._held > self._memory and self._oldest < len(self._parts) - 1:
+            part = self._parts[self._oldest]
+            if isinstance(part, _Segment):
+                self._held -= part.records.bytes
+                part.records = None
+            self._oldest += 1
+
+    def _record(self, most: int, time: float) -> Any:
         records = self._stepper.recorder(most)
         self._stepper.record(records)
-        self._made(self._stepper.march(self._end, most))
+        self._made(self._stepper.march(time, most))
         return records
 
     def _made(self, samples: Samples) -> Samples:
@@ -103,22 +137,29 @@ class Recorded:
             raise InputError(f"there is no gradient of what is not reached: {samples.reason}")
         return samples
 
-    def pulled_back(self, gradient: Array, *, parameters: bool) -> tuple[Array, Array]:
-        """Return derivatives with respect to the start and the parameters of what has them at the end.
+    def pulled_back(self, gradients: Array, *, parameters: bool) -> tuple[Array, Array]:
+        """Return derivatives with respect to the start and the parameters of what has them at the samples.
 
         Parameters
         ----------
-        gradient : ndarray, shape (dim,)
-            Derivatives with respect to the end.
+        gradients : ndarray, shape (m, dim)
+            Derivatives with respect to the samples.
         parameters : bool
             Whether those with respect to the parameters are wanted; else there are none, shape (0,).
         """
         adjoint = self._stepper.adjoint(parameters=parameters)
-        adjoint.begin(gradient)
-        for segment in reversed(self._segments):
-            records = segment.records
+        along = np.zeros(gradients.shape[1])
+        for part in reversed(self._parts):
+            if isinstance(part, _Sample):
+                adjoint.begin(gradients[part.number])
+                adjoint.follow(part.records)
+                along = along + adjoint.gradient[0]
+                adjoint.begin(along)
+                continue
+            records = part.records
             if records is None:
-                self._stepper.restore(segment.start)
-                records = self._record(segment.steps)
+                self._stepper.restore(part.start)
+                records = self._record(part.steps, part.end)
             adjoint.follow(records)
+            along = adjoint.gradient[0]
         return adjoint.gradient

@@ -95,6 +95,7 @@ class Checkpoint:
     status: Status
     reason: str
     vectors: tuple[Any, ...] | None = None  # what `Vectors.save` returned
+    stages: Array | None = None  # of the step ahead, which may be solved, where steps are recorded
 
 
 class HBVMStepper(ABC):
@@ -148,6 +149,7 @@ class HBVMStepper(ABC):
     variations: Array | None = None
     """Tangent vectors at the last samples, shape (m, dim, n); see `follow`."""
     _vectors: Vectors | None = None
+    _recorded = False  # whether steps are recorded for an adjoint
     stop: threading.Event | None = None  # set by another thread: come back, what is made is not wanted
 
     def __init__(self, program: Program, y: Array, par: Array, t0: float):
@@ -208,6 +210,7 @@ class HBVMStepper(ABC):
     def record(self, records: Records) -> None:
         """Record the steps from here on, instead of what was recorded or followed them before."""
         records.attach(self._context)
+        self._recorded = True
 
     def adjoint(self, *, parameters: bool) -> Adjoint:
         """Return the adjoint of recorded steps."""
@@ -434,6 +437,7 @@ class HBVMStepper(ABC):
             self._status,
             self._reason,
             None if self._vectors is None else self._vectors.save(),
+            self._context.stages.copy() if self._recorded else None,
         )
 
     @one_thread
@@ -467,6 +471,8 @@ class HBVMStepper(ABC):
             self._make_implicit()[0].restore(checkpoint.implicit)
         if self._vectors is not None and checkpoint.vectors is not None:
             self._vectors.restore(checkpoint.vectors)
+        if checkpoint.stages is not None:
+            self._context.stages[:] = checkpoint.stages
         self._uncounted = self._context.steps - checkpoint.taken
         self._status, self._reason, self.error = checkpoint.status, checkpoint.reason, None
 

@@ -201,7 +201,14 @@ class System:
     def _scalar(self, function: Callable[..., Any], what: str) -> Node:
         return self._node(self._call(function, what), function, what)
 
-    def trace(self, function: Callable[..., Any], what: str, outputs: int | None = None) -> Function:
+    def trace(
+        self,
+        function: Callable[..., Any],
+        what: str,
+        outputs: int | None = None,
+        *,
+        data: tuple[int, ...] | None = None,
+    ) -> Function:
         """Trace a function of the same arguments, on a graph of its own: nothing of the system changes.
 
         Parameters
@@ -212,6 +219,8 @@ class System:
             What it is, for messages.
         outputs : int, optional
             So many numbers, in a list, and not one.
+        data : tuple of int, optional
+            The shape, () or (n,), of a further argument ``data``, whose numbers come after the parameters.
 
         Raises
         ------
@@ -219,7 +228,8 @@ class System:
             For anything that cannot be traced, with the line.
         """
         graph = Graph(self.dof)
-        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what)
+        more = None if data is None else {"data": lambda: arguments.further(graph, "data", self.n_par, data)}
+        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what, more=more)
         if outputs is None:
             values = [value]
         elif arguments.is_list(value) and len(value) == outputs:

@@ -100,6 +100,13 @@ class Vector:
     __iadd__ = __isub__ = __imul__ = __itruediv__ = _whole
 
 
+def further(graph: Graph, name: str, offset: int, shape: tuple[int, ...]) -> Any:
+    """Return numbers that lie behind the parameters, as one symbol, shape (), or as a vector, (n,)."""
+    if not shape:
+        return graph.symbol("par", offset, flags=PAR)
+    return Vector(graph, name, "par", offset, *shape)
+
+
 def is_list(value: Any) -> bool:
     """Whether a function returned several numbers."""
     return isinstance(value, list | tuple | Vector)
@@ -208,6 +215,7 @@ def call(
     layout: Layout,
     what: str,
     second: str = "p",
+    more: Mapping[str, Callable[[], Any]] | None = None,
 ) -> Any:
     """Run a user's function on symbols, with the arguments that it names.
 
@@ -225,6 +233,8 @@ def call(
         What the function is, for messages: ``"H"``, ``"invariant 'L'"``.
     second : {"p", "v"}
         What the second half of the state is called: momenta, or velocities in a Lagrangian.
+    more : mapping of str to callable, optional
+        Further arguments, and what makes their symbols.
 
     Raises
     ------
@@ -245,6 +255,7 @@ def call(
         offered[second] = lambda: Vector(graph, second, "y", dof, dof)
         if second != "p":
             del offered["y"]
+    offered |= more or {}
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

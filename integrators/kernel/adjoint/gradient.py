@@ -109,8 +109,10 @@ class Adjoint:
             self._memory.slopes = compile_field(system, system.product("parameters"), c.lanes).address
 
     def begin(self, gradient: Array) -> None:
-        """Set the gradient with respect to the end."""
+        """Set the gradient with respect to the end; those with respect to the parameters go on adding up."""
         self.context.write(gradient)
+        self.context.error[:] = 0.0
+        self.context.length = 0.0
 
     def follow(self, records: Records) -> None:
         """Follow recorded steps, the last one first."""

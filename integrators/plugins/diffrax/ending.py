@@ -64,13 +64,13 @@ def end_state(
     program = method.compile(problem.system)
 
     def recorded(y0: Array, par: Array) -> Recorded:
-        return Recorded(program, problem, stop, y0=np.asarray(y0), par=np.asarray(par))
+        return Recorded(program, problem, [stop], y0=np.asarray(y0), par=np.asarray(par))
 
     def forward(y0: Array, par: Array) -> Array:
-        return recorded(y0, par).y
+        return recorded(y0, par).y[0]
 
     def backward(y0: Array, par: Array, gradient: Array) -> tuple[Array, Array]:
-        return recorded(y0, par).pulled_back(np.asarray(gradient), parameters=par.size > 0)
+        return recorded(y0, par).pulled_back(np.asarray(gradient)[np.newaxis], parameters=par.size > 0)
 
     shapes = [jax.ShapeDtypeStruct((size,), np.float64) for size in (problem.system.dim, problem.par.size)]
     call = partial(jax.pure_callback, vmap_method="sequential")

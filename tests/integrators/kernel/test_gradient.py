@@ -104,12 +104,54 @@ def test_they_are_what_tangent_vectors_say(name, method):
 def test_with_little_memory_steps_are_made_again_with_the_same_bits(method):
     problem = PROBLEMS[4]()
     program = method.compile(problem.system)
-    much = Recorded(program, problem, 30.0)
-    little = Recorded(program, problem, 30.0, memory=much.kept / 7)
+    much = Recorded(program, problem, [30.0])
+    little = Recorded(program, problem, [30.0], memory=much.kept / 7)
     assert much.steps == little.steps > 20
     assert 0 < little.kept <= much.kept / 7
-    ends = [each.pulled_back(np.ones(4), parameters=True) for each in (much, little)]
+    ends = [each.pulled_back(np.ones((1, 4)), parameters=True) for each in (much, little)]
     assert all(map(np.array_equal, *ends))
+
+
+@pytest.mark.parametrize(
+    "method",
+    [Gauss(s=4, h=0.11), HBVM(k=8, s=4, h=0.3), HBVM(), HBVM(tol=1e-6), Gauss(s=5, tol=1e-9)],
+    ids=repr,
+)
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_sum_over_samples_has_the_derivatives_of_the_samples(method, backwards):
+    problem, names = PROBLEMS[4](), ["y0", "t0", *NAMES[4][1:]]
+    times = np.sort(np.random.default_rng(1).uniform(0.0, 9.0, 40)) * (-1.0 if backwards else 1.0)
+    times = np.concatenate([[0.0], np.sort(times)[:: -1 if backwards else 1]])
+    data = np.random.default_rng(2).standard_normal((41, 2))
+
+    def misfit(y, par, data, t, m):
+        return (y[0] - data[0]) ** 2 + m.sin(y[1] * par.m + t) * data[1]
+
+    value, grads = gradient(problem, method, misfit, names, times=times, data=data)
+    made = integrate(problem, method, times, variations=names)
+    (a, b), m = made.y.T[:2], problem.system.parameters["m"]
+    assert value == pytest.approx(
+        np.sum((a - data[:, 0]) ** 2 + np.sin(b * m + times) * data[:, 1]), rel=1e-13
+    )
+    slopes = np.zeros_like(made.y)
+    slopes[:, 0], turn = 2.0 * (a - data[:, 0]), np.cos(b * m + times) * data[:, 1]
+    slopes[:, 1] = turn * m
+    wanted = np.einsum("id,idn->n", slopes, made.variations)
+    wanted[names.index("m") + 3 + 1] += np.sum(turn * b)  # y0 has four columns and k two
+    found = stacked(grads, names)
+    assert np.abs(found - wanted).max() < 1e-13 * np.abs(wanted).max()  # measured: 1.2e-15
+
+
+def test_samples_with_little_memory_and_single_numbers_as_data():
+    problem, times = PROBLEMS[4](), np.linspace(0.5, 30.0, 37)
+    for method in (Gauss(s=4, h=0.02), HBVM(tol=1e-12)):
+        options = {"times": times, "data": np.sin(times)}
+        much = gradient(problem, method, lambda y, data: (y[0] - data) ** 2, NAMES[4], **options)
+        little = gradient(
+            problem, method, lambda y, data: (y[0] - data) ** 2, NAMES[4], memory=4e4, **options
+        )
+        assert much[0] == little[0]
+        assert all(np.array_equal(much[1][name], little[1][name]) for name in NAMES[4])
 
 
 def test_backwards_in_time():
@@ -124,11 +166,11 @@ def test_backwards_in_time():
 def test_stiff_steps_that_newton_solves_have_them():
     problem = problems.load("stiff_chain")
     program = Gauss(s=3, h=0.1).compile(problem.system)
-    recorded = Recorded(program, problem, 1.05)
+    recorded = Recorded(program, problem, [1.05])
     assert "Newton" in recorded.solver
     dof, rng = problem.system.dof, np.random.default_rng(0)
     ends = rng.standard_normal((2, 2 * dof))
-    starts = [recorded.pulled_back(end, parameters=True)[0] for end in ends]
+    starts = [recorded.pulled_back(end[np.newaxis], parameters=True)[0] for end in ends]
     J = np.kron([[0, 1], [-1, 0]], np.eye(dof))
     size = np.linalg.norm(starts[0]) * np.linalg.norm(starts[1])
     assert (
@@ -159,6 +201,12 @@ def test_what_depends_on_the_parameters_and_the_time_alone():
         ({"loss": lambda y: y[0] > 1}, "loss"),
         ({"t_end": 1e300}, "h=0.1"),
         ({"memory": 0.0}, "memory"),
+        ({"data": [1.0]}, "data belong to samples"),
+        ({"times": [1.0]}, "leave out t_end=1.0"),
+        ({"times": [1.0, 0.5], "t_end": None}, "strictly monotone"),
+        ({"times": [1.0, 2.0], "data": [1.0], "t_end": None}, r"shape \(2,\) or \(2, n\)"),
+        ({"times": [1.0], "data": [np.nan], "t_end": None}, "finite numbers"),
+        ({"times": [1.0], "loss": lambda q, data: q[0] - data, "t_end": None}, "argument 'data'"),
     ],
 )
 def test_what_cannot_be_is_said(keywords, words):
