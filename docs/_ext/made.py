@@ -13,7 +13,7 @@ from hbvm_bench.measure.metrics import METRICS
 
 REPORT = re.compile(r"^## \[(.+)\]\((\S+)\)$")
 THUMBNAIL = re.compile(r'^<a href="[^"]*"><img src="([^"]*)".*$')
-PROBLEM = re.compile(r"^## (\w+)\n\n!\[([^]]*)\]\(problems/\w+\.svg\)\n\n([^\n]+)$", re.MULTILINE)
+PROBLEM = re.compile(r"^# (\w+)\n\n!\[([^]]*)\]\(\w+\.svg\)\n\n([^\n]+)$", re.MULTILINE)
 
 
 def commands() -> str:
@@ -62,12 +62,13 @@ def reports() -> str:
 
 
 def gallery() -> str:
-    """Return a card for each problem, with its picture and its first sentence, as `problems.md` has them."""
-    page = (Path(__file__).parents[1] / "problems.md").read_text(encoding="utf-8")
+    """Return a card for each problem, with its picture and the first sentence of its page."""
+    pages = sorted((Path(__file__).parents[1] / "problems").glob("*.md"))
     cards = [
-        f":::{{grid-item-card}} {name}\n:link: ../problems.html#{name.replace('_', '-')}\n:link-type: url\n"
+        f":::{{grid-item-card}} {name}\n:link: ../problems/{name}.html\n:link-type: url\n"
         f":img-top: ../problems/{name}.svg\n:img-alt: {alternative}\n\n{summary}\n:::"
-        for name, alternative, summary in PROBLEM.findall(page)
+        for page in pages
+        for name, alternative, summary in PROBLEM.findall(page.read_text(encoding="utf-8"))
     ]
     return "\n\n".join(["::::{grid} 1 2 3 3\n:gutter: 3", *cards, "::::", ""])
 

@@ -1,4 +1,4 @@
-"""What docs/problems.md and docs/engines.md say of every problem, from its own words, formulas and data."""
+"""The pages on problems and engines in docs, from the problems' own docstrings, formulas and data."""
 
 import inspect
 import re
@@ -23,7 +23,9 @@ BEGIN, END = "<!-- made by: hbvm-bench gallery docs -->", "<!-- end of what is m
 
 
 def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
-    """Write the pictures, and what is made of ``problems.md`` and ``engines.md``, into a directory.
+    """Write a page and a picture of each problem, and the generated parts of the overviews, into a directory.
+
+    These are ``problems/NAME.md``, ``problems/NAME.svg``, ``problems.md`` and ``engines.md``.
 
     Raises
     ------
@@ -33,8 +35,10 @@ def write(directory: Path, *, with_pictures: bool = True) -> list[Path]:
     entries = {name: registry.entry(name) for name in registry.built_in()}
     drawn = {name: entry.picture for name, entry in entries.items() if entry and entry.picture}
     names = [name for name, picture in drawn.items() if not picture.arguments]
-    pages = {"problems.md": [_gallery(names), _references()], "engines.md": [_engines(names)]}
+    loaded = {name: problems.load(name) for name in names}
+    pages = {"problems.md": [_overview(loaded), _references()], "engines.md": [_engines(names)]}
     made = {directory / name: _filled(directory / name, pieces).encode() for name, pieces in pages.items()}
+    made |= {directory / "problems" / f"{name}.md": _page(name, one).encode() for name, one in loaded.items()}
     for name in drawn if with_pictures else ():
         made[directory / "problems" / f"{name}.svg"] = pictures.draw(name).encode()
     write_all(made)
@@ -55,11 +59,6 @@ def _filled(path: Path, pieces: Sequence[str]) -> str:
     return kept[0] + "".join(piece + after for piece, after in zip(made, kept[1:], strict=True))
 
 
-def _gallery(names: Sequence[str]) -> str:
-    loaded = {name: problems.load(name) for name in names}
-    return _overview(loaded) + "".join(_section(name, problem) for name, problem in loaded.items())
-
-
 def _engines(names: Sequence[str]) -> str:
     table, reasons = findings.engines(names)
     listed = "\n".join(f"{i}. {reason}" for i, reason in enumerate(reasons, start=1))
@@ -75,30 +74,31 @@ def _overview(loaded: dict[str, Problem]) -> str:
         system = problem.system
         degree = structure.degree(system, problem.par)
         lines.append(
-            f"| [{name}](#{name}) | {system.dim} | {'yes' if system.separable else 'no'} | "
+            f"| [{name}](problems/{name}.md) | {system.dim} | {'yes' if system.separable else 'no'} | "
             f"{'no' if degree is None else f'degree {degree}'} | "
             f"{', '.join(system.invariants).replace('_', ' ')} | {problem.notes} |"
         )
-    return "\n".join(lines) + "\n\n"
+    contents = "\n".join(f"problems/{name}" for name in loaded)
+    return "\n".join([*lines, "", f"```{{toctree}}\n:hidden:\n\n{contents}\n```"])
 
 
-def _section(name: str, problem: Problem) -> str:
+def _page(name: str, problem: Problem) -> str:
     sections = _numpydoc(inspect.getdoc(registry.factory(name)) or "")
     summary = _flowed(sections.get("Summary", "")).removeprefix("Return ")
     arguments, returns = (_entries(sections.get(key, "")) for key in ("Parameters", "Returns"))
     guards = ", ".join(problem.system.guards).replace("_", " ")
     lines = [
-        f"## {name}\n",
-        f"![{problem.title}](problems/{name}.svg)\n",
+        f"# {name}\n",
+        f"![{problem.title}]({name}.svg)\n",
         f"{summary[:1].upper()}{summary[1:]}\n",
         f"$$H = {latex(problem.system)}$$\n",
         f"`{problem!r}`, t from {problem.t0:g} to {problem.t_end:g}.\n",
         *(f"- `{head}`: {body}" for head, body in arguments),
         *(f"- returns: {body}" for _, body in returns[:1]),
-        *([f"- stays exactly 0 by symmetry: {guards}"] if guards else []),
+        *([f"- exactly 0 by symmetry: {guards}"] if guards else []),
         *(f"- source: {source}" for source in problem.references),
     ]
-    return "\n".join(lines) + "\n\n"
+    return "\n".join(lines) + "\n"
 
 
 def _numpydoc(doc: str) -> dict[str, str]:

@@ -48,7 +48,7 @@ def kepler(
     e: Annotated[float, Must("an eccentricity, 0 <= e < 1", lambda e: 0 <= e < 1)] = 0.6,
     t_end: float = HUNDRED_REVOLUTIONS,
 ) -> Problem:
-    """Return Kepler's problem from the pericentre of an ellipse with half axis 1 and period 2 pi.
+    """Return Kepler's problem from the pericentre of an ellipse with semi-major axis 1 and period 2 pi.
 
     Tests the passage through pericentres, and phase error against an exact
     solution (`solution`).

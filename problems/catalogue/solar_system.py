@@ -27,7 +27,7 @@ MASS_RATIOS = (
     "22902.98",
     "19412.24",
 )
-# Half axis (au), eccentricity, inclination, mean longitude, longitudes of perihelion and node (degrees).
+# Semi-major axis (au), eccentricity, inclination, mean longitude, longitudes of perihelion and node (deg).
 ELEMENTS = (
     ("0.38709927", "0.20563593", "7.00497902", "252.25032350", "77.45779628", "48.33076593"),
     ("0.72333566", "0.00677672", "3.39467605", "181.97909950", "131.60246718", "76.67984255"),
