@@ -145,13 +145,13 @@ def build(
 
 
 def lower(function: Any, arguments: Sequence[tuple[Any, str]], returns: str = "void") -> str:
-    """Return what `build` makes machine code of, as LLVM's text: the same for all processors of a system."""
+    """Return what `build` makes machine code of as LLVM's text, simplified, the same for all processors."""
     with machine.alone():
-        return str(_linked(function, arguments, returns))
+        return str(machine.simplified(_linked(function, arguments, returns)))
 
 
 def build_lowered(text: str) -> bytes:
-    """Return the object file that `build` makes, of what `lower` has returned; without numba.
+    """Return an object file of what `lower` has returned, without numba; its results are those of `build`.
 
     Raises
     ------

@@ -1,13 +1,12 @@
 """The kernel's functions as LLVM's text, which is made where the package is built and lies beside it.
 
-To lower them takes numba two thirds of a first compilation, and what comes out is the same for all
-processors of a system: only what LLVM makes of it depends on the processor at hand. An archive is named by
-the system and by the version of LLVM that wrote it, for no other one promises to read it; a text in it by the
-key of its function, so that an edit of the sources has another one. Where there is none, numba lowers the
-function.
+To lower them takes numba two thirds of a first compilation, and what comes out, after LLVM's passes that
+depend on no processor, is the same for all processors of a system. An archive is named by the system and by
+the version of LLVM that wrote it, for no other one promises to read it; a text in it by the key of its
+function, so that an edit of the sources has another one. Where there is none, numba lowers the function.
 
-The texts have functions in common: 12 MB take 0.47 MB in one archive, 0.82 MB one by one, and 1.02 MB as
-bitcode. An archive is read up to the text that is asked for, 5 ms for each MB.
+The texts have functions in common: one archive of them takes 0.34 MB, and one for each text would take
+0.41 MB. An archive is read up to the text that is asked for, 5 ms for each MB.
 """
 
 import io

@@ -55,6 +55,20 @@ def optimized(module: Any, emit: Callable[[Any, Any], Made]) -> Made:
     return emit(machine, module)
 
 
+def simplified(module: Any) -> Any:
+    """Return a module after the passes that depend on no processor; none of them changes a number.
+
+    Vectors and unrolled loops are left to `optimized`, which knows the processor.
+    """
+    _initialize()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+    builder = llvm.create_pass_builder(target.create_target_machine(cpu="generic", opt=2), options)
+    builder.getModulePassManager().run(module, builder)
+    return module
+
+
 def object_file(machine: Any, module: Any) -> bytes:
     """Return a module as an object file."""
     return machine.emit_object(module)

@@ -1,14 +1,22 @@
 """LLVM's text of the kernel beside the package: the same machine code, or as if it were not there."""
 
+import ctypes
 import lzma
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import llvmlite.binding as llvm
 import pytest
+from numba import types
 
 from integrators.kernel.ahead import ENGINES
-from integrators.kernel.native import binary, lowered
+from integrators.kernel.native import binary, jit, lowered, machine
 
 ENGINE = ENGINES["ensembles"]  # the smallest
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
@@ -24,9 +32,31 @@ def file(text, tmp_path, monkeypatch):
     return file
 
 
-def test_it_becomes_the_same_object_file(text, file):
+def logistic(n):
+    x = 0.3
+    for _ in range(n):
+        x = 3.9 * x * (1.0 - x) + 1e-3 * math.sqrt(x) / (1.0 + x)
+        if x > 1.0:
+            x = x - 1.0
+    return int(x * 2**52)
+
+
+def test_its_machine_code_gives_the_same_bits():
+    """A chaotic map shows any sum that is rounded otherwise, as one fused with a product would be."""
+    signature = [(types.int64, "i64")], "i64"
+    for n in (0, 1, 7, 1000):
+        results = [
+            ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(machine.load(code))(n)
+            for code in (
+                binary.build(jit.compiled(logistic), *signature),
+                binary.build_lowered(binary.lower(jit.compiled(logistic), *signature)),
+            )
+        ]
+        assert results == [logistic(n)] * 2
+
+
+def test_what_lies_there_is_what_was_lowered(text, file):
     assert lowered.get(ENGINE.key) == text
-    assert binary.build_lowered(text) == binary.build(*ENGINE._compiled())
 
 
 def test_numba_is_asked_only_where_there_is_none(file, tmp_path, monkeypatch):
@@ -76,3 +106,27 @@ def test_that_of_other_sources_systems_and_later_versions_is_not_there(file, tex
     assert len(list(file.parent.iterdir())) == 1
     monkeypatch.setattr(llvm, "get_process_triple", lambda: "mips-unknown-linux-gnu")
     assert lowered.get(ENGINE.key) is None
+
+
+WAYS = """
+import sys
+from pathlib import Path
+import pytest
+from integrators.kernel import ahead
+from integrators.kernel.native import engine, lowered
+lowered.FOLDER = Path(sys.argv[1])
+ahead.lower()
+def by_numba(self):
+    raise AssertionError(f"{self.key} was not lowered")
+engine.Engine._compiled = by_numba
+options = ["-o", "addopts=", "-q", "-p", "no:cacheprovider", "-m", "portable"]
+sys.exit(pytest.main([*options, "tests/integrators/test_processors.py"]))
+"""
+
+
+@pytest.mark.slow
+def test_each_way_through_the_kernel_from_its_text(tmp_path):
+    environment = os.environ | {"HBVM_BENCH_CACHE": str(tmp_path / "cache")}
+    command = [sys.executable, "-c", WAYS, str(tmp_path / "lowered")]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
