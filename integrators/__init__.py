@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from integrators.peers.diffrax.methods import SemiImplicitEuler as SemiImplicitEuler
     from integrators.peers.diffrax.methods import Tsit5 as Tsit5
     from integrators.peers.heyoka.taylor import Taylor as Taylor
+    from integrators.peers.pyhamsys import Composition as Composition
     from integrators.peers.rebound import BS as BS
     from integrators.peers.rebound import EOS as EOS
     from integrators.peers.rebound import IAS15 as IAS15
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from integrators.peers.scipy import DOP853 as DOP853
     from integrators.peers.scipy import LSODA as LSODA
     from integrators.peers.scipy import Radau as Radau
+    from integrators.peers.sundials import CVODE as CVODE
     from integrators.plugins.rebound.convert import from_rebound as from_rebound
     from integrators.plugins.rebound.convert import to_rebound as to_rebound
     from integrators.running.poincare import section as section
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BDF",
     "BS",
+    "CVODE",
     "DOP853",
     "EOS",
     "HBVM",
@@ -65,6 +68,7 @@ __all__ = [
     "MERCURIUS",
     "SABA",
     "TRACE",
+    "Composition",
     "Dopri8",
     "Event",
     "Gauss",

@@ -26,6 +26,8 @@ BUILT_IN = {
     "integrators.peers.diffrax.methods": (
         "Dopri8", "Kvaerno5", "LeapfrogMidpoint", "ReversibleHeun", "SemiImplicitEuler", "Tsit5",
     ),
+    "integrators.peers.pyhamsys": ("Composition",),
+    "integrators.peers.sundials": ("CVODE",),
     "integrators.peers.scipy": ("BDF", "DOP853", "LSODA", "Radau"),
 }  # fmt: skip
 """Modules and the methods in them; written down here, because looking into a module would import it."""

@@ -7,7 +7,7 @@ import sys
 import pytest
 from hypothesis import settings
 
-from integrators.peers import ONLY_LINUX
+from integrators.peers import without_wheels
 from problems.errors import MissingLibraryError
 
 # What decides whether a change lands is the same every time; at home hypothesis goes on looking.
@@ -21,7 +21,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Libraries that have no wheels for this system; elsewhere the tests want every one of them.
 # WITHOUT="heyoka ..." hides more of them, as they are hidden there.
-ABSENT = {*([] if sys.platform == "linux" else ONLY_LINUX), *os.environ.get("WITHOUT", "").split()}
+ABSENT = {*without_wheels(), *os.environ.get("WITHOUT", "").split()}
 sys.modules.update(dict.fromkeys(ABSENT))
 
 

@@ -44,6 +44,8 @@ COMPUTES_WITH = {
     "hbvm-bench": ("numpy", "numba", "llvmlite"),
     "diffrax": ("diffrax", "jax", "jaxlib", "equinox", "lineax", "optimistix"),
     "scipy": ("scipy", "numpy", "numba"),
+    "scikit-sundae": ("scikit-sundae", "numpy", "numba"),
+    "pyhamsys": ("pyhamsys", "numpy", "numba"),
 }
 
 

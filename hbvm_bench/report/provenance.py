@@ -15,6 +15,8 @@ BUILT = {
     "diffrax": "compiled on this machine by XLA",
     "rebound": "generic wheel",
     "scipy": "generic wheel; vector field compiled on this machine by numba",
+    "scikit-sundae": "generic wheel; vector field and Jacobian compiled on this machine by numba",
+    "pyhamsys": "a loop in Python; maps compiled on this machine by numba",
 }
 
 

@@ -1,4 +1,6 @@
-"""Established integrators of other libraries behind the stepper protocol: heyoka, REBOUND, diffrax, SciPy.
+"""Established integrators of other libraries behind the stepper protocol.
+
+heyoka, REBOUND, diffrax, SciPy, SUNDIALS and pyhamsys.
 
 The modules are named after the libraries; each imports its library by `load`, only when a
 method is compiled, so importing a module here costs nothing and needs nothing installed.
@@ -6,6 +8,7 @@ method is compiled, so importing a module here costs nothing and needs nothing i
 
 import sys
 from importlib import import_module
+from platform import machine
 from types import ModuleType
 
 from problems.errors import MissingLibraryError
@@ -13,8 +16,17 @@ from problems.errors import MissingLibraryError
 UNTRACED = "it needs the field as a formula, not as a function; write it as a VectorField or Hamiltonian."
 """Why libraries that take expressions refuse a `problems.Foreign`."""
 
-ONLY_LINUX = ("heyoka",)
-"""Libraries without wheels for other systems, as the extra ``peers`` says too."""
+WHEELS = {"heyoka": "Linux only", "scikit-sundae": "x86-64 only, and for macOS"}
+"""Of libraries without wheels for some systems, for which there are some, as the extra ``peers`` says too."""
+
+
+def without_wheels() -> list[str]:
+    """Return the libraries that have no wheels for this system."""
+    there = {
+        "heyoka": sys.platform == "linux",
+        "scikit-sundae": sys.platform != "linux" or machine() == "x86_64",
+    }
+    return [library for library in WHEELS if not there[library]]
 
 
 def load(library: str, *modules: str) -> ModuleType:
@@ -35,8 +47,8 @@ def load(library: str, *modules: str) -> ModuleType:
     try:
         found = [import_module(name) for name in modules or (library,)]
     except ImportError as error:
-        if library in ONLY_LINUX and sys.platform != "linux":
-            fix = "it has wheels for Linux only; on this system it must be built from its sources."
+        if library in without_wheels():
+            fix = f"it has wheels for {WHEELS[library]}; on this system it must be built from its sources."
         else:
             fix = 'install the peers with pip install "hbvm-bench[peers]".'
         raise MissingLibraryError(f"{library} is not installed ({error}); {fix}") from error

@@ -157,9 +157,9 @@ CALLS = r"""
 registry.create('HBVN')                                      | unknown method 'HBVN'; did you mean 'HBVM'?
 registry.create('HBVM', kk=3)                                | unknown option of HBVM 'kk'; did you mean
 registry.create('Gauss')                                     | Gauss needs s; give a value as in
-registry.create(3)                                           | unknown method 3; known: BDF, BS, DOP853,
-registry.create(None)                                        | unknown method None; known: BDF, BS, DOP853,
-registry.get([1])                                            | unknown method [1]; known: BDF, BS, DOP853,
+registry.create(3)                                           | unknown method 3; known: BDF, BS, CVODE, Com
+registry.create(None)                                        | unknown method None; known: BDF, BS, CVODE, Com
+registry.get([1])                                            | unknown method [1]; known: BDF, BS, CVODE, Com
 Event(3)                                                     | an event needs a function g, not 3
 Event(None)                                                  | an event needs a function g, not None
 Event()                                                      | Event needs g; give a value as in

@@ -120,7 +120,7 @@ show nowhere --sort foo                                    | unknown metric 'foo
 show nowhere --json                                        | the directory 'nowhere' does not exist; make
 show a b                                                   | Got unexpected extra argument(s) (b)
 cite HBVN                                                  | unknown method 'HBVN'; did you mean 'HBVM'?
-cite ""                                                    | unknown method ''; known: BDF, BS, DOP853,
+cite ""                                                    | unknown method ''; known: BDF, BS, CVODE, Com
 reference                                                  | Missing argument 'problem'
 reference keplr                                            | unknown problem 'keplr'; did you mean 'kepler'?
 reference "kepler("                                        | cannot read 'kepler(': this is not one call

@@ -41,6 +41,8 @@ METHODS = {
     "Radau": ("#55606b", "#b4bfca", "H"),
     "BDF": ("#55606b", "#b4bfca", "d"),
     "LSODA": ("#55606b", "#b4bfca", "s"),
+    "CVODE": ("#55606b", "#b4bfca", "v"),
+    "Composition": ("#86720c", "#dcc44a", "P"),
     "Motion": ("#a8324a", "#ff8a9e", "8"),  # what is a property of the motion, not of a method
 }
 OTHERS = (("#a8324a", "#ff8a9e", "8"), ("#3d6b1f", "#a5d677", "8"), ("#7a4a1e", "#e0a46a", "8"))

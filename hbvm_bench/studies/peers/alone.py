@@ -301,6 +301,55 @@ def _scipy(system: System, method: Any) -> Begin:
     return begin
 
 
+def _sundae(system: System, method: Any) -> Begin:
+    """``CVODE(f, jacfn=..., rtol=..., atol=...).solve([t0, t_end], y0)`` with compiled functions."""
+    solver = load("scikit-sundae", "sksundae.cvode").CVODE
+    field, known = emit.numba(system, "field"), system.jacobian()
+    pattern: Any = cast(Any, known)
+    entries: Any = None if known is None else emit.numba(system, known)
+
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        def f(t: float, y: Array, out: Array) -> None:
+            field(t, y, par, out)
+
+        def jac(t: float, y: Array, slope: Array, matrix: Array) -> None:
+            del slope
+            values = np.empty(pattern.rows.size)
+            entries(t, y, par, values)
+            matrix[pattern.rows, pattern.columns] = values
+
+        options = {} if entries is None else {"jacfn": jac}
+        made = solver(
+            f, rtol=method.rtol, atol=method.atol, method=method.method, max_num_steps=2**31 - 1, **options
+        )
+        return Call(lambda t_end: made.solve([t0, t_end], y0), lambda found: (found.t.size - 1, found.y[-1]))
+
+    return begin
+
+
+def _pyhamsys(system: System, method: Any) -> Begin:
+    """``solve_ivp_symp(chi, chi_star, (t0, t_end), y0, t_eval=[t0, t_end], params=...)``, maps compiled."""
+    library = load("pyhamsys")
+    from integrators.peers.pyhamsys import maps
+
+    chi, adjoint = maps(system, method.type)
+
+    def begin(y0: Array, par: Array, t0: float) -> Call:
+        def go(t_end: float) -> Any:
+            return library.solve_ivp_symp(
+                lambda h, t, y: chi(h, t, y, par),
+                lambda h, t, y: adjoint(h, t, y, par),
+                (t0, t_end),
+                y0,
+                t_eval=[t0, t_end],
+                params=library.Parameters(step=1.0000001 * method.h, solver=method.type),  # it takes one more
+            )
+
+        return Call(go, lambda found: (round((found.t[-1] - t0) / found.step), found.y[:, -1]))
+
+    return begin
+
+
 def _alone(method: type[MethodBase]) -> type[MethodBase]:
     """Return a method of a library with the library's own calls in the place of our adapter."""
     script, program = SCRIPTS[method.library]
@@ -318,6 +367,8 @@ SCRIPTS: dict[str, tuple[Script, type[Program]]] = {
     "rebound": (_rebound, Program),
     "diffrax": (_diffrax, Program),
     "scipy": (_scipy, Program),
+    "scikit-sundae": (_sundae, Program),
+    "pyhamsys": (_pyhamsys, Program),
 }
 METHODS = {
     method.__name__: _alone(method)

@@ -35,6 +35,7 @@ FAMILIES: dict[str, Family] = {
         "WHFast512",
         "from the wheel, with AVX-512 instructions; on other processors it does not run",
     ),
+    "SABA": Family("REBOUND, SABA(10,6,4)", "SABA", WHEEL),
     "Leapfrog": Family("REBOUND, leapfrog", "leapfrog", WHEEL_AND_FORCES),
     "DOP853": Family(
         "SciPy, DOP853",

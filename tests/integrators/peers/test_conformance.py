@@ -11,6 +11,7 @@ from integrators.peers.diffrax.methods import (
     Tsit5,
 )
 from integrators.peers.heyoka.taylor import Taylor
+from integrators.peers.pyhamsys import Composition
 from integrators.peers.rebound import (
     BS,
     EOS,
@@ -24,6 +25,7 @@ from integrators.peers.rebound import (
     WHFast512,
 )
 from integrators.peers.scipy import BDF, DOP853, LSODA, Radau
+from integrators.peers.sundials import CVODE
 
 AVX512 = pytest.mark.skipif(not rebound.avx512_available, reason="this processor has no AVX-512")
 
@@ -59,6 +61,10 @@ CASES = [
     (Radau(rtol=1e-7, atol=1e-9), testing.pendulum),
     (BDF(rtol=1e-7, atol=1e-9), testing.pendulum),
     (LSODA(rtol=1e-9, atol=1e-11), testing.two_bodies),
+    (CVODE(rtol=1e-8, atol=1e-10), testing.pendulum),
+    (CVODE(rtol=1e-9, atol=1e-11, method="Adams"), testing.two_bodies),
+    (Composition(h=0.02), testing.two_bodies),
+    (Composition(h=0.05, type="RKN6a"), testing.pendulum),
 ]
 
 

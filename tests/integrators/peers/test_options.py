@@ -10,8 +10,10 @@ import integrators.testing as testing
 from integrators import registry
 from integrators.peers.diffrax.methods import Dopri8, LeapfrogMidpoint, ReversibleHeun, SemiImplicitEuler
 from integrators.peers.heyoka.taylor import Taylor
+from integrators.peers.pyhamsys import Composition
 from integrators.peers.rebound import IAS15, Leapfrog, WHFast
 from integrators.peers.scipy import DOP853, RTOL_FLOOR, Radau
+from integrators.peers.sundials import CVODE
 from problems import Bodies, Hamiltonian, Problem, VectorField
 from problems.errors import InputError, MissingLibraryError, UnknownNameError
 
@@ -26,6 +28,8 @@ METHODS = [
     Dopri8(h=0.1),
     DOP853(rtol=1e-9, atol=1e-9),
     Radau(rtol=1e-9, atol=1e-9),
+    CVODE(rtol=1e-9, atol=1e-9),
+    Composition(h=0.1),
 ]
 
 
@@ -104,11 +108,11 @@ def test_methods_say_in_a_sentence_what_they_cannot_integrate():
         WHFast(h=0.1, body_order=(0, 1, 2)).accepts(testing.two_bodies()) or ""
     )
     for problem in (not_separable(), first_order()):
-        for method in (IAS15(), Leapfrog(h=0.1), SemiImplicitEuler(h=0.1)):
+        for method in (IAS15(), Leapfrog(h=0.1), SemiImplicitEuler(h=0.1), Composition(h=0.1)):
             assert "separable" in (method.accepts(problem) or "")
             with pytest.raises(InputError, match="separable"):
                 method.compile(problem.system)
-        for method in (Taylor(), Dopri8(h=0.1), ReversibleHeun(h=0.1), LeapfrogMidpoint(h=0.1), METHODS[-1]):
+        for method in (Taylor(), Dopri8(h=0.1), ReversibleHeun(h=0.1), LeapfrogMidpoint(h=0.1), METHODS[-2]):
             assert method.accepts(problem) is None
 
 
@@ -163,6 +167,8 @@ def test_bodies_with_other_forces_than_gravity_are_refused():
         (Dopri8(h=0.1), "diffrax"),
         (SemiImplicitEuler(h=0.1), "jax"),
         (DOP853(rtol=1e-9, atol=1e-9), "scipy.integrate"),
+        (CVODE(rtol=1e-9, atol=1e-9), "sksundae.cvode"),
+        (Composition(h=0.1), "pyhamsys.pyhamsys"),
     ],
     ids=repr,
 )
@@ -177,6 +183,13 @@ def test_a_library_without_wheels_for_this_system_is_said_to_have_none(monkeypat
     monkeypatch.setattr(sys, "platform", "darwin")
     with pytest.raises(MissingLibraryError, match=r"heyoka is not installed.*wheels for Linux only"):
         Taylor().compile(testing.two_bodies().system)
+
+
+def test_a_linux_without_wheels_of_scikit_sundae_is_told_where_there_are_some(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sksundae.cvode", None)
+    monkeypatch.setattr("integrators.peers.machine", lambda: "aarch64")
+    with pytest.raises(MissingLibraryError, match=r"scikit-sundae is not installed.*wheels for x86-64 only"):
+        CVODE(rtol=1e-9, atol=1e-9).compile(testing.two_bodies().system)
 
 
 def test_importing_the_peers_imports_no_peer():

@@ -1,0 +1,262 @@
+"""SUNDIALS' CVODE through scikit-sundae, with compiled vector fields and Jacobians."""
+
+import warnings
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any, Literal
+
+import numpy as np
+
+from integrators.options import NotNegative, Share
+from integrators.peers import load
+from integrators.protocol import Array, MethodBase, Status, UserError
+from integrators.running.watchdog import Crawl, crawl
+from integrators.stepping import ProgramBase, StepperBase
+from problems.problem import System
+
+SUNDIALS = """\
+@article{HindmarshEtAl2005,
+  author = {Hindmarsh, Alan C. and Brown, Peter N. and Grant, Keith E. and Lee, Steven L. and Serban, Radu and
+            Shumaker, Dan E. and Woodward, Carol S.},
+  title = {{SUNDIALS}: suite of nonlinear and differential/algebraic equation solvers},
+  journal = {ACM Transactions on Mathematical Software},
+  volume = {31},
+  number = {3},
+  pages = {363--396},
+  year = {2005},
+  doi = {10.1145/1089014.1089020}
+}
+"""
+ENDLESS = 2**31 - 1  # steps of one call, which the watchdog ends instead
+DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CVODE(MethodBase):
+    """SUNDIALS' CVODE: multistep formulas of variable order and step size, with Newton iterations.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative tolerance of the local error, > 0.
+    atol : float
+        Absolute tolerance, >= 0.
+    method : {"BDF", "Adams"}
+        Backward differentiation formulas of order 1 to 5, for stiff systems; Adams' of order 1 to 12.
+
+    Notes
+    -----
+    The Jacobian is the traced system's own, sparse where it is large; finite differences where there is none.
+    It damps oscillations: no method for conserving energy. There are no checkpoints.
+
+    Examples
+    --------
+    >>> import problems
+    >>> from integrators import CVODE, integrate
+    >>> integrate(problems.load("pendulum"), CVODE(rtol=1e-8, atol=1e-10), [0.0, 10.0]).status
+    <Status.FINISHED: 'finished'>
+    """
+
+    rtol: Share
+    atol: NotNegative
+    method: Literal["BDF", "Adams"] = "BDF"
+
+    library = "scikit-sundae"
+    family = "multistep"
+    citation = SUNDIALS
+    to_end = "stop"
+
+    def compile(self, system: System) -> "CVODEProgram":
+        """Compile the vector field of ``system``, and its Jacobian."""
+        return CVODEProgram(system, self)
+
+
+class CVODEProgram(ProgramBase):
+    """A vector field and a Jacobian compiled for CVODE."""
+
+    def __init__(self, system: System, method: MethodBase):
+        super().__init__(system, method)
+        self._solver = load("scikit-sundae", "sksundae.cvode").CVODE
+        from problems import emit
+
+        started = perf_counter()
+        self.field = emit.numba(system, "field")
+        # The first call compiles for these types.
+        self.field(0.0, np.ones(system.dim), system.pack({}), np.empty(system.dim))
+        self.jacobian = system.jacobian()
+        if self.jacobian is not None:
+            self.entries = emit.numba(system, self.jacobian)
+            self.entries(0.0, np.ones(system.dim), system.pack({}), np.empty(self.jacobian.rows.size))
+        self.from_cache = None
+        self.compile_seconds = perf_counter() - started
+
+    def solver(self, par: Array) -> Any:
+        """Return CVODE for parameters, as its own documentation makes it."""
+        method, field = self.method, self.field
+
+        def right(t: float, y: Array, out: Array) -> None:
+            try:
+                field(t, y, par, out)
+            except Exception as error:
+                raise UserError(error) from error
+
+        options = {
+            "rtol": method.rtol,
+            "atol": method.atol,
+            "method": method.method,
+            "max_num_steps": ENDLESS,
+        }
+        with warnings.catch_warnings(action="ignore"):  # that a sparsity is not used for differences
+            return self._solver(right, **options, **self._jacobian(par))
+
+    def _jacobian(self, par: Array) -> dict[str, Any]:
+        found = self.jacobian
+        if found is None:
+            return {}
+        entries = self.entries
+        if found.size > DENSE and found.density < SPARSE:
+            from scipy.sparse import csc_matrix
+
+            numbers = csc_matrix(
+                (np.arange(1, found.rows.size + 1), (found.rows, found.columns)), (found.size, found.size)
+            )
+            order, values = np.asarray(numbers.data, dtype=np.int64) - 1, np.empty(found.rows.size)
+
+            def fill(t: float, y: Array, slope: Array, out: Array) -> None:
+                del slope
+                entries(t, y, par, values)
+                out[:] = values[order]
+
+            pattern = numbers.astype(bool).astype(float)
+            return {"jacfn": fill, "linsolver": "sparse", "sparsity": pattern}
+        rows, columns, few = found.rows, found.columns, np.empty(found.rows.size)
+
+        def whole(t: float, y: Array, slope: Array, out: Array) -> None:
+            del slope
+            entries(t, y, par, few)
+            out[rows, columns] = few
+
+        return {"jacfn": whole}
+
+    def stepper(self, y: Array, par: Array, t: float) -> "CVODEStepper":
+        """Return a trajectory."""
+        return CVODEStepper(self, y, par, t)
+
+
+class CVODEStepper(StepperBase):
+    """A trajectory of CVODE.
+
+    ``"partial"`` (default)
+        CVODE's own steps. A time between two of them is given by its polynomial, of the formula's order.
+    ``"steps"``
+        Its own steps, up to the last time.
+    ``"stop"``
+        The last step before each time is shortened onto it. From the start to one time it is one call of
+        scikit-sundae's ``solve``.
+    """
+
+    samplings = ("partial", "steps", "stop")
+
+    def __init__(self, program: CVODEProgram, y: Array, par: Array, t: float):
+        super().__init__(y, t)
+        self._program, self._par = program, par
+        self._solver = program.solver(par)
+        self._sign = self._evaluated = 0
+        self._tn, self._yn = t, y  # the last of its own steps, which may be ahead of the present
+
+    def _towards(self, end: float) -> float:
+        """Return the sign of the direction to ``end``, with a solver that goes that way."""
+        sign = 1 if end > self._t else -1
+        if self._sign != sign:
+            self._begin()
+            self._sign = sign
+        return float(sign)
+
+    def _begin(self) -> None:
+        self._tn, self._yn = self._t, self._y
+        self._evaluated = self._stats.evaluations or 0
+        self._solver.init_step(self._t, self._y)
+
+    def _serve(self, grid: Array, how: str) -> tuple[Array, Array]:
+        end = float(grid[-1])
+        if how == "stop" and grid.size == 1 and not self._sign:
+            return self._whole(end)
+        sign, watch = self._towards(end), crawl(self, self._tn, end)
+        states = np.empty((grid.size, self._y.size))
+        for i, t in enumerate(grid.tolist()):
+            while sign * (self._tn - t) < 0.0:
+                if not self._step(watch, t if how == "stop" else None):
+                    return grid[:i], states[:i]
+            states[i] = self._yn if self._tn == t else self._solver.step(t, "normal").y
+        return grid, states
+
+    def _whole(self, end: float) -> tuple[Array, Array]:
+        """Go from the start to one time, by the library's own loop."""
+        start = self._t
+        self._sign = 1 if end > start else -1
+        try:
+            found = self._solver.solve(np.array([start, end]), self._y)
+        except UserError as raised:
+            self._broken(raised, start)
+            return np.empty(0), np.empty((0, self._y.size))
+        self._note(found)
+        self._stats.steps += found.t.size - 1
+        self._tn, self._yn = float(found.t[-1]), found.y[-1]
+        if self._refused(found, self._tn):
+            return np.empty(0), np.empty((0, self._y.size))
+        return found.t[-1:], found.y[-1:]
+
+    def _step_states(self, end: float) -> tuple[Array, Array]:
+        sign, watch = self._towards(end), crawl(self, self._tn, end)
+        times, states = [self._t], [self._y]
+        while self._tn != times[-1] or self._step(watch):
+            if sign * (self._tn - end) > 0.0:
+                break
+            times.append(self._tn)
+            states.append(self._yn)
+        return np.array(times[1:]), np.array(states).reshape(len(times), -1)[1:]
+
+    def _one(self) -> tuple[float, Array] | None:
+        self._towards(self._t + (self._sign or 1) * self._far(self._t))
+        if self._tn == self._t and not self._step(Crawl(self._t, self._t)):
+            return None
+        return self._tn, self._yn
+
+    @staticmethod
+    def _far(t: float) -> float:
+        """Return how far CVODE is told to go: its first step depends on that, and must not on samples."""
+        return max(1.0, abs(t))
+
+    def _step(self, watch: Crawl, stop: float | None = None) -> bool:
+        """Take one step, not beyond ``stop``; return whether it succeeded."""
+        before = self._tn
+        end = before + self._sign * self._far(before) if stop is None else stop
+        try:
+            found = self._solver.step(end, "onestep", stop)
+            if found.t == before and found.success:  # it repeats a step after a time within it
+                found = self._solver.step(end, "onestep", stop)
+        except UserError as raised:
+            self._broken(raised, before)
+            return False
+        self._note(found)
+        if self._refused(found, before):
+            return False
+        self._stats.steps += 1
+        self._tn, self._yn = float(found.t), np.array(found.y, dtype=np.float64)
+        if stalled := watch.sees(self._tn):
+            self._fail(Status.STALLED, self._tn, stalled)
+        return not stalled
+
+    def _note(self, found: Any) -> None:
+        self._stats.evaluations = self._evaluated + int(found.nfev)
+        self._stats.extra["jacobians"] = int(found.njev)
+
+    def _refused(self, found: Any, t: float) -> bool:
+        if found.success:
+            return False
+        self._fail(Status.STEP_UNDERFLOW, t, f"CVODE gave up at t = {t!r}: {found.message}")
+        return True
+
+    def _broken(self, raised: UserError, t: float) -> None:
+        self.error = raised.error
+        self._fail(Status.USER_ERROR, t, f"{raised} in the step from t = {t!r}.")
