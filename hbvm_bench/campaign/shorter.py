@@ -68,7 +68,7 @@ def quick_run(campaign: Campaign) -> Campaign:
         ensembles=[replace(one, count=max(1, int(QUICK_SHARE * one.count))) for one in campaign.ensembles],
         quick=True,
     )
-    return with_rounds(short, QUICK_ROUNDS)
+    return with_rounds(short, min(campaign.timing.rounds, QUICK_ROUNDS))
 
 
 def _shortened(entry: ProblemEntry) -> ProblemEntry:

@@ -67,6 +67,7 @@ class Claims:
     """Claims in groups, each group with its title and the anchor of the section that it is of."""
 
     groups: Sequence[tuple[str, str, Sequence[Claim]]]
+    given: str = "paper"  # what the column of the publication is called
 
     @property
     def counts(self) -> dict[str, int]:

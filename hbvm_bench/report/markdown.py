@@ -75,7 +75,10 @@ def _claims(block: blocks.Claims, heading: str) -> str:
         rows = [
             (words(one.words), words(one.paper), words(one.here), VERDICTS[one.verdict]) for one in claims
         ]
-        parts += [f"{heading} {words(title)}", lined(("claim", "paper", "here", "verdict"), rows, range(4))]
+        parts += [
+            f"{heading} {words(title)}",
+            lined(("claim", block.given, "here", "verdict"), rows, range(4)),
+        ]
     return "\n\n".join(parts)
 
 

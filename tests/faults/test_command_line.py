@@ -153,6 +153,9 @@ endure -m "nosuch()" --quick                               | nosuch(): unknown m
 endure --quick --out /dev/null/x                           | cannot write to the directory '/dev/null/x
 endure --starts 1000000000 --quick --out /dev/null/x       | cannot write to the directory '/dev/null/x
 endure -m "Leapfrog(h=0.1)" -m "Leapfrog(h=0.1)" --quick --out /dev/null/x | is given twice
+chaos nosuch                                               | Got unexpected extra argument
+chaos --jobs 0                                             | Invalid value for '--jobs': Input should be
+chaos --out /dev/null/x                                    | cannot write to the directory
 paper nosuch                                               | Got unexpected extra argument
 paper --jobs 0                                             | Invalid value for '--jobs': Input should be
 paper --jobs a                                             | Invalid value for '--jobs': Input should be a

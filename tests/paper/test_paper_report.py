@@ -16,8 +16,9 @@ from hbvm_bench.report.figures.canvas import new, small
 from hbvm_bench.store.archive import NAME
 from hbvm_bench.store.files import write_json
 from hbvm_bench.store.store import Store
-from hbvm_bench.studies.paper import properties_part, report, results
-from hbvm_bench.studies.paper.drawn import number
+from hbvm_bench.studies import computations as results
+from hbvm_bench.studies.drawn import number
+from hbvm_bench.studies.paper import properties_part, report
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.departure import departure
 from hbvm_bench.studies.paper.henon_heiles_part import fates
@@ -79,12 +80,12 @@ def work(count: int) -> list[results.Task]:
 def ran(tasks, directory, jobs=1):
     """Run tasks and return what is kept, and what was said of those that ended, in order."""
     said: dict[str, str] = {}
-    kept = results.run_all(tasks, jobs, Store(directory), said.__setitem__)
+    kept = results.run_all("paper", tasks, jobs, Store(directory), said.__setitem__)
     return kept, said
 
 
 def stored(directory):
-    return results.load(Store(directory).beside())
+    return results.load("paper", Store(directory).beside())
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -136,7 +137,7 @@ def test_a_failure_is_tried_again(tmp_path):
 )
 def test_what_is_missing_or_damaged_is_told(beside, says):
     with pytest.raises(InputError, match=says):
-        results.load(beside)
+        results.load("paper", beside)
 
 
 @dataclass(frozen=True)

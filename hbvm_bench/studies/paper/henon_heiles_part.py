@@ -14,11 +14,11 @@ from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, power_label, say
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER
-from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
+from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, legend_above, number
 from hbvm_bench.studies.paper.experiments import henon_heiles as experiment
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments.henon_heiles import GAP, GAPS, NEIGHBOURS, T_END, H, Orbit, StepRow
-from hbvm_bench.studies.paper.results import Part, Results, Task, each, split
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array
 from problems.catalogue.henon_heiles import ESCAPE, SADDLES

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
+from hbvm_bench.studies.computations import Part, Results, Task, each
+from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, legend_above, number
 from hbvm_bench.studies.paper.experiments import others
 from hbvm_bench.studies.paper.experiments import period_annulus as experiment
 from hbvm_bench.studies.paper.experiments.period_annulus import (
@@ -22,7 +23,6 @@ from hbvm_bench.studies.paper.experiments.period_annulus import (
     Path,
     energy,
 )
-from hbvm_bench.studies.paper.results import Part, Results, Task, each
 from hbvm_bench.summaries.table import Table
 from integrators.methods.gauss import Gauss
 from integrators.methods.hbvm import HBVM

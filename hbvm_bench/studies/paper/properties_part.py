@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, number
+from hbvm_bench.studies.computations import Part, Results, Task
+from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, number
 from hbvm_bench.studies.paper.experiments import properties
 from hbvm_bench.studies.paper.experiments.properties import PAIRS, Order, Row
-from hbvm_bench.studies.paper.results import Part, Results, Task
 from hbvm_bench.summaries.table import Table
 
 PROBLEM = "The theory's statements, each measured on the paper's own polynomial problems."

@@ -1,15 +1,24 @@
 """The page on the original paper's experiments, from kept results alone: claim, paper, here."""
 
 from collections.abc import Callable
-from functools import partial
 
-from hbvm_bench.report.document import Block, Claims, Section, attempt
+from hbvm_bench.report.document import Section
 from hbvm_bench.report.page import Results as Run
 from hbvm_bench.report.page import block
 from hbvm_bench.store.store import Store
+from hbvm_bench.studies.computations import (
+    Part,
+    Results,
+    Task,
+    claims_of,
+    load,
+    run_all,
+    sections_of,
+    telling,
+)
 from hbvm_bench.studies.paper import henon_heiles_part, period_annulus_part, properties_part, sitnikov_part
-from hbvm_bench.studies.paper.results import Part, Results, Task, load, run_all
 
+NAME = "paper"
 PARTS = (sitnikov_part.PART, henon_heiles_part.PART, period_annulus_part.PART, properties_part.PART)
 
 
@@ -20,14 +29,8 @@ def tasks() -> list[Task]:
 
 def compute(store: Store, jobs: int, tell: Callable[[str], None]) -> None:
     """Compute what is missing beside the cases of a run."""
-    missing, ended = tasks(), 0
-
-    def done(key: str, said: str) -> None:
-        nonlocal ended
-        ended += 1
-        tell(f"  computation {ended} of at most {len(missing)}, {key}: {said}")
-
-    run_all(missing, jobs, store, done)
+    missing = tasks()
+    run_all(NAME, missing, jobs, store, telling(tell, len(missing)))
 
 
 COMPUTATIONS = {"compute": compute}
@@ -36,27 +39,15 @@ COMPUTATIONS = {"compute": compute}
 @block
 def claims(run: Run) -> Section:
     """Return every claim with what the paper gives and what came out."""
-
-    def of(part: Part, results: Results) -> Claims:
-        return Claims([(part.title, part.key, part.claims(results))])
-
-    made = attempt(
-        *((f"the claims of {part.title}", partial(of, part, found)) for part, found in _parts(run))
-    )
-    groups = [group for one in made if isinstance(one, Claims) for group in one.groups]
-    failed: list[Block] = [one for one in made if not isinstance(one, Claims)]
-    return Section("Claim, paper, here", [Claims(groups), *failed], "all-claims", nav="Claims")
+    return claims_of(_parts(run), "Claim, paper, here", "Claims")
 
 
 @block
 def experiments(run: Run) -> list[Section]:
     """Return the section of each experiment."""
-    return [
-        Section(part.title, attempt(*part.blocks(found)), part.key, nav=part.title)
-        for part, found in _parts(run)
-    ]
+    return sections_of(_parts(run))
 
 
 def _parts(run: Run) -> list[tuple[Part, Results]]:
-    kept, records = load(run.beside), {record.case.method: record for record in run.records}
+    kept, records = load(NAME, run.beside), {record.case.method: record for record in run.records}
     return [(part, Results(part, kept, records)) for part in PARTS]

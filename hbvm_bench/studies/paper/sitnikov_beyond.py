@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import log_axis, say
 from hbvm_bench.report.figures.style import INK, MUTED, PAPER, TRUTH
-from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn, heat, number
+from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn, heat, number
 from hbvm_bench.studies.paper.experiments import axis_motion
 from hbvm_bench.studies.paper.experiments.axis_motion import START, Growth
 from hbvm_bench.studies.paper.experiments.sitnikov import DEGREE, T_END, E, StepRow

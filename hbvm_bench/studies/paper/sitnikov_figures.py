@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from hbvm_bench.report.figures.canvas import log_axis
 from hbvm_bench.report.figures.over_time import envelope
 from hbvm_bench.report.figures.style import INK, MUTED, TRUTH
-from hbvm_bench.studies.paper.drawn import COLOURS, WIDTH, Said, drawn
+from hbvm_bench.studies.drawn import COLOURS, WIDTH, Said, drawn
 from hbvm_bench.studies.paper.experiments.sitnikov import LOST, REVOLUTIONS, T_END, D, E, H, Orbit
 from integrators.protocol import Array
 

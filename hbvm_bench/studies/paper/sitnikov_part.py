@@ -8,13 +8,13 @@ import numpy as np
 
 from hbvm_bench.report.document import Claim, Maker
 from hbvm_bench.store.records import Record, Value
+from hbvm_bench.studies.computations import Part, Results, Task, each, split
+from hbvm_bench.studies.drawn import number
 from hbvm_bench.studies.paper import sitnikov_beyond as beyond
 from hbvm_bench.studies.paper import sitnikov_figures as figures
-from hbvm_bench.studies.paper.drawn import number
 from hbvm_bench.studies.paper.experiments import axis_motion, others, sitnikov
 from hbvm_bench.studies.paper.experiments.axis_motion import Growth
 from hbvm_bench.studies.paper.experiments.sitnikov import Orbit, StepRow
-from hbvm_bench.studies.paper.results import Part, Results, Task, each, split
 from hbvm_bench.summaries.rows import group_of, status_of
 from hbvm_bench.summaries.table import Table
 from integrators.protocol import Array

@@ -1,4 +1,4 @@
-"""The computations behind the page on the paper: run side by side, kept beside the cases, and read again.
+"""The computations behind the page of a study: run side by side, kept beside the cases, and read again.
 
 They are what no integration of a campaign is: bisections, maps of many starts, sections, orders. What one
 returns is kept as MessagePack, in which not-a-number and every bit of a double survive; the type that its
@@ -6,6 +6,7 @@ function is annotated with says how it is read again.
 """
 
 import functools
+import itertools
 import re
 import time
 import traceback
@@ -13,7 +14,7 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import as_completed
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -21,7 +22,7 @@ import msgspec
 import numpy as np
 
 from hbvm_bench.campaign.identity import digest_of
-from hbvm_bench.report.document import Claim, Maker
+from hbvm_bench.report.document import Block, Claim, Claims, Maker, Section, attempt
 from hbvm_bench.run import executors
 from hbvm_bench.store.files import write_json
 from hbvm_bench.store.records import Record
@@ -29,7 +30,6 @@ from hbvm_bench.store.store import Store
 from problems.errors import InputError
 
 POOL = "concurrent.futures:ProcessPoolExecutor"
-NAME = "paper"  # of what a store keeps beside its cases
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ class Task:
     key: str  # under which its result is found
     run: Callable[[], Any]
     cost: float = 1.0  # rough seconds, so that the long ones start first
+    timed: bool = False  # whether it takes times, so that nothing may run beside it
 
 
 def each(key: str, run: Callable[..., Any], values: Iterable[Any], cost: float) -> list[Task]:
@@ -54,18 +55,18 @@ def split(key: str, run: Callable[..., Any], values: Sequence[float], parts: int
 
 @dataclass(frozen=True)
 class Part:
-    """One of the paper's experiments, with its name on the command line and its heading."""
+    """One of the experiments of a study, with its name in the store and its heading."""
 
     key: str
     title: str
     runs: Sequence[Task]
-    claims: Callable[["Results"], list[Claim]]  # what the paper says and what came out
+    claims: Callable[["Results"], list[Claim]]  # what a publication says and what came out
     blocks: Callable[["Results"], list[Maker]]  # what makes each block that is shown
 
     @property
     def tasks(self) -> list[Task]:
         """The computations under the names by which they are kept: those of all parts lie side by side."""
-        return [Task(f"{self.key}/{task.key}", task.run, task.cost) for task in self.runs]
+        return [replace(task, key=f"{self.key}/{task.key}") for task in self.runs]
 
 
 class Kept(msgspec.Struct, frozen=True):
@@ -105,16 +106,53 @@ class Results:
         return unpacked(self.kept.results[key], self.tasks[key].run)
 
 
-def run_all(tasks: Sequence[Task], jobs: int, store: Store, done: Callable[[str, str], None]) -> Kept:
+def claims_of(found: Sequence[tuple[Part, "Results"]], title: str, nav: str, given: str = "paper") -> Section:
+    """Return every claim of the parts with what was published, called ``given``, and what came out."""
+
+    def of(part: Part, results: Results) -> Claims:
+        return Claims([(part.title, part.key, part.claims(results))])
+
+    makers = [
+        (f"the claims of {part.title}", functools.partial(of, part, results)) for part, results in found
+    ]
+    made = attempt(*makers)
+    groups = [group for one in made if isinstance(one, Claims) for group in one.groups if group[2]]
+    failed: list[Block] = [one for one in made if not isinstance(one, Claims)]
+    return Section(title, [Claims(groups, given), *failed], "all-claims", nav=nav)
+
+
+def sections_of(found: Sequence[tuple[Part, "Results"]]) -> list[Section]:
+    """Return the section of each part."""
+    return [
+        Section(part.title, attempt(*part.blocks(results)), part.key, nav=part.title)
+        for part, results in found
+    ]
+
+
+def telling(tell: Callable[[str], None], count: int) -> Callable[[str, str], None]:
+    """Return a function that says which of so many computations has ended, as `run_all` calls it."""
+    ended = itertools.count(1)
+    return lambda key, said: tell(f"  computation {next(ended)} of at most {count}, {key}: {said}")
+
+
+def run_all(
+    name: str,
+    tasks: Sequence[Task],
+    jobs: int,
+    store: Store,
+    done: Callable[[str, str], None],
+    variant: str = "",
+) -> Kept:
     """Run tasks in so many processes, or here; keep each result at once, so that an end loses no other.
 
-    Those that this code has computed for the store are not run again. ``done`` is called with the key of each
-    task that has ended and what to say of it.
+    Those that this code has computed for the store, in the same variant, are not run again. ``name`` is that
+    of what the store keeps, and ``done`` is called with the key of each task that has ended and what to say
+    of it.
     """
-    code = digest_of(tuple({function_of(task.run).__module__ for task in tasks}))
+    code = digest_of(tuple({function_of(task.run).__module__ for task in tasks})) + variant
     kept = Kept({}, {}, code)
     with suppress(InputError):
-        before = load(store.beside())
+        before = load(name, store.beside())
         kept = Kept(before.results, {}, code) if before.code == code else kept
     left = sorted((task for task in tasks if task.key not in kept.results), key=lambda task: -task.cost)
     for key, data, why, seconds in _outcomes(left, jobs):
@@ -122,16 +160,22 @@ def run_all(tasks: Sequence[Task], jobs: int, store: Store, done: Callable[[str,
             kept.failed[key] = why
         else:
             kept.results[key] = data
-        write_json(store.directory / f"{NAME}.json", kept)
+        write_json(store.directory / f"{name}.json", kept)
         done(key, why or f"{seconds:.1f} s")
     return kept
 
 
 def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, str, float]]:
     """Yield key, packed result, why there is none, and seconds, as they come."""
-    if jobs == 1:
-        for task in tasks:
+    together = [task for task in tasks if not task.timed] if jobs > 1 else []
+    yield from _side_by_side(together, jobs)
+    for task in tasks:
+        if task not in together:
             yield (task.key, *_outcome(task.run))
+
+
+def _side_by_side(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, str, float]]:
+    if not tasks:
         return
     with executors.opened(POOL, jobs) as pool:
         futures = {pool.executor.submit(_outcome, task.run): task.key for task in tasks}
@@ -142,20 +186,20 @@ def _outcomes(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[str, bytes, st
                 yield futures[future], b"", f"ended with {type(error).__name__}: {error}", 0.0
 
 
-def load(beside: Mapping[str, object]) -> Kept:
-    """Return what a store or an archive keeps beside its cases.
+def load(name: str, beside: Mapping[str, object]) -> Kept:
+    """Return what a store or an archive keeps of a study beside its cases.
 
     Raises
     ------
     problems.errors.InputError
         If there is nothing, or something else.
     """
-    if NAME not in beside:
-        raise InputError("the paper's computations were not run; run hbvm-bench paper first.")
+    if name not in beside:
+        raise InputError(f"the computations of {name} were not run; run hbvm-bench {name} first.")
     try:
-        return msgspec.convert(beside[NAME], Kept)
+        return msgspec.convert(beside[name], Kept)
     except msgspec.ValidationError as error:
-        raise InputError(f"what is kept of the paper's computations is damaged: {error}.") from None
+        raise InputError(f"what is kept of the computations of {name} is damaged: {error}.") from None
 
 
 def packed(value: Any) -> bytes:

@@ -1,4 +1,4 @@
-"""What all figures on the paper share: colours, sizes, what their sheets have in common."""
+"""What the figures of studies share: colours, sizes, what their sheets have in common."""
 
 from collections.abc import Callable, Sequence
 from functools import wraps

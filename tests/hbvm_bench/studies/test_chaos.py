@@ -1,0 +1,118 @@
+"""The study of chaos: its systems, what it says of published values, and its page."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from msgspec.structs import replace as with_fields
+
+from hbvm_bench.campaign.file import load
+from hbvm_bench.campaign.shorter import quick_run
+from hbvm_bench.cli import main
+from hbvm_bench.studies.chaos import exponents, maps, orbits, report
+from hbvm_bench.studies.chaos.systems import SKIP, SYSTEMS
+from integrators import lyapunov
+from problems import emit
+
+
+@pytest.mark.parametrize("name", [name for name, one in SYSTEMS.items() if one.divergence is not None])
+def test_the_divergence_is_the_trace_of_the_jacobian(name):
+    problem = SYSTEMS[name].problem()
+    field = emit.numpy(problem.system, "field")
+    rng = np.random.default_rng(3)
+    step = 1e-6
+    for y in problem.y0 + rng.uniform(-0.5, 0.5, (3, problem.system.dim)):
+        trace = 0.0
+        for i, unit in enumerate(np.eye(problem.system.dim)):
+            ahead, behind = (np.array(field(0.7, y + sign * step * unit, problem.par)) for sign in (1, -1))
+            trace += (ahead - behind)[i] / (2 * step)
+        assert trace == pytest.approx(SYSTEMS[name].divergence, abs=1e-7)  # measured at most 3e-9
+
+
+def test_heyoka_and_we_have_the_same_sum_of_exponents():
+    """Thomas's exponents are small, so rounding has not parted the trajectories at this end."""
+    problem = SYSTEMS["thomas"].problem(0.003)
+    theirs = exponents.Variational(problem).run()
+    ours = lyapunov(problem, exponents.METHOD, skip=SKIP)
+    assert theirs.sum() == pytest.approx(ours.sum, abs=1e-11)
+    assert ours.sum == pytest.approx(-0.54, abs=1e-11)
+    assert theirs.shape == ours.exponents.shape
+
+
+def made_up(name, largest, heyoka, total):
+    dim = SYSTEMS[name].problem().system.dim
+    values = np.zeros(dim)
+    values[0] = largest
+    return exponents.Measured(
+        exponents=values,
+        intervals=np.stack([values - 0.01, values + 0.01], axis=1),
+        sum=total,
+        time=1000.0,
+        heyoka=np.full(dim, heyoka),
+        seconds=[1.0],
+        heyoka_seconds=[0.5],
+        others=0.0,
+        stolen=0.0,
+    )
+
+
+def decided(name, index, here):
+    known = SYSTEMS[name]
+    return report._decided(known, known.published[index], here)
+
+
+def test_a_published_spectrum_that_breaks_an_exact_law_is_told():
+    rusyn = decided("rucklidge", 1, made_up("rucklidge", 0.3, 0.305, -3.0))
+    assert "add up to -3.0016" in rusyn
+    assert "heyoka's value is 0.3050, inside our interval" in rusyn
+    pairs = decided("henon_heiles", 0, made_up("henon_heiles", 0.0, 0.0, 0.0))
+    assert "the published ones add up to 0.0270 and are no pairs" in pairs
+
+
+def test_a_published_spectrum_with_the_exact_sum_is_not_called_wrong():
+    sprott = decided("rucklidge", 0, made_up("rucklidge", 0.19, 0.5, -3.0))
+    assert "the sum does not decide" in sprott
+    assert "outside our interval" in sprott
+
+
+def test_times_on_a_busy_machine_are_not_judged():
+    quiet = made_up("lorenz", 0.9, 0.9, -41 / 3)
+    (row,) = report._times({"lorenz": quiet}).rows
+    assert "not judged" not in " ".join(row)
+    made = report._times({"lorenz": replace(quiet, others=0.5)})
+    assert " ".join(made.rows[0]).count("(not judged)") == 2
+    assert "at most 50%" in made.note
+
+
+def test_maps_tell_regular_from_chaotic_starts():
+    (row,) = maps.henon_heiles_section([0.0], [-0.26, 0.13, 0.99], 1 / 8, 500.0)
+    assert row[0] > report.figures.CHAOTIC  # measured 7.2
+    assert row[1] == pytest.approx(2.0, abs=0.3)  # measured 1.78
+    assert np.isnan(row[2])
+    (gone,) = maps.sitnikov([0.5], [0.5, 1.3], 10)
+    assert gone[0] == pytest.approx(2.0, abs=0.5)
+    assert np.isnan(gone[1])
+
+
+def test_a_quick_run_computes_and_draws_everything(tmp_path, monkeypatch):
+    few = {name: SYSTEMS[name] for name in ("thomas", "henon_heiles")}
+    for module in (report, report.figures):
+        monkeypatch.setattr(module, "SYSTEMS", few)
+    monkeypatch.setattr(orbits, "PLANETS", {"regular": orbits.PLANETS["regular"]})
+    campaign = load("chaos")
+    one = with_fields(campaign.methods[0], use=["Gauss(s=8, h=0.5)"])
+    monkeypatch.setattr(
+        "hbvm_bench.commands.paper.load", lambda name: with_fields(campaign, name=name, methods=[one])
+    )
+    assert main(["chaos", "--quick", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    assert "Thomas, b = 0.18: the largest exponent" in text
+    assert "| regular: a = 7, e = 0.05 | REBOUND, WHFast |" in text
+    drawn = (tmp_path / "report" / "index.html").read_text(encoding="utf-8")
+    for key in ("values", "megno", "sitnikov", "sections", "asteroids"):
+        assert f'id="chaos-{key}' in drawn
+
+
+def test_a_quick_run_of_a_campaign_without_times_takes_none():
+    assert quick_run(load("chaos")).timing.rounds == 0
+    assert quick_run(load("sitnikov")).timing.rounds > 0
