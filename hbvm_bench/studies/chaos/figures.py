@@ -128,8 +128,8 @@ def sections(
     _bar(figure, list(panels), meshes[-1])
     return (
         f"MEGNO of orbits that start with p₁ > 0, at t = {t_end:g}, by `{maps.HENON_HEILES!r}`, which "
-        "conserves this energy: none escapes at H = 1/6 either. The higher the energy, the more of the "
-        "section is chaotic; islands remain around stable periodic orbits.",
+        "conserves this energy, so that none can escape, not even at H = 1/6. The higher the energy, the "
+        "more of the section is chaotic; islands remain around stable periodic orbits.",
         " ".join(said),
     )
 

@@ -130,7 +130,6 @@ class Planets:
     """One planetary system, and what else the machine did meanwhile, as shares of one core's time."""
 
     rows: list[Row]
-    time: float  # over which it was followed
     others: float
     stolen: float
 
@@ -169,7 +168,7 @@ def planets(name: str, share: float = 1.0, samples: int = SAMPLES) -> Planets:
         else:
             indicator, exponent = made
             rows.append(Row(key, indicator, exponent, None, None, taken))
-    return Planets(rows, t_end, load.others if load else 0.0, load.stolen if load else 0.0)
+    return Planets(rows, load.others if load else 0.0, load.stolen if load else 0.0)
 
 
 def _simulation(axis: float, eccentricity: float) -> Any:

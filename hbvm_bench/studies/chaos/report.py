@@ -105,7 +105,13 @@ def parts(*, quick: bool) -> list[Part]:
         Task("curves", partial(orbits.curves, size.share)),
     ]
     return [
-        Part("exponents", "Lyapunov exponents of known systems", timed, _exponent_claims, _exponent_blocks),
+        Part(
+            "exponents",
+            "Lyapunov exponents of known systems",
+            timed,
+            _exponent_claims,
+            partial(_exponent_blocks, size.share),
+        ),
         Part("indicators", "What must hold exactly", checks, _exact_claims, _curve_blocks),
         Part(
             "sitnikov",
@@ -281,11 +287,14 @@ def _exact_claims(found: Results) -> list[Claim]:
     ]
 
 
-def _exponent_blocks(found: Results) -> list[Maker]:
+def _exponent_blocks(share: float, found: Results) -> list[Maker]:
+    def planets() -> Table:
+        return _planets({name: found[f"planets {name}"] for name in orbits.PLANETS}, share)
+
     return [
         ("the values", lambda: figures.values(_measured(found))),
         ("the times", lambda: _times(_measured(found))),
-        ("the planets", lambda: _planets({name: found[f"planets {name}"] for name in orbits.PLANETS})),
+        ("the planets", planets),
         ("how", lambda: Note(HOW)),
         ("the sources", lambda: Items([f"{key}: {text}" for key, text in SOURCES.items()])),
     ]
@@ -351,13 +360,14 @@ def _times(measured: dict[str, exponents.Measured]) -> Table:
     )
 
 
-def _planets(found: dict[str, orbits.Planets]) -> Table:
+def _planets(found: dict[str, orbits.Planets], share: float) -> Table:
+    t_end = share * orbits.REVOLUTIONS * orbits.PERIOD
     rows = [
         (
             f"{name}: a = {orbits.PLANETS[name][0]:g}, e = {orbits.PLANETS[name][1]:g}",
             row.method,
             f"{row.megno:.4g}",
-            number(2.0 * row.megno / system.time),
+            number(2.0 * row.megno / t_end),
             number(row.exponent)
             if row.low is None or row.high is None
             else f"{number(row.exponent)} [{number(row.low)}, {number(row.high)}]",
@@ -370,9 +380,9 @@ def _planets(found: dict[str, orbits.Planets]) -> Table:
         "Sun, Jupiter and Saturn, beside REBOUND's MEGNO",
         ("Saturn", "method", "MEGNO", "2 MEGNO/t", "exponent", "time"),
         rows,
-        f"Over {orbits.REVOLUTIONS} revolutions of Jupiter, from the same initial doubles, with Saturn's "
-        "semi-major axis a and eccentricity e. REBOUND integrates variational equations of gravitating "
-        "bodies only, so it takes no part above; its `lyapunov()` is a slope without an interval, and "
+        f"Over {share * orbits.REVOLUTIONS:g} revolutions of Jupiter, from the same initial doubles, with "
+        "Saturn's semi-major axis a and eccentricity e. REBOUND integrates variational equations of "
+        "gravitating bodies only, so it takes no part above; its `lyapunov()` is a slope without an interval, and "
         "its MEGNO excludes safe_mode=0 of WHFast. Where motion is chaotic, 2 MEGNO/t tends to the exponent. "
         "Each library has a tangent vector of its own, and chaotic trajectories of different methods diverge."
         + _busy([max(system.others, system.stolen) for system in found.values()]),
