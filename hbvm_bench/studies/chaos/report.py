@@ -382,10 +382,10 @@ def _planets(found: dict[str, orbits.Planets], share: float) -> Table:
         rows,
         f"Over {share * orbits.REVOLUTIONS:g} revolutions of Jupiter, from the same initial doubles, with "
         "Saturn's semi-major axis a and eccentricity e. REBOUND integrates variational equations of "
-        "gravitating bodies only, so it takes no part above; its `lyapunov()` is a slope without an interval, and "
-        "its MEGNO excludes safe_mode=0 of WHFast. Where motion is chaotic, 2 MEGNO/t tends to the exponent. "
-        "Each library has a tangent vector of its own, and chaotic trajectories of different methods diverge."
-        + _busy([max(system.others, system.stolen) for system in found.values()]),
+        "gravitating bodies only, so it takes no part above; its `lyapunov()` is a slope without an "
+        "interval, and its MEGNO excludes safe_mode=0 of WHFast. Where motion is chaotic, 2 MEGNO/t tends to "
+        "the exponent. Each library has a tangent vector of its own, and chaotic trajectories of different "
+        "methods diverge." + _busy([max(system.others, system.stolen) for system in found.values()]),
         words=(0, 1),
         key="exponents-planets",
     )
