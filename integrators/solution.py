@@ -575,8 +575,7 @@ def from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], prob
         events={name: occurrences(name, arrays, dim) for name in words["events"]},
         variations=_variations(arrays, n, dim),
         directions=_directions(arrays, dim, problem.par.size),
-        low=doubles(arrays["low"], (n, dim), "low") if "low" in arrays else None,
-        start=doubles(arrays["start"], (dim, 2), "start") if "start" in arrays else None,
+        **_digits(arrays, n, dim),
         error=None if words["error"] is None else RuntimeError(": ".join(words["error"])),
         reason=of_type(str, words["reason"]),
         t_stop=of_type(float, words["t_stop"]),
@@ -627,6 +626,18 @@ def occurrences(name: str, arrays: Mapping[str, NDArray[Any]], dim: int) -> Occu
         doubles(t, (n,), "t"), doubles(y, (n, dim), "y"), direction.astype(np.int64),
         None if after is None else doubles(after, (n, dim), "after"),
     )  # fmt: skip
+
+
+def _digits(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> dict[str, Array]:
+    """Return the low parts of states and the start in pairs, which a file has both or none of."""
+    if "low" not in arrays and "start" not in arrays:
+        return {}
+    if "variations" in arrays or "directions_state" in arrays:
+        raise TypeError("low parts and variations do not go together")
+    return {
+        "low": doubles(arrays["low"], (n, dim), "low"),
+        "start": doubles(arrays["start"], (dim, 2), "start"),
+    }
 
 
 def _variations(arrays: Mapping[str, NDArray[Any]], n: int, dim: int) -> Array | None:

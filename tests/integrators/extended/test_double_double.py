@@ -113,6 +113,10 @@ def test_a_solution_keeps_its_digits(tmp_path):
     assert np.array_equal(kept.pairs, solution.pairs)
     assert np.array_equal(kept.errors()["energy"], solution.errors()["energy"])
     assert kept.method == solution.method
+    with np.load(tmp_path / "kept.npz") as file:
+        np.savez(tmp_path / "half.npz", **{name: file[name] for name in file.files if name != "start"})
+    with pytest.raises(InputError, match="is damaged"):
+        load(tmp_path / "half.npz")
     with pytest.raises(InputError, match="has doubles only; integrate with Gauss"):
         integrate(problem, HBVM(), [1.0]).to_mpmath()
 
