@@ -160,7 +160,7 @@ def asteroids(
         f"MEGNO over {turns} revolutions of Jupiter, by `{maps.RESTRICTED!r}`. Massless asteroids start at "
         "the pericentre on the far side of the Sun from Jupiter, which moves on a circle. Marks: where the "
         "periods are in the ratios written. Chaos spreads from Jupiter's orbit inwards as eccentricities "
-        "grow, with regular islands at resonances.",
+        "grow, with regular islands at resonances. Blank: the integration did not reach its end.",
         _share(found),
     )
 
