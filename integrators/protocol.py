@@ -116,6 +116,8 @@ _FORMER_SAMPLINGS = {"side": "partial", "land": "stop"}
 
 def sampling_named(sample: Any) -> Any:
     """Return the present name of a sampling; the former ``"side"`` and ``"land"`` warn."""
+    if sample is None:
+        return None
     return deprecated.renamed("sampling", sample, _FORMER_SAMPLINGS, removed_in="0.2")
 
 
@@ -667,7 +669,11 @@ CAPABILITIES: tuple[type, ...] = (
 
 def offers(thing: Any, capability: type) -> bool:
     """Whether a method, a program or a stepper has everything that a capability names."""
-    return all(hasattr(thing, name) for name in members(capability))
+    # Without a generator, which takes longer: `integrate` asks at each call.
+    for name in members(capability):  # noqa: SIM110
+        if not hasattr(thing, name):
+            return False
+    return True
 
 
 @cache

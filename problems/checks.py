@@ -248,6 +248,7 @@ class Arguments:
         self.parameters = signature.parameters
         self._defaults: dict[str, Any] = {}
         self._by_place = [key for key, one in self.parameters.items() if one.kind is not one.KEYWORD_ONLY]
+        self._by_name = [key for key, one in self.parameters.items() if one.kind is one.KEYWORD_ONLY]
         self._needed = [key for key, one in self.parameters.items() if one.default is EMPTY]
         self._free = {key for key, one in self.parameters.items() if _allows_everything(one.annotation)}
 
@@ -330,13 +331,13 @@ class Arguments:
         self.check_names(values, options)
         call = self._unchecked.copy()
         for key, value in (*zip(self._by_place, values, strict=False), *options.items()):
-            call[key] = self._used(key, value)
+            call[key] = value if key in self._free else self._used(key, value)
         return call
 
     def split(self, call: Mapping[str, Any]) -> tuple[list[Any], dict[str, Any]]:
         """Return the arguments of a call by place and by name, as Python takes them."""
-        rest = {key: value for key, value in call.items() if key not in self._by_place}
-        return [call[key] for key in self._by_place], rest
+        by_name = dict(zip(self._by_name, map(call.__getitem__, self._by_name), strict=True))
+        return list(map(call.__getitem__, self._by_place)), by_name
 
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""

@@ -346,8 +346,10 @@ class HBVMProgram(Compiled):
         """Put parameters, and what follows from them and from the start (t0, y), into a pair of contexts."""
         for context in contexts:
             context.par[:] = par
-            if self.second:
-                context.velocity[: self.shape.rows], context.speed[:], context.mass[:] = self._velocity(par)
+        if self.second:
+            velocity, speed, mass = self._velocity(par)
+            for context in contexts:
+                context.velocity[: self.shape.rows], context.speed[:], context.mass[:] = velocity, speed, mass
         contexts[0].h = self.h
         if self.kept:
             self.kept.load(contexts, y, par, t0)

@@ -19,7 +19,8 @@ makes them attributes of its address:
 import ctypes
 from collections.abc import Mapping
 from math import prod
-from typing import Any, ClassVar, Self, overload
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +33,13 @@ LINE = 8  # words in 64 bytes, at a multiple of which every array begins
 
 def aligned(n: int) -> Numbers:
     """Return n zeros at an address that is a multiple of 64."""
-    room = np.zeros(n + LINE)
+    return _from_a_line_on(np.zeros(n + LINE))
+
+
+def _from_a_line_on(room: Numbers) -> Numbers:
+    """Return the part of an array, `LINE` words shorter, that begins at a multiple of 64."""
     start = (-address(room) % 64) // 8
-    return room[start : start + n]
+    return room[start : start + room.size - LINE]
 
 
 def address(array: Any) -> int:
@@ -56,31 +61,57 @@ class Slot:
         self.name = name
 
 
-class Integer(Slot):
+class Number(Slot, property):
+    """A slot that holds a number; it is read without a call of Python's."""
+
+    kind: Any
+    """Of `ctypes`."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+        property.__init__(self, attrgetter(f"numbers.{name}"), self._write)
+
+    def _write(self, memory: "Memory", value: float) -> None:
+        raise NotImplementedError
+
+
+class Integer(Number):
     """A whole number, or the address of a function."""
 
-    @overload
-    def __get__(self, memory: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, memory: "Memory", owner: type) -> int: ...
-    def __get__(self, memory: "Memory | None", owner: type) -> "Self | int":
-        return self if memory is None else int(memory.words[self.place])
+    kind = ctypes.c_int64
 
-    def __set__(self, memory: "Memory", value: int) -> None:
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self, memory: None, owner: type) -> Self: ...
+        @overload
+        def __get__(self, memory: "Memory", owner: type) -> int: ...
+        def __get__(  # type: ignore[override]
+            self, memory: "Memory | None", owner: type
+        ) -> "Self | int": ...
+        def __set__(self, memory: "Memory", value: int) -> None: ...
+
+    def _write(self, memory: "Memory", value: float) -> None:
         memory.words[self.place] = value
 
 
-class Real(Slot):
+class Real(Number):
     """A double."""
 
-    @overload
-    def __get__(self, memory: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, memory: "Memory", owner: type) -> float: ...
-    def __get__(self, memory: "Memory | None", owner: type) -> "Self | float":
-        return self if memory is None else float(memory.reals[self.place])
+    kind = ctypes.c_double
 
-    def __set__(self, memory: "Memory", value: float) -> None:
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self, memory: None, owner: type) -> Self: ...
+        @overload
+        def __get__(self, memory: "Memory", owner: type) -> float: ...
+        def __get__(  # type: ignore[override]
+            self, memory: "Memory | None", owner: type
+        ) -> "Self | float": ...
+        def __set__(self, memory: "Memory", value: float) -> None: ...
+
+    def _write(self, memory: "Memory", value: float) -> None:
         memory.reals[self.place] = value
 
 
@@ -106,7 +137,14 @@ class Array(Slot):
     @overload
     def __get__(self, memory: "Memory", owner: type) -> Any: ...
     def __get__(self, memory: "Memory | None", owner: type) -> Any:
-        return self if memory is None else memory.array(self)
+        if memory is None:
+            return self
+        # Compiled code may have exchanged it for another.
+        if self.name in memory._pointed:
+            return memory._pointed[self.name]
+        start = (int(memory.words[self.place]) - memory.address) // 8
+        found = memory._memory[start : memory._ends[start]]
+        return found if self.of is float else found.view(np.int64)
 
 
 class Table(Array):
@@ -127,11 +165,14 @@ class Memory:
     ----------
     words, reals : ndarray
         The slots as integers and as doubles: the same memory.
+    numbers : ctypes.Structure
+        The same by name.
     address : int
         For compiled functions.
     """
 
     slots: ClassVar[dict[str, Slot]] = {}
+    _numbers: ClassVar[Any] = None
 
     def __init_subclass__(cls) -> None:
         own = {name: slot for name, slot in vars(cls).items() if isinstance(slot, Slot)}
@@ -140,6 +181,15 @@ class Memory:
         for place, slot in enumerate(own.values(), len(cls.slots)):
             slot.place = place
         cls.slots = {**cls.slots, **own}
+        cls._numbers = None
+
+    @classmethod
+    def _as_numbers(cls) -> Any:
+        """Return the slots as a structure of `ctypes`, whose fields are read at once."""
+        if cls._numbers is None:
+            fields = [(name, getattr(slot, "kind", ctypes.c_int64)) for name, slot in cls.slots.items()]
+            cls._numbers = type(f"{cls.__name__}Numbers", (ctypes.Structure,), {"_fields_": fields})
+        return cls._numbers
 
     def __init__(self, numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]):
         def length(slot: Array) -> int:
@@ -153,6 +203,7 @@ class Memory:
                 self._own[name] = (end, end + length(slot))
                 self._ends[end] = end + length(slot)
                 end += -(-max(length(slot), 1) // LINE) * LINE
+        self._structure = self._as_numbers()
         self._lies_in(aligned(end))
         for name, (start, _) in self._own.items():
             self.words[self.slots[name].place] = self.address + 8 * start
@@ -166,14 +217,15 @@ class Memory:
         self._memory = memory
         self.reals: Numbers = memory[: len(self.slots)]
         self.words: Integers = self.reals.view(np.int64)
-        self.address: int = address(memory)
+        self.numbers = self._structure.from_buffer(memory)
+        self.address: int = ctypes.addressof(self.numbers)
 
     def copy(self) -> Self:
         """Return memory of its own with the same content, which points to the same arrays."""
         other = object.__new__(type(self))
         vars(other).update(vars(self))
         other._pointed = self._pointed.copy()
-        memory = aligned(self._memory.size)
+        memory = _from_a_line_on(np.empty(self._memory.size + LINE))
         memory[:] = self._memory
         other._lies_in(memory)
         other.words[self._places] += other.address - self.address
@@ -191,11 +243,3 @@ class Memory:
     def _find_places(self) -> None:
         # of the addresses in this memory, which are others in a copy
         self._places = np.array([self.slots[name].place for name in self._own], dtype=np.intp)
-
-    def array(self, slot: Array) -> NDArray[Any]:
-        """Return the array that a slot points to now; compiled code may have exchanged it for another."""
-        if slot.name in self._pointed:
-            return self._pointed[slot.name]
-        start = (int(self.words[slot.place]) - self.address) // 8
-        found = self._memory[start : self._ends[start]]
-        return found if slot.of is float else found.view(np.int64)
