@@ -438,13 +438,10 @@ class AdaptiveProgram(HBVMProgram):
         if c.route != tables.THROUGH:
             self._fixed["raw_matrix"] = tables.rounded(c)
         self._onward = tables.onward(c) if c.route > tables.THROUGH else aligned(0)
-        # P_s vanishes at the nodes of the rule with s nodes.
-        self.degree = s if k > s else s - 1
+        self.degree = tables.degree_of_error(k, s)
         basis = legendre(c.arrays["nodes"].reshape(-1), k) * c.arrays["weights"].reshape(-1)[:, None]
-        m = self.degree
         middle = max(1, (k - 4) // 2)
-        degrees = [0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1]
-        degrees += [min(middle, k - 1), min(middle + 1, k - 1)]
+        degrees = [*tables.degrees_judged(k, s), min(middle, k - 1), min(middle + 1, k - 1)]
         rows = [*basis.T[degrees], *(basis @ legendre(np.array([0.0, 1.0]), k).T).T]
         self._estimators = aligned(len(rows) * 8 * -(-k // 8))
         self._estimators.reshape(len(rows), -1)[:, :k] = rows
@@ -463,7 +460,7 @@ class AdaptiveProgram(HBVMProgram):
         self.projected = projected
         self._energy = self._energy_code() if projected else None
         looks = sees_kinks(k, system) and not self.kept
-        self._doubt, self._slowest = _decays(k, m, tol, middle, looks)
+        self._doubt, self._slowest = _decays(k, self.degree, tol, middle, looks)
         self.compile_seconds += binary.clock() - started
 
     @property

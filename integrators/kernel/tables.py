@@ -301,6 +301,17 @@ def fixed(constants: Constants) -> dict[str, Array]:
     }
 
 
+def degree_of_error(k: int, s: int) -> int:
+    """Return the degree of the coefficient that estimates a step's error."""
+    return s if k > s else s - 1  # P_s vanishes at the nodes of the rule with s nodes
+
+
+def degrees_judged(k: int, s: int) -> tuple[int, ...]:
+    """Return the degrees of the coefficients ``GAMMA_0`` .. ``LAST`` that a step is judged by."""
+    m = degree_of_error(k, s)
+    return 0, *(min(j, m - 1) for j in (1, 2, 3)), m - 1, m, max(k - 2, 0), k - 1
+
+
 def recurrence(modes: int) -> Array:
     """Return pairs a, b with P_{j+1} = a x P_j - b P_{j-1}, x = 2 c - 1, for the orthonormal basis."""
     j = np.arange(modes, dtype=np.float64)

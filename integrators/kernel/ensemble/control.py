@@ -6,12 +6,11 @@ where anything else happens (a step that failed or was too long, a sample that i
 looks like a kink's) is left as it is, and marked for `integrators.kernel.ensemble.own` to look after.
 """
 
+from math import sqrt
 from typing import Any
 
 from integrators.kernel.context import (
-    AT_END,
     AT_ERROR,
-    AT_START,
     BEFORE_ERROR,
     BEFORE_LAST,
     GAMMA_0,
@@ -27,6 +26,22 @@ from integrators.kernel.simd.values import Condition, Value
 from integrators.kernel.step.rule import SMALLEST
 
 INFINITY = float("inf")
+
+
+def in_powers(k: int) -> list[list[float]]:
+    """Return the factors of powers of x in Legendre polynomials on [-1, 1], orthonormal on [0, 1].
+
+    Returns
+    -------
+    list of list of float
+        For each power m below k those in the polynomials of degrees m, m + 2, ... below k.
+    """
+    from numpy.polynomial.legendre import leg2poly  # takes its time, and is needed to compile only
+
+    powers = [leg2poly([0.0] * j + [sqrt(2 * j + 1)]) for j in range(k)]
+    return [[float(powers[j][m]) for j in range(m, k, 2)] for m in range(k)]
+
+
 MEASURED = "size", "moved", "strict", "floored"  # rooms that the iteration does not need any more
 
 
@@ -90,7 +105,7 @@ class Control:
                 scale = slope = gamma_error = gamma_last = gap = w.zero
                 for i in range(width):
                     d = w.at(start, 1, i)
-                    found = self.coefficients(d)
+                    found, start_value, end_value = self.coefficients(d)
                     low = rules.lowest(found[GAMMA_1], found[GAMMA_2], found[GAMMA_3])
                     high = greatest(found[BEFORE_LAST], found[LAST])
                     note(doubtful, rules.is_doubtful(low, high, self.number("doubt")))
@@ -105,7 +120,7 @@ class Control:
                         found[LAST], found[BEFORE_LAST], self.number("defect_decay")
                     )
                     gamma_error, gamma_last = greatest(gamma_error, here), greatest(gamma_last, last)
-                    gap = greatest(gap, self.gap(d, high))
+                    gap = greatest(gap, self.gap(d, high, start_value, end_value))
                 w.put(gap, w.array(Group.slots["gaps"]), start)
                 for name, value in zip(MEASURED, (scale, slope, gamma_error, gamma_last), strict=True):
                     w.put(value, getattr(w, name), start)
@@ -141,25 +156,54 @@ class Control:
         speed = w.get(w.velocity, d).absolute()
         return where(speed > 0.0, speed, w.one)
 
-    def coefficients(self, d: Any) -> list[Value]:
-        """Return the sizes of the field's coefficients `GAMMA_0` .. `LAST` in row d."""
-        return [self.coefficient(d, which).absolute() for which in range(LAST + 1)]
+    def coefficients(self, d: Any) -> tuple[list[Value], Value, Value]:
+        """Return what row d is judged by, and keep its polynomial for the first values of the next step.
 
-    def coefficient(self, d: Any, which: int) -> Value:
-        """Return what an estimator makes of the values of row d."""
-        w, k = self.w, self.w.form.k
-        table, total = w.table(Group.slots["estimators"]), w.zero
-        for i in range(k):
-            value = w.get(w.values, w.at(i, w.form.rows, d))
-            total = w.number(table, -(-k // 8) * 8 * which + i).fma(value, total)
-        return total
+        Returns
+        -------
+        sizes : list of Value
+            Of the field's coefficients `GAMMA_0` .. `LAST`.
+        start, end : Value
+            The polynomial at both ends of the step.
+        """
+        w, form = self.w, self.w.form
+        found = self.modes(d)
+        ends = [w.zero, w.zero]  # at the end what polynomials of even degree contribute, and of odd degree
+        for j, coefficient in enumerate(found):
+            ends[j % 2] = coefficient.fma(sqrt(2 * j + 1), ends[j % 2])
+        for power, factors in enumerate(in_powers(form.k)):
+            total = w.zero
+            for coefficient, factor in zip(found[power::2], factors, strict=True):
+                total = coefficient.fma(factor, total)
+            w.put(total, w.ahead, w.at(power, form.rows, d))
+        even, odd = ends
+        return [found[j].absolute() for j in form.judged], even - odd, even + odd
 
-    def gap(self, d: Any, last: Value) -> Value:
+    def modes(self, d: Any) -> list[Value]:
+        """Return the Legendre coefficients of the values of row d.
+
+        Those of even degree are the same for values at mirrored nodes, those of odd degree opposite.
+        """
+        w, k, rows = self.w, self.w.form.k, self.w.form.rows
+        table, values = (
+            w.table(Group.slots["into_modes"]),
+            [w.get(w.values, w.at(i, rows, d)) for i in range(k)],
+        )
+        pairs = [(values[i], values[k - 1 - i]) for i in range(k // 2)]
+        parts = [x + y for x, y in pairs] + values[k // 2 : k - k // 2], [x - y for x, y in pairs]
+        found = []
+        for j in range(k):
+            total = w.zero
+            for i, part in enumerate(parts[j % 2]):
+                total = w.number(table, k * j + i).fma(part, total)
+            found.append(total)
+        return found
+
+    def gap(self, d: Any, last: Value, start: Value, end: Value) -> Value:
         """Return how far row d's polynomials are apart where two steps meet, if farther than it may be."""
         from integrators.kernel.step.estimate import is_gap
 
         w, slots = self.w, Group.slots
-        start, end = self.coefficient(d, AT_START), self.coefficient(d, AT_END)
         w.put(end, w.array(slots["ends_ahead"]), d)
         w.put(last, w.array(slots["lasts_ahead"]), d)
         behind, last_behind = (w.get(w.array(slots[name]), d) for name in ("ends", "lasts"))

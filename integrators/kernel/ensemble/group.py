@@ -43,7 +43,9 @@ class Group(Memory):
 
     # --- a step ---
     values = Array("k", "rows", "lanes")  # of the field, at the stages
-    ahead = Array("k", "rows", "lanes")  # the values that a step starts from
+    # The values that a step starts from; of adaptive steps the last one's polynomial, by powers of x from -1
+    # at its start to 1 at its end.
+    ahead = Array("k", "rows", "lanes")
     base = Array("k", "rows", "lanes")  # what a stage has besides the state and the values
     stage = Array("rows", "lanes")
     found = Array("rows", "lanes")  # the field there
@@ -54,15 +56,12 @@ class Group(Memory):
     size = Array("rows", "lanes")
 
     # --- adaptive steps ---
-    modes = Integer()  # Legendre coefficients of the values that are extrapolated
-    into_modes = Array()  # values -> coefficients, (modes, k)
-    recurrence = Array()  # pairs; see `Context.recurrence`
+    into_modes = Array()  # values -> Legendre coefficients, (k, k)
     ratio = Array("lanes")  # of the length to that of the step that `values` belong to; 0: none
     begin = Array("lanes")  # where on that step this one begins: at its end, 1, or at its start, 0
     next_state = Array("dim", "lanes")
     next_error = Array("dim", "lanes")
     # what such a step is judged by, as in `Context`, and its end; see `ensemble.control`
-    estimators = Array()
     allowed_error = Real()
     allowed_defect = Real()
     error_power = Real()  # one over the order of the error,

@@ -49,9 +49,9 @@ def place(ctx, d):
 
 @compiled
 def clear(group, lane):
-    """Forget the lane's values of the field."""
+    """Forget the lane's values of the field, and their polynomial."""
     for i in range(group.k * group.rows):
-        group.values[group.lanes * i + lane] = 0.0
+        group.values[group.lanes * i + lane] = group.ahead[group.lanes * i + lane] = 0.0
 
 
 @compiled
@@ -243,7 +243,6 @@ def crawls(group, lane, ctx):
 @compiled
 def share(group, ctx):
     """Let a group know what its steps are judged by."""
-    group.estimators = ctx.estimators
     group.allowed_error, group.allowed_defect = ctx.allowed_error, ctx.allowed_defect
     group.error_power, group.defect_power = error_power(ctx.error_degree), defect_power(ctx.k)
     group.error_aim, group.defect_aim = ctx.error_aim, ctx.defect_aim

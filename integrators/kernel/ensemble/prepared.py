@@ -11,14 +11,14 @@ from integrators.kernel.context import width_of_blocks
 from integrators.kernel.ensemble.engine import run, run_own
 from integrators.kernel.ensemble.group import Group
 from integrators.kernel.ensemble.steps import Form, compile_steps
-from integrators.kernel.native import binary
+from integrators.kernel.native import binary, machine
 from integrators.kernel.native.memory import Numbers, aligned
 from integrators.kernel.tables import Constants
 from problems import emit
 from problems.systems.base import System
 from problems.trace.graph import reachable
 
-LANES = 8  # of a register
+LANES = 8  # of a register of AVX-512
 SOON = ("const", "symbol", "index", "add", "sub", "mul", "neg", "pow", "sum")  # operations not waited for
 STAGES = 16  # at most: their sums are written out
 ROOM = 4096  # rows of all stages, at most: beyond, a group of trajectories does not fit in the nearest caches
@@ -56,9 +56,10 @@ class Lanes:
         groups = tuple((start, size // width, width) for start in starts)
         self.k = constants.k
         self.width = width_for(system, second, self.rows, varying)
+        judged = tables.degrees_judged(constants.k, constants.s)
         self._code = compile_steps(
             system,
-            Form(self.width, self.k, self.rows, second, self.unit, varying, constants.modes, groups),
+            Form(self.width, self.k, self.rows, second, self.unit, varying, judged, groups),
         )
         loop = (run_own if varying else run).code()
         self.from_cache = self._code.from_cache and loop.from_cache
@@ -77,7 +78,7 @@ class Lanes:
         names = ("nodes", "nodes_low", "weights", "weights_low", "position_weights", "position_weights_low")
         extrapolation = a["beyond"][:, : tables.MODES] @ a["into_modes"][: tables.MODES]
         found = {name: a[name] for name in names} | {"extrapolation": extrapolation}
-        found |= {"into_modes": a["into_modes"], "recurrence": tables.recurrence(self._constants.modes)}
+        found["into_modes"] = a["into_modes"]
         return {name: _aligned(values) for name, values in found.items()}
 
     def _matrix(self, h: float) -> Numbers:
@@ -144,11 +145,15 @@ class Lanes:
 def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     """Return how many trajectories go side by side.
 
-    Eight, which fill a register; more where the field has few components and the results of
-    divisions, roots or other functions are waited for (Kepler: 15 % faster with sixteen, an
-    exponential of one component twice as fast with 32). Adaptive steps wait for those
-    of their control (Henon and Heiles: 8 % faster with sixteen).
+    Eight, which fill a register where there are 32 of eight doubles; more where the field has few components
+    and the results of divisions, roots or other functions are waited for (Kepler: 15 % faster with
+    sixteen, an exponential of one component twice as fast with 32). Adaptive steps wait for those
+    of their control (Henon and Heiles: 8 % faster with sixteen). With fewer registers adaptive steps of few
+    components go eight by eight: a value fills two registers of AVX2 then (Henon and Heiles 18 %, Kepler 9 %
+    and Morse 7 % faster than with sixteen, sixteen and 32; with four 6 % to 57 % slower than with eight).
     """
+    if varying and not machine.many_registers():
+        return LANES
     nodes = reachable(system.function("force" if second else "field").roots)
     if rows > 4 or (not varying and all(node.op in SOON for node in nodes)):
         return LANES

@@ -52,8 +52,8 @@ class Form:
     varying : bool
         Whether every lane has a step of its own length. The matrix is that of a step of 1, the end of the
         step goes to `Group.next_state`, and a lane whose equations are not solved is not alive then.
-    modes : int
-        Legendre coefficients that such a step is extrapolated by.
+    judged : tuple of int
+        Degrees of the Legendre coefficients that such a step is judged by; see `tables.degrees_judged`.
     groups : tuple of tuple of int
         First row, number of blocks and rows of a block, of groups of blocks (positions, momenta).
     """
@@ -64,7 +64,7 @@ class Form:
     second: bool
     unit: bool
     varying: bool
-    modes: int
+    judged: tuple[int, ...]
     groups: tuple[tuple[int, int, int], ...]
 
 
@@ -137,7 +137,8 @@ class Steps(Writer):
             setattr(self, name, self.array(slots[name]))
         for name in ("factor", "moved", "strict", "floored", "size", "stage", "found"):
             setattr(self, name, self.room(slots[name], rows))
-        self.values, self.ahead = (self.room(slots[name], k * rows) for name in ("values", "ahead"))
+        self.values = self.room(slots["values"], k * rows)
+        self.ahead = self.array(slots["ahead"]) if form.varying else self.room(slots["ahead"], k * rows)
         self.base = self.array(slots["base"])
         kept = self.array(slots["values"])
         pointer = DOUBLE.as_pointer()
@@ -288,45 +289,33 @@ class Steps(Writer):
         if self.form.varying:
             self.predict_elsewhere()
             return
-        self.product(self.table(Group.slots["extrapolation"]), k)
-        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
-
-    def product(self, table: Any, count: int) -> None:
-        """Set so many rows of `ahead` to those of a table times the values."""
+        table = self.table(Group.slots["extrapolation"])
 
         def one(i: Index) -> None:
             total = self.combination(table, i)
-            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, self.form.rows, d)))
+            self.each_row(lambda d: self.put(total(d), self.ahead, self.at(i, rows, d)))
 
-        self.each(count, one)
+        self.each(k, one)
+        self.each(k * rows, lambda i: self.put(self.get(self.ahead, i), self.values, i))
 
     def predict_elsewhere(self) -> None:
-        """As `predict`, by the polynomial's coefficients: this step's length may be another one."""
-        from integrators.kernel.step.begin import behind, next_polynomial  # imports numba
+        """As `predict`, from the powers of the polynomial: this step's length may be another one."""
+        from integrators.kernel.step.begin import behind  # imports numba
 
-        slots, rows, modes = Group.slots, self.form.rows, self.form.modes
+        slots, k, rows = Group.slots, self.form.k, self.form.rows
         ratio, begin = (self.get(self.array(slots[name])) for name in ("ratio", "begin"))
-        recurrence = self.array(slots["recurrence"])
         there = ratio.compare("!=", 0.0)
-        self.product(self.table(slots["into_modes"]), modes)
 
         def stage(i: Index) -> None:
             x = behind(self.number(self.nodes, i), begin, ratio)
-            basis, before = [self.one], self.zero
-            for j in range(modes - 1):
-                a, b = (self.number(recurrence, 2 * j + part) for part in (0, 1))
-                basis.append(next_polynomial(a, b, x, basis[j], before))
-                before = basis[j]
 
             def row(d: Index) -> None:
-                total = self.zero
-                for j, value in enumerate(basis):
-                    total = value.fma(self.get(self.ahead, self.at(j, rows, d)), total)
-                self.put(total.where(there, 0.0), self.values, self.at(i, rows, d))
+                powers = [self.get(self.ahead, self.at(j, rows, d)) for j in range(k)]
+                self.put(x.polynomial(powers).where(there, 0.0), self.values, self.at(i, rows, d))
 
             self.each_row(row)
 
-        self.each(self.form.k, stage)
+        self.each(k, stage)
 
     def iterate(self) -> None:
         """Sweep until every lane is solved, or has left."""

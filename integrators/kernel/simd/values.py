@@ -117,7 +117,7 @@ class Value:
 
     def bits(self) -> "Value":
         """Return the bits, read as an integer, as a number."""
-        return self._make(self.builder.sitofp(self.integers(), vector(self.count)))
+        return self._make(self.builder.uitofp(self.integers(), vector(self.count)))
 
     def whole(self, number: int) -> Any:
         return ir.Constant(ir.VectorType(INTEGER, self.count), [number] * self.count)
@@ -127,7 +127,7 @@ class Value:
 
     def larger(self, other: "Value") -> "Value":
         """Return the larger of numbers that are not negative, by their bits: a NaN is larger than all."""
-        bits = llvm_call(self.builder, "umax", self.integers(), other.integers())
+        bits = llvm_call(self.builder, "smax", self.integers(), other.integers())
         return self.doubles(bits)
 
     def two_sum(self, other: "Value") -> "tuple[Value, Value]":

@@ -373,3 +373,23 @@ def test_where_something_else_says_where_steps_end_they_go_one_by_one():
     system = problems.load("kepler").system
     for more in ({"max_step": 0.1}, {"max_steps": 10}, {"breakpoints": [1.0]}):
         assert AdaptiveProgram(system, k=8, s=7, tol=1e-10, **more).in_lanes() is None
+
+
+@pytest.mark.parametrize("k", [7, 8, 16])
+def test_powers_of_the_next_steps_polynomial_are_those_of_legendre(k):
+    x = np.linspace(-1.0, 4.0, 11)
+    rows = [sum(f[(j - m) // 2] * x**m for m, f in enumerate(in_powers(k)) if m <= j and (j - m) % 2 == 0)
+            for j in range(k)]  # fmt: skip
+    expected = legendre((x + 1.0) / 2.0, k).T
+    scale = np.abs(expected).max(axis=1, keepdims=True)
+    assert (np.abs(np.array(rows) - expected) / scale).max() < 1e-14  # measured: see below
+
+
+def test_an_odd_number_of_stages_starts_its_steps_as_well_in_lanes():
+    problem = problems.load("kepler", e=0.3)
+    method = HBVM(k=7, s=5, tol=1e-11)
+    starts = np.tile(problem.y0, (8, 1))
+    alone = integrate(problem, method, times=[50.0])
+    together = method.compile(problem.system).batch(starts, times=np.array([50.0]))
+    print(alone.stats.steps, alone.stats.iterations, together.steps[0], together.iterations[0])
+    assert together.iterations[0] < 1.2 * alone.stats.iterations
