@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 import problems
+from integrators import HBVM, integrate
+from integrators.coefficients.legendre import legendre
 from integrators.kernel import batch
 from integrators.kernel.batch import _Work
 from integrators.kernel.ensemble import prepared
+from integrators.kernel.ensemble.control import in_powers
 from integrators.kernel.program import AdaptiveProgram, HBVMProgram
 from integrators.protocol import Status
 from problems import Hamiltonian, Problem, VectorField
@@ -382,7 +385,7 @@ def test_powers_of_the_next_steps_polynomial_are_those_of_legendre(k):
             for j in range(k)]  # fmt: skip
     expected = legendre((x + 1.0) / 2.0, k).T
     scale = np.abs(expected).max(axis=1, keepdims=True)
-    assert (np.abs(np.array(rows) - expected) / scale).max() < 1e-14  # measured: see below
+    assert (np.abs(np.array(rows) - expected) / scale).max() < 3e-15  # 1.5e-16 to 3.1e-16
 
 
 def test_an_odd_number_of_stages_starts_its_steps_as_well_in_lanes():
@@ -391,5 +394,4 @@ def test_an_odd_number_of_stages_starts_its_steps_as_well_in_lanes():
     starts = np.tile(problem.y0, (8, 1))
     alone = integrate(problem, method, times=[50.0])
     together = method.compile(problem.system).batch(starts, times=np.array([50.0]))
-    print(alone.stats.steps, alone.stats.iterations, together.steps[0], together.iterations[0])
-    assert together.iterations[0] < 1.2 * alone.stats.iterations
+    assert together.iterations[0] < 1.2 * alone.stats.iterations  # 839 and 1,064
