@@ -336,13 +336,15 @@ def _pyhamsys(system: System, method: Any) -> Begin:
 
     def begin(y0: Array, par: Array, t0: float) -> Call:
         def go(t_end: float) -> Any:
+            count = max(2, round((t_end - t0) / method.h))
+            step = (1.0 + 1e-9) * (t_end - t0) / (count - 1)  # pyhamsys takes a step more than fits
             return library.solve_ivp_symp(
                 lambda h, t, y: chi(h, t, y, par),
                 lambda h, t, y: adjoint(h, t, y, par),
                 (t0, t_end),
                 y0,
                 t_eval=[t0, t_end],
-                params=library.Parameters(step=1.0000001 * method.h, solver=method.type),  # it takes one more
+                params=library.Parameters(step=step, solver=method.type),
             )
 
         return Call(go, lambda found: (round((found.t[-1] - t0) / found.step), found.y[:, -1]))
