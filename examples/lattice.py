@@ -4,12 +4,14 @@ Masses, springs and distances are 1: times are in units of sqrt(mass/stiffness).
 """
 
 import numpy as np
-from side_by_side import clocked
+from scipy.integrate import solve_ivp
+from side_by_side import Comparison
 
 import integrators
 import problems
 
-N = 1000
+N, ALPHA, BETA, END = 1000, 0.25, 1.0, 100.0
+TIMES = np.linspace(0.0, END, 11)
 
 
 def H(q, p, par, m):
@@ -23,28 +25,43 @@ def H(q, p, par, m):
     return kinetic + m.sum(spring, [(i, (i + 1) % N) for i in range(N)])
 
 
-def momentum(p, m):
-    """Return the total momentum."""
-    return m.sum(lambda i: p[i], range(N))
+def by_hand(t, y):
+    """Return the derivative by NumPy."""
+    d = np.roll(y[:N], -1) - y[:N]
+    pull = d + ALPHA * d**2 + BETA * d**3
+    return np.concatenate([y[N:], pull - np.roll(pull, 1)])
 
 
-def main() -> None:
-    """Integrate it with steps of a twelfth of the fastest period, and with heyoka."""
+def compare() -> Comparison:
+    """Integrate it with steps of a twelfth of the fastest period, with heyoka and with SciPy."""
     ring = problems.Hamiltonian(
-        H, dof=N, parameters={"alpha": 0.25, "beta": 1.0}, invariants={"momentum": momentum}
-    )
+        H, dof=N, parameters={"alpha": ALPHA, "beta": BETA},
+        invariants={"momentum": lambda p, m: m.sum(lambda i: p[i], range(N))},
+    )  # fmt: skip
     place = np.arange(N) - N / 2
-    pulse = problems.Problem(ring, q0=0 * place, p0=0.5 / np.cosh(place / 3) ** 2, t_end=100.0)
-    times = np.linspace(0.0, 100.0, 11)
-    method = integrators.HBVM(k=8, s=4, h=0.25)
-    ours = clocked(f"{method}", lambda: integrators.integrate(pulse, method, times))
-    taylor = integrators.Taylor(compact_mode=True)
-    heyokas = clocked("heyoka", lambda: integrators.integrate(pulse, taylor, times))
-    print(f"largest difference of a place: {np.abs(ours.q[-1] - heyokas.q[-1]).max():.1e}")
-    for name, solution in (("ours", ours), ("heyoka", heyokas)):
-        print(name, *(f"{key} {error.max():.1e}" for key, error in solution.errors().items()))
-    print("energy kept:", bool(ours.errors()["energy"].max() < 1e-13))
+    pulse = problems.Problem(ring, q0=0 * place, p0=0.5 / np.cosh(place / 3) ** 2, t_end=END)
+
+    def run(method) -> np.ndarray:
+        return integrators.integrate(pulse, method, TIMES).y
+
+    def by_scipy() -> np.ndarray:
+        return solve_ivp(by_hand, (0.0, END), pulse.y0, "DOP853", TIMES, rtol=1e-10, atol=1e-12).y.T
+
+    exact = run(integrators.Gauss(s=8, h=0.1))
+
+    def error(y: np.ndarray) -> float:
+        return np.abs(y - exact).max()
+
+    def energy(y: np.ndarray) -> float:
+        return pulse.errors(y)["energy"].max()
+
+    made = Comparison("A lattice: a ring of 1,000 masses", "states at 11 times", 1e-7)
+    ours = integrators.HBVM(k=8, s=4, h=0.25)
+    made.add("HBVM(k=8, s=4, h=0.25)", lambda: run(ours), error, energy)
+    made.add("heyoka", lambda: run(integrators.Taylor(compact_mode=True)), error, energy)
+    made.add("SciPy's DOP853", by_scipy, error, energy, calls=0)
+    return made
 
 
 if __name__ == "__main__":
-    main()
+    print(compare())

@@ -1,22 +1,112 @@
-"""What the scripts beside this one print of a computation: its first call, which compiles, and the next."""
+"""How the scripts beside this one time a computation, and how they compare ours with another library."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from statistics import median
 from time import perf_counter
 from typing import TypeVar
 
 T = TypeVar("T")
 
+CALLS, SECONDS = 7, 0.5  # further calls that are timed, and the time after which no more follow
 
-def clocked(name: str, compute: Callable[[], T]) -> T:
-    """Compute twice, print the times of both, and return the result.
+
+def timed(compute: Callable[[], T], calls: int = CALLS) -> tuple[T, float, float]:
+    """Return the result, the seconds of the first call, which compiles, and the median of further ones.
 
     heyoka's integrator is made anew by every call; whoever keeps one saves that time, which is left out.
     """
     began = perf_counter()
-    compute()
-    first = perf_counter() - began
-    began = perf_counter()
     result = compute()
-    warm = perf_counter() - began - getattr(result, "compile_seconds", 0.0)
+    first = perf_counter() - began
+    warm: list[float] = []
+    while len(warm) < calls and sum(warm) < SECONDS:
+        began = perf_counter()
+        result = compute()
+        warm.append(perf_counter() - began - getattr(result, "compile_seconds", 0.0))
+    return result, first, median(warm or [first])
+
+
+def clocked(name: str, compute: Callable[[], T]) -> T:
+    """Compute twice, print the times of both, and return the result."""
+    result, first, warm = timed(compute, calls=1)
     print(f"{name}: {1e3 * warm:.2f} ms, the first call {first:.2f} s")
     return result
+
+
+@dataclass(frozen=True)
+class Row:
+    """One library on a task: seconds of the first call and of a further one, and errors.
+
+    ``energy`` is the largest relative error of the energy, ``None`` where nothing is conserved;
+    ``error`` is that of what the task asks for.
+    """
+
+    library: str
+    first: float
+    seconds: float
+    energy: float | None
+    error: float
+
+
+@dataclass
+class Comparison:
+    """A task as several libraries do it.
+
+    Attributes
+    ----------
+    task : str
+        What is computed.
+    error : str
+        What the error is of, with its unit.
+    asked : float
+        The largest error that is accepted.
+    rows : list of Row
+        Ours first.
+    """
+
+    task: str
+    error: str
+    asked: float
+    rows: list[Row] = field(default_factory=list)
+
+    def add(
+        self,
+        library: str,
+        compute: Callable[[], T],
+        error: Callable[[T], float],
+        energy: Callable[[T], float] | None = None,
+        calls: int = CALLS,
+    ) -> T:
+        """Time a library's computation, and measure its errors; ``calls=0`` where nothing is compiled."""
+        result, first, seconds = timed(compute, calls)
+        conserved = None if energy is None else float(energy(result))
+        self.rows.append(Row(library, first, seconds, conserved, float(error(result))))
+        return result
+
+    @property
+    def accurate(self) -> list[Row]:
+        """The rows whose error is accepted, the fastest first."""
+        return sorted((row for row in self.rows if row.error <= self.asked), key=lambda row: row.seconds)
+
+    def verdict(self) -> str:
+        """Say which of those that are accurate enough is the fastest, and by how much."""
+        if not self.accurate:
+            return "none is accurate enough"
+        first, *others = self.accurate
+        if not others:
+            return f"only {first.library} is accurate enough"
+        ratios = [f"{row.seconds / first.seconds:.2g} times as long" for row in others]
+        said = (f"{row.library} takes {ratio}" for row, ratio in zip(others, ratios, strict=True))
+        return f"{first.library} is the fastest; " + ", ".join(said)
+
+    def __str__(self) -> str:
+        width = max(len(row.library) for row in self.rows)
+        lines = [f"{self.task}. Error: {self.error}, at most {self.asked:g}"]
+        lines.append(f"{'':{width}}      time  first call   energy    error")
+        for row in self.rows:
+            energy = "       –" if row.energy is None else f"{row.energy:8.1e}"
+            times = f"{1e3 * row.seconds:6.4g} ms {row.first:9.2f} s"
+            lines.append(f"{row.library:{width}} {times} {energy} {row.error:8.1e}")
+        lines.append("accurate: " + ", ".join(row.library for row in self.rows if row in self.accurate))
+        return "\n".join([*lines, f"verdict: {self.verdict()}"])

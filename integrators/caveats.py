@@ -176,7 +176,7 @@ def unseen(problem: Problem, why: str | None) -> str | None:
     if why is None or not problem.system.traced or not has_kinks(problem.system):
         return None
     return (
-        f"its field has m.abs or m.where, and {why}: steps go over a kink with any error, "
+        f"its field has m.abs, m.round or m.where, and {why}: steps go over a kink with any error, "
         "and the run ends as finished."
     )
 

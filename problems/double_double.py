@@ -185,6 +185,15 @@ def sign(a: DD) -> DD:
     return DD(np.copysign(1.0, a.hi))
 
 
+def rint(a: DD) -> DD:
+    """Return the nearest whole number, of two equally near ones the even one."""
+    high = np.rint(a.hi)
+    whole = DD(high) + np.rint(a.lo)  # where the first half is whole, the second one decides
+    between = np.abs(a.hi - high) == 0.5  # then any second half does
+    beside = DD(np.floor(a.hi) + (a.lo > 0.0))
+    return where(high == a.hi, whole, where(between & (a.lo != 0.0), beside, DD(high)))
+
+
 def _series(x: DD, coefficients: list[Fraction]) -> DD:
     """Evaluate a polynomial, lowest coefficient first."""
     value = _constant(coefficients[-1]) + DD(np.zeros_like(x.hi))

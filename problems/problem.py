@@ -141,6 +141,49 @@ class Problem:
             object.__setattr__(named, key, value)
         return named
 
+    @checked_arguments
+    def replace(
+        self,
+        *,
+        y0: ArrayLike | None = None,
+        parameters: Named[Value] = NOTHING,
+        t0: float | None = None,
+        t_end: float | None = None,
+    ) -> "Problem":
+        """Return the same system from another start, with other parameters or over another interval.
+
+        Parameters
+        ----------
+        y0 : array_like, shape (dim,), optional
+            The whole state at the start.
+        parameters : mapping of str to float or sequence of float
+            Values that change; the others stay those of this problem, not the system's defaults.
+        t0, t_end : float, optional
+            Integration interval.
+
+        Raises
+        ------
+        problems.errors.InputError
+            As for `Problem`.
+
+        Examples
+        --------
+        >>> import problems
+        >>> problems.load("kepler", e=0.6).replace(t_end=10.0).t_end
+        10.0
+        """
+        values = {**self.system.unpack(self.par), **parameters}
+        return Problem(
+            self.system,
+            y0=self.y0 if y0 is None else y0,
+            parameters={
+                key: value.tolist() if isinstance(value, np.ndarray) else value
+                for key, value in values.items()
+            },
+            t0=self.t0 if t0 is None else t0,
+            t_end=self.t_end if t_end is None else t_end,
+        )
+
     def __getstate__(self) -> dict[str, Any]:
         """Return what `__setstate__` takes: copies and pickles need none of the user's functions."""
         return {**vars(self), "arguments": dict(self.arguments)}

@@ -1,5 +1,7 @@
 """Starts near a problem's own: for the law of a drift, and for ensembles."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,9 +55,8 @@ def members(problem: Problem, asked: Ensemble) -> tuple[Array, Array]:
 
 def changed(problem: Problem, start: Array, par: Array, t_end: float) -> Problem:
     """Return a problem with another start, other parameters and another end."""
-    values = problem.system.unpack(par)
-    parameters = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in values.items()}
-    return Problem(problem.system, y0=start, parameters=parameters, t0=problem.t0, t_end=t_end)
+    parameters: Any = problem.system.unpack(par)
+    return problem.replace(y0=start, parameters=parameters, t_end=t_end)
 
 
 def _evenly(count: int, dim: int) -> Array:

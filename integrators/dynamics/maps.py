@@ -191,5 +191,4 @@ def _value(
 ) -> Indicator:
     """Return the indicator of one trajectory."""
     parameters: Any = problem.system.unpack(par)
-    one = Problem(problem.system, y0=y0, parameters=parameters, t0=problem.t0, t_end=problem.t_end)
-    return function(one, method, **options)
+    return function(problem.replace(y0=y0, parameters=parameters), method, **options)

@@ -230,7 +230,7 @@ def continued(
         y0, par = guess[: problem.system.dim], guess[problem.system.dim : -1]
         parameters: Any = problem.system.unpack(par)
         end = problem.t0 + float(guess[-1])
-        base = Problem(problem.system, y0=y0, parameters=parameters, t0=problem.t0, t_end=end)
+        base = problem.replace(y0=y0, parameters=parameters, t_end=end)
         made = periodic(base, method=orbit.method, free=free, mirror=orbit.mirror, tol=tol, most=most)
         found.append(made)
         if not made.converged:

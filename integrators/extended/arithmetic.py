@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from problems import double_double
+from problems.trace.functions import WHOLE
 
 Numbers = NDArray[np.complex128]
 """Arrays of numbers."""
@@ -180,7 +181,18 @@ def copysign(x, a):
     return math.copysign(x, a.real)
 
 
-FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, copysign)
+@njit
+def whole(a):
+    """Return the nearest whole number."""
+    high = np.rint(a.real)
+    if high == a.real:
+        return complex(high, np.rint(a.imag))
+    if abs(high - a.real) == 0.5 and a.imag != 0.0:
+        return complex(np.floor(a.real) + (a.imag > 0.0), 0.0)
+    return complex(high, 0.0)
+
+
+FUNCTIONS = (plus, minus, times, over, sqrt, sin, cos, tan, exp, log, fabs, copysign, whole)
 _OPERATORS = {ast.Add: "plus", ast.Sub: "minus", ast.Mult: "times", ast.Div: "over"}
 
 
@@ -188,6 +200,11 @@ class _Operators(ast.NodeTransformer):
     """Turns operators into calls, but for those of places in an array and of counters."""
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        match node:  # what rounds doubles leaves numbers with more digits as they are
+            case ast.BinOp(ast.BinOp(x, ast.Add(), ast.Constant(up)), ast.Sub(), ast.Constant(down)) if (
+                up == down == WHOLE
+            ):
+                return ast.Call(ast.Name("whole", ast.Load()), [self.visit(x)], [])
         self.generic_visit(node)
         if (name := _OPERATORS.get(type(node.op))) is None:
             return node

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from problems.analysis.structure import has_kink
 from problems.calculus.function import Function, Term
-from problems.trace.graph import STATE, Node, Table, reachable
+from problems.trace.graph import STATE, Node, T, Table, reachable
 
 MOST = 16  # surfaces whose distances have an output of their own
 GOLDEN = (5.0**0.5 - 1.0) / 2.0  # multiples of it are far from equal sums
@@ -16,7 +16,8 @@ def sides(field: Function) -> Function | None:
     Parameters
     ----------
     field : Function
-        Of a system; conditions in time alone do not count, see `problems.analysis.switches`.
+        Of a system; conditions in time alone do not count, see `problems.analysis.switches`, except those
+        of a rounded number, which have no end.
 
     Returns
     -------
@@ -29,7 +30,8 @@ def sides(field: Function) -> Function | None:
     found = [
         node
         for node in reachable(field.roots)
-        if (has_kink(node) or node.op == "table") and node.args[0].flags & STATE
+        if (has_kink(node) or node.op == "table")
+        and node.args[0].flags & (STATE | T if node.op == "round" else STATE)
     ]
     if not found:
         return None
@@ -49,6 +51,8 @@ def _side(node: Node) -> Node:
     if node.op == "table":
         knots = node.data.knots
         side = graph.table(x, Table(knots, tuple((float(i),) for i in range(len(knots) - 1))))
+    elif node.op == "round":
+        side = node
     else:
         side = graph.where(x, graph.const(1.0), graph.const(0.0))
     return side if node.loop is None else graph.sum(side, node.loop)
@@ -64,6 +68,8 @@ def _distance(node: Node) -> Node:
             for pieces in (ends[:-1], ends[1:])
         )
         x = (x - low) * (high - x)
+    elif node.op == "round":
+        x = 0.25 - (x - node) ** 2
     return x if node.loop is None else _smallest(graph.sum(_inverse_square(x), node.loop))
 
 

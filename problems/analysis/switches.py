@@ -40,7 +40,9 @@ class Switches:
         self._nodes = [
             node
             for node in nodes
-            if (has_kink(node) or node.op == "table") and node.args[0].flags & (T | STATE) == T
+            if (has_kink(node) or node.op == "table")
+            and node.args[0].flags & (T | STATE) == T
+            and node.op != "round"  # which switches without end: see `problems.analysis.sides`
         ]
 
     @cached_property

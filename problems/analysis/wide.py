@@ -22,9 +22,10 @@ _DIGITS = 36
 _WIDE = mpmath.MPContext()  # of its own: the precision of mpmath.mp belongs to the user
 _WIDE.dps = _DIGITS
 _OPERATIONS: dict[str, Callable[..., Any]] = {
-    **{name: getattr(_WIDE, name) for name in FUNCTIONS if name not in ("abs", "sign")},
+    **{name: getattr(_WIDE, name) for name in FUNCTIONS if name not in ("abs", "sign", "round")},
     "abs": abs,
     "sign": lambda x: _WIDE.mpf(-1 if x < 0 else 1),
+    "round": _WIDE.nint,
     "add": operator.add,
     "sub": operator.sub,
     "mul": operator.mul,

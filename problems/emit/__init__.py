@@ -35,7 +35,7 @@ _WRITERS = {"numpy": numpy_text, "numba": numba_text, "jax": jax_text, "heyoka":
 BACKENDS = tuple(_WRITERS)
 LONG, PER_SECOND = 3000, 400  # operations of a field of which its writer is told; compiled in a second, about
 _COST = {name: function.cost for name, function in FUNCTIONS.items()} | {"table": SLOW}
-_MATHEMATICS = sorted({function.numba.partition("(")[0] for function in FUNCTIONS.values()})
+_MATHEMATICS = sorted({f.numba.partition("(")[0] for f in FUNCTIONS.values()} - {""})
 _NUMBA_HEAD = f"""from math import {", ".join(_MATHEMATICS)}
 
 import numba

@@ -20,7 +20,7 @@ class _HeyokaPrinter(Printer):
             self.names[node.id] = "t" if space == "t" else f"{space}[{place}]"
         elif node.op in FUNCTIONS and node.op not in _FUNCTIONS:
             raise InputError(
-                f"heyoka cannot compute m.{node.op} to all digits; use a method of another library."
+                f"heyoka has no m.{node.op} that is right to all digits; use a method of another library."
             )
         else:
             super().let(node, index)

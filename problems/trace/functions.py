@@ -17,6 +17,8 @@ ONE = Fraction(1)
 SLOW = 10  # operations that take as long to compile as a sine
 _TWO_OVER_SQRT_PI = Fraction(2 / math.sqrt(math.pi))
 _INFINITY = math.inf
+WHOLE = 1.5 * 2.0**52
+"""Added to a double and subtracted again, it leaves the nearest whole number."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Elementary:
         Name in the library, or text with ``{}`` for the arguments; by default the same name. Those of
         numba are from `math`; those of NumPy and JAX without a dot from `scipy.special`.
     heyoka : str or None
-        The same; ``None`` for what heyoka cannot compute to all digits: it is refused.
+        The same; ``None`` for what heyoka does not have, or not to all digits: it is refused.
     latex : str
         Text with ``%s`` for the arguments.
     cost : int
@@ -182,6 +184,20 @@ _RECORDS = (
         cost=1,
         smooth=False,
         public=False,
+    ),
+    Elementary(
+        name="round",
+        value=lambda x: math.copysign(round(x), x),
+        derivative=None,
+        double_double=double_double.rint,
+        numpy="np.rint",
+        # The sum has no digits behind the point. Of numbers beyond 2^51 the result may be off by one.
+        numba=f"(({{}} + {WHOLE}) - {WHOLE})",
+        jax="jnp.rint",
+        heyoka=None,
+        latex=r"\operatorname{round}\left(%s\right)",
+        cost=1,
+        smooth=False,
     ),
     Elementary(
         name="sinh",

@@ -284,13 +284,16 @@ class Node:
     def _number(self, *_: Any) -> NoReturn:
         refuse(
             "this needs the value of a symbol",
-            "declare the argument m and use m.sqrt, m.sin, m.cos, m.tan, m.exp, m.log, m.abs, m.where",
+            "declare the argument m and use m.sqrt, m.sin, m.cos, m.exp, m.log, m.abs, m.round, m.where",
         )
 
     __float__ = __int__ = __complex__ = __index__ = __round__ = __trunc__ = __floor__ = __ceil__ = _number
 
     def _whole(self, *_: Any) -> NoReturn:
-        refuse("this takes // or % of a symbol", "write a smooth formula: m.sin and m.cos are periodic")
+        refuse(
+            "this takes // or % of a symbol",
+            "write it with m.round, or as a smooth formula: m.sin and m.cos are periodic",
+        )
 
     __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __divmod__ = __rdivmod__ = _whole
 

@@ -1,0 +1,93 @@
+"""Molecular dynamics: 108 Lennard-Jones atoms in a periodic box, beside a plain velocity Verlet in numba.
+
+Units are the atoms' own: mass, diameter and depth of the potential are 1. Each pair takes the nearest of its
+periodic images, by `m.round`; potential and force vanish at the cutoff, so that the energy is conserved.
+"""
+
+import numba
+import numpy as np
+from side_by_side import Comparison
+
+import integrators
+import problems
+
+ATOMS, BOX, CUT, END = 108, 5.2, 2.5, 0.25
+
+
+def H(q, p, m):
+    """Return the energy; the potential of a pair is (4/r^12 - 4/r^6) (1 - r^2/CUT^2)^3 up to the cutoff."""
+
+    def pair(i, j):
+        apart = [q[3 * i + c] - q[3 * j + c] for c in range(3)]
+        nearest = [d - BOX * m.round(d / BOX) for d in apart]
+        r2 = sum(d**2 for d in nearest)
+        faded = m.where(r2 < CUT**2, (1 - r2 / CUT**2) ** 3, 0.0)
+        return 4 * (1 / r2**6 - 1 / r2**3) * faded
+
+    kinetic = m.sum(lambda i: p[i] ** 2 / 2, range(3 * ATOMS))
+    return kinetic + m.sum(pair, [(i, j) for i in range(ATOMS) for j in range(i)])
+
+
+@numba.njit(error_model="numpy")
+def forces(q, f):
+    """Write the forces."""
+    f[:] = 0.0
+    for i in range(ATOMS):
+        for j in range(i):
+            d = q[3 * i : 3 * i + 3] - q[3 * j : 3 * j + 3]
+            d -= BOX * np.rint(d / BOX)
+            r2 = d[0] ** 2 + d[1] ** 2 + d[2] ** 2
+            if r2 < CUT**2:
+                fading = 1.0 - r2 / CUT**2
+                r6 = r2**-3
+                pull = 4.0 * ((-12.0 * r6**2 + 6.0 * r6) / r2 * fading - 6.0 / CUT**2 * (r6**2 - r6))
+                for c in range(3):
+                    f[3 * i + c] -= pull * fading**2 * d[c]
+                    f[3 * j + c] += pull * fading**2 * d[c]
+
+
+@numba.njit
+def verlet(q, p, h, steps):
+    """Return the state after so many steps."""
+    q, p, f = q.copy(), p.copy(), np.empty_like(q)
+    forces(q, f)
+    for _ in range(steps):
+        p += 0.5 * h * f
+        q += h * p
+        forces(q, f)
+        p += 0.5 * h * f
+    return np.concatenate((q, p))
+
+
+def compare() -> Comparison:
+    """Integrate the melting crystal with ours, and with Verlet's steps of two lengths."""
+    cell = np.array([(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)]) / 2
+    corner = np.argwhere(np.ones((3, 3, 3)))
+    q0 = (BOX / 3 * (corner[:, None] + cell)).ravel()
+    p0 = np.random.default_rng(1).standard_normal((ATOMS, 3))
+    box = problems.Hamiltonian(H, dof=3 * ATOMS, name="box")
+    problem = problems.Problem(box, q0=q0, p0=(p0 - p0.mean(axis=0)).ravel(), t_end=END)
+
+    def run(method) -> np.ndarray:
+        return integrators.integrate(problem, method, [END]).y[-1]
+
+    exact = run(integrators.Gauss(s=6, h=0.0025))
+
+    def error(y: np.ndarray) -> float:
+        return np.abs(y - exact)[: 3 * ATOMS].max()
+
+    def energy(y: np.ndarray) -> float:
+        return problem.errors(y)["energy"].max()
+
+    made = Comparison(
+        "Molecular dynamics: 108 atoms in a periodic box", "positions, of a diameter of 1", 1e-3
+    )
+    ours = integrators.HBVM(k=4, s=2, h=0.005)
+    made.add("HBVM(k=4, s=2, h=0.005)", lambda: run(ours), error, energy)
+    made.add("Verlet in numba, h=0.005", lambda: verlet(q0, problem.y0[3 * ATOMS :], 5e-3, 50), error, energy)
+    made.add("Verlet in numba, h=5e-4", lambda: verlet(q0, problem.y0[3 * ATOMS :], 5e-4, 500), error, energy)
+    return made
+
+
+if __name__ == "__main__":
+    print(compare())

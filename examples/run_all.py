@@ -1,0 +1,83 @@
+"""Run the fourteen tasks, each in a process of its own, and write examples/measured.json and docs/tasks.md.
+
+``python examples/run_all.py``; with ``--page`` the page alone, from what is stored.
+"""
+
+import json
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from importlib import import_module
+from multiprocessing import get_context
+from pathlib import Path
+
+from side_by_side import Comparison, Row
+
+STORED = Path(__file__).parent / "measured.json"
+PAGE = Path(__file__).parents[1] / "docs" / "tasks.md"
+TASKS = (
+    "own_system", "section", "long_runs", "campaign", "encounters", "stiff", "lattice", "star_cluster", "plugin",
+    "exponents", "fit", "impacts", "short", "molecular_dynamics",
+)  # fmt: skip
+BUSY = 0.5  # other processes that wanted a core in the last minute
+INTRODUCTION = """# Fourteen tasks, beside the library one would otherwise use
+
+Each is a short script in [examples](../examples/side_by_side.py), which the tests run. A library is accurate enough if its error is at most the one that
+is asked for; the verdict compares those alone. "First call" contains compilation, unless the machine has compiled the same before; "time" is the
+median of further calls. This page is written by `make examples`.
+"""
+
+
+def compared(name: str) -> Comparison:
+    """Return what a script measures."""
+    return import_module(name).compare()
+
+
+def measure() -> None:
+    """Run all, and store what they measure with the kind of machine and what else it did."""
+    from hbvm_bench.measure import machine
+
+    busy = os.getloadavg()[0]
+    results = {}
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
+        for name in TASKS:
+            results[name] = pool.submit(compared, name).result()
+            print(results[name], end="\n\n", flush=True)
+    stored = {
+        "machine": machine.sentence(machine.describe(measure=True)),
+        "busy": round(busy, 2),
+        "tasks": {name: asdict(result) for name, result in results.items()},
+    }
+    STORED.write_text(json.dumps(stored, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def page() -> str:
+    """Return the page of what is stored."""
+    stored = json.loads(STORED.read_text(encoding="utf-8"))
+    lines = [INTRODUCTION, stored["machine"]]
+    if stored["busy"] > BUSY:
+        lines.append(
+            f"**Other work ran on the machine ({stored['busy']} processes at the start): these times are "
+            "provisional.**"
+        )
+    for name, fields in stored["tasks"].items():
+        made = Comparison(**{**fields, "rows": [Row(**row) for row in fields["rows"]]})
+        table = ["| | time | first call | energy | error |", "|:--|--:|--:|--:|--:|"]
+        for row in made.rows:
+            energy = "–" if row.energy is None else f"{row.energy:.1e}"
+            cells = (f"{1e3 * row.seconds:.3g} ms", f"{row.first:.2g} s", energy, f"{row.error:.1e}")
+            table.append(f"| {row.library} | {' | '.join(cells)} |")
+        lines += [
+            f"\n## {made.task}",
+            f"[examples/{name}.py](../examples/{name}.py). Error: {made.error}, at most {made.asked:g}.",
+            "\n".join(table),
+            made.verdict().replace("none", "None", 1) + ".",
+        ]
+    return "\n\n".join(line.strip("\n") for line in lines) + "\n"
+
+
+if __name__ == "__main__":
+    if "--page" not in sys.argv:
+        measure()
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,63 @@
+"""A stiff system: HIRES, eight reactions that light sets off in a plant, with rates from 0.0007 to 280.
+
+The equations and the state at the end are those of F. Mazzia, C. Magherini, Test Set for Initial Value
+Problem Solvers, release 2.4.
+"""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from side_by_side import Comparison
+
+import integrators
+import problems
+
+END = 321.8122
+START = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0057])
+EXACT = np.array([
+    7.371312573325668e-4, 1.442485726316185e-4, 5.888729740967575e-5, 1.175651343283149e-3,
+    2.386356198831331e-3, 6.238968252742796e-3, 2.849998395185769e-3, 2.850001604814231e-3,
+])  # fmt: skip
+
+
+def reactions(y):
+    """Return the derivative of the eight concentrations, for any library."""
+    fast = 280.0 * y[5] * y[7]
+    return [
+        -1.71 * y[0] + 0.43 * y[1] + 8.32 * y[2] + 0.0007,
+        1.71 * y[0] - 8.75 * y[1],
+        -10.03 * y[2] + 0.43 * y[3] + 0.035 * y[4],
+        8.32 * y[1] + 1.71 * y[2] - 1.12 * y[3],
+        -1.745 * y[4] + 0.43 * y[5] + 0.43 * y[6],
+        -fast + 0.69 * y[3] + 1.71 * y[4] - 0.43 * y[5] + 0.69 * y[6],
+        fast - 1.81 * y[6],
+        -fast + 1.81 * y[6],
+    ]
+
+
+def by_scipy(method: str) -> np.ndarray:
+    """Return the end by one of SciPy's methods for stiff systems, which makes the Jacobian by differences."""
+    return solve_ivp(
+        lambda t, y: reactions(y), (0.0, END), START, method, [END], rtol=1e-10, atol=1e-13
+    ).y[:, -1]  # fmt: skip
+
+
+def compare() -> Comparison:
+    """Integrate it with ours and with SciPy's methods."""
+    problem = problems.Problem(problems.VectorField(reactions, dim=8), y0=START, t_end=END)
+    made = Comparison("A stiff system: HIRES", "end, relative to each concentration", 1e-8)
+
+    def error(y) -> float:
+        return np.abs(y / EXACT - 1.0).max()
+
+    for name, method in (("HBVM()", integrators.HBVM()), ("HBVM(tol=1e-10)", integrators.HBVM(tol=1e-10))):
+        made.add(
+            name, lambda method=method: integrators.integrate(problem, method, [END]),
+            lambda solution: error(solution.y[-1]),
+        )  # fmt: skip
+    made.add("SciPy's Radau", lambda: by_scipy("Radau"), error, calls=0)
+    made.add("SciPy's LSODA", lambda: by_scipy("LSODA"), error, calls=0)
+    return made
+
+
+if __name__ == "__main__":
+    print(compare())
