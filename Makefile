@@ -7,10 +7,13 @@ PIP     = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 REPORTS ?= sitnikov
 
-.PHONY: bench pages reports test test-all test-aarch64 docs lint format venv lock clean
+.PHONY: bench examples pages reports test test-all test-aarch64 docs lint format venv lock clean
 
 bench: venv  ## run Sitnikov through every integrator: results and report in runs/sitnikov/, where git does not look
 	$(BIN)/hbvm-bench run sitnikov --report runs/sitnikov/report
+
+examples: venv  ## the fourteen tasks beside other libraries: writes examples/measured.json and docs/tasks.md
+	$(BIN)/python examples/run_all.py
 
 reports: venv  ## write the committed reports of campaigns, REPORTS="sitnikov drift ...", from runs/; what is missing there runs
 	for name in $(REPORTS); do $(BIN)/hbvm-bench run $$name --report reports/$$name || exit 1; done

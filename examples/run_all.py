@@ -17,15 +17,16 @@ from side_by_side import Comparison, Row
 STORED = Path(__file__).parent / "measured.json"
 PAGE = Path(__file__).parents[1] / "docs" / "tasks.md"
 TASKS = (
-    "own_system", "section", "long_runs", "campaign", "encounters", "stiff", "lattice", "star_cluster", "plugin",
-    "exponents", "fit", "impacts", "short", "molecular_dynamics",
+    "own_system", "section", "long_runs", "campaign", "encounters", "stiff", "lattice", "star_cluster",
+    "plugin", "exponents", "fit", "impacts", "short", "molecular_dynamics",
 )  # fmt: skip
 BUSY = 0.5  # other processes that wanted a core in the last minute
 INTRODUCTION = """# Fourteen tasks, beside the library one would otherwise use
 
-Each is a short script in [examples](../examples/side_by_side.py), which the tests run. A library is accurate enough if its error is at most the one that
-is asked for; the verdict compares those alone. "First call" contains compilation, unless the machine has compiled the same before; "time" is the
-median of further calls. This page is written by `make examples`.
+Each is a short script in [examples](../examples/side_by_side.py), which the tests run. A library is accurate
+enough if its error is at most the one that is asked for; the verdict compares those alone. "First call"
+contains compilation, unless the machine has compiled the same before; "time" is the median of further calls.
+This page is written by `make examples`.
 """
 
 

@@ -1,5 +1,6 @@
 """Each example script runs, and says what it says it shows."""
 
+import json
 import os
 import subprocess
 import sys
@@ -11,28 +12,50 @@ SCRIPTS = Path(__file__).parents[2] / "examples"
 
 SAYS = {
     "bouncing_ball.py": ["by an event: each impact found: True to 1e-9: True", "us each"],
+    "own_system.py": ["accurate: HBVM(), SciPy's DOP853, heyoka"],
+    "long_runs.py": ["accurate: Gauss(s=8, h=1.5), REBOUND's IAS15, heyoka"],
+    "campaign.py": ["accurate: hbvm-bench run"],
+    "encounters.py": ["accurate: HBVM(), REBOUND's IAS15, heyoka"],
+    "stiff.py": ["accurate: HBVM(), HBVM(tol=1e-10), SciPy's Radau, SciPy's LSODA"],
+    "star_cluster.py": ["accurate: HBVM(), REBOUND's IAS15\n"],
+    "plugin.py": ["accurate: HBVM, SciPy's DOP853"],
+    "fit.py": ["accurate: HBVM(tol=1e-10), variations, diffrax's Dopri8, jacfwd"],
+    "impacts.py": ["104 impacts", "accurate: HBVM(), Event(then=...), heyoka, callbacks"],
+    "short.py": ["accurate: HBVM(tol=1e-12), heyoka, SciPy's DOP853"],
+    "molecular_dynamics.py": ["accurate: HBVM(k=4, s=2, h=0.005), Verlet"],
     "geodesics.py": ["from 3.30 to 20.47 ", "energy kept: True"],
-    "lattice.py": ["energy kept: True"],
+    "lattice.py": ["accurate: HBVM(k=8, s=4, h=0.25), heyoka, SciPy's DOP853"],
     "bodies.py": ["the same places to 1e-8 au: True", "names are kept: True"],
-    "exponents.py": ["the interval holds 0.9056: True", "their sum is -41/3: True"],
+    "exponents.py": ["accurate: integrators.lyapunov, heyoka"],
     "ensemble.py": ["28% of 10000 orbits are chaotic"],
     "own_campaign.py": ["exit code: 0 report: True", "DOP853"],
     "mass_matrix.py": ["the same trajectory as SciPy's: True", "energy kept: True"],
     "measured_forcing.py": ["steps that end at a knot: 40 of 40"],
     "long_run.py": ["interrupted at t = ", "the same bits as without a break: True"],
-    "section.py": ["3600 passages", "each on the surface: True", "each at the energy: True"],
+    "section.py": ["3793 passages", "accurate: HBVM(), heyoka"],
     "solution.py": ["the same from a file: True True", "the same from another process: True"],
 }
 
 
 def test_every_script_has_its_words():
-    names = {path.name for path in SCRIPTS.glob("*.py")} - {"side_by_side.py"}  # which others import
+    names = {path.name for path in SCRIPTS.glob("*.py")} - {
+        "side_by_side.py",
+        "run_all.py",
+    }  # which others import, and which runs others
     assert names == set(SAYS)
 
 
+def test_the_page_of_tasks_is_what_is_stored(monkeypatch):
+    monkeypatch.syspath_prepend(str(SCRIPTS))
+    import run_all
+
+    assert set(json.loads(run_all.STORED.read_text(encoding="utf-8"))["tasks"]) == set(run_all.TASKS)
+    assert run_all.page() == run_all.PAGE.read_text(encoding="utf-8")
+
+
 # Its reference is computed by two methods, half a minute of compiling (that of the tutorial is stored);
-# bodies.py compiles for 14 s, and exponents.py lets SciPy compute for 10.
-SLOW = {"own_campaign.py", "bodies.py", "exponents.py"}
+# campaign.py starts seven processes; bodies.py compiles for 14 s, and XLA does in fit.py for 5.
+SLOW = {"own_campaign.py", "campaign.py", "bodies.py", "fit.py"}
 
 
 @pytest.mark.parametrize(

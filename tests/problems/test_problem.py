@@ -200,3 +200,12 @@ def test_all_registered_problems_load_by_their_defaults():
         problem = problems.load(name)
         assert problem.name == name
         assert repr(problem).startswith(f"{name}(")
+
+
+def test_replace_keeps_what_is_not_replaced():
+    problem = swinging(parameters={"m": 3.0})
+    other = problem.replace(y0=[1.0, 0.0], parameters={"k": 2.0}, t_end=5.0)
+    assert problem.system.unpack(other.par) == {"m": 3.0, "k": 2.0}
+    assert (other.system, other.y0.tolist(), other.t_end) == (problem.system, [1.0, 0.0], 5.0)
+    with pytest.raises(InputError, match="y0 must be"):
+        problem.replace(y0=[1.0])
