@@ -96,8 +96,11 @@ class Comparison:
         first, *others = self.accurate
         if not others:
             return f"only {first.library} is accurate enough"
-        ratios = [f"{row.seconds / first.seconds:.2g} times as long" for row in others]
-        said = (f"{row.library} takes {ratio}" for row, ratio in zip(others, ratios, strict=True))
+        ratios = [row.seconds / first.seconds for row in others]
+        said = (
+            f"{row.library} takes {ratio:.{1 if ratio < 10 else 0}f} times as long"
+            for row, ratio in zip(others, ratios, strict=True)
+        )
         return f"{first.library} is the fastest; " + ", ".join(said)
 
     def __str__(self) -> str:
