@@ -147,9 +147,9 @@ class CVODEStepper(StepperBase):
     """A trajectory of CVODE.
 
     ``"partial"`` (default)
-        CVODE's own steps. A time between two of them is given by its polynomial, of the formula's order.
+        CVODE's steps. A time between two of them is given by its polynomial, of the formula's order.
     ``"steps"``
-        Its own steps, up to the last time.
+        Its steps, up to the last time.
     ``"stop"``
         The last step before each time is shortened onto it. From the start to one time it is one call of
         scikit-sundae's ``solve``.
@@ -162,7 +162,7 @@ class CVODEStepper(StepperBase):
         self._program, self._par = program, par
         self._solver = program.solver(par)
         self._sign = self._evaluated = 0
-        self._tn, self._yn = t, y  # the last of its own steps, which may be ahead of the present
+        self._tn, self._yn = t, y  # the last of its steps, which may be ahead of the present
 
     def _towards(self, end: float) -> float:
         """Return the sign of the direction to ``end``, with a solver that goes that way."""

@@ -42,9 +42,12 @@ NOT_ASKED = {
         "integrators.running.watch",
         "integrators.running.run",
         "integrators.running.variations",
+        "integrators.running.digits",
     ),
     # what takes times, and no case is integrated by
-    *("hbvm_bench.measure.ensemble", "hbvm_bench.measure.timing"),
+    *("hbvm_bench.measure.ensemble", "hbvm_bench.measure.timing", "hbvm_bench.measure.machine"),
+    # how a worker ends, and what memory it took
+    *("hbvm_bench.run.ending", "hbvm_bench.measure.memory"),
     # which many trajectories may be asked for, and a case is not
     *("integrators.events", *(f"integrators.events.{name}" for name in ("event", "finder", "members"))),
 }
