@@ -150,7 +150,7 @@ def width_for(system: System, second: bool, rows: int, varying: bool) -> int:
     sixteen, an exponential of one component twice as fast with 32). Adaptive steps wait for those
     of their control (Henon and Heiles: 8 % faster with sixteen). With fewer registers adaptive steps of few
     components go eight by eight: a value fills two registers of AVX2 then (Henon and Heiles 18 %, Kepler 9 %
-    and Morse 7 % faster than with sixteen, sixteen and 32; with four 6 % to 57 % slower than with eight).
+    and Morse 7 % faster than with sixteen, sixteen and 32; with four 18 % to 57 % slower than with eight).
     """
     if varying and not machine.many_registers():
         return LANES
