@@ -17,6 +17,7 @@ import integrators.registry
 from hbvm_bench.campaign.identity import version_of
 from hbvm_bench.measure import machine, timing
 from hbvm_bench.measure.timing import calibrate
+from integrators.peers import without_wheels
 from problems.errors import InputError
 
 State = Literal["ok", "note", "bad"]
@@ -31,7 +32,10 @@ LOOKS, PAUSE = 9, 0.03  # at the processes that run: something short always does
 
 # Of each optional extra its libraries, and what happens without them.
 EXTRAS = {
-    "peers": (("heyoka", "rebound", "diffrax"), "their methods are refused, and only HBVM and Gauss run"),
+    "peers": (
+        ("heyoka", "rebound", "diffrax", "pyhamsys", "scikit-sundae"),
+        "their methods are refused, and only HBVM and Gauss run",
+    ),
     "dask": (("distributed",), "--executor dask:// does not work"),
     "export": (("pyarrow",), "export writes CSV only"),
 }
@@ -78,7 +82,10 @@ def libraries() -> list[Finding]:
             try:
                 found.append(Finding(name, "ok", version(name)))
             except PackageNotFoundError:
-                found.append(Finding(name, state, *missing))
+                absent = Finding(name, state, *missing)
+                if name in without_wheels():
+                    absent = Finding(name, "note", "not installed: it has no wheels for this system")
+                found.append(absent)
     return found
 
 

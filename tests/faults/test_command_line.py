@@ -41,12 +41,12 @@ list --foo                                                 | No such option: --f
 --foo                                                      | No such option: --foo
 -x                                                         | No such option: -x
 run                                                        | give a campaign, or at least one -p
-run ""                                                     | unknown campaign ''; known: automatic, drift,
+run ""                                                     | unknown campaign ''; known: automatic, chaos,
 run sitnikof                                               | unknown campaign 'sitnikof'; did you mean
 run missing.toml                                           | there is no campaign file 'missing.toml'
-run .                                                      | unknown campaign '.'; known: automatic, drift,
+run .                                                      | unknown campaign '.'; known: automatic, chaos,
 run .toml                                                  | unknown campaign '.toml'; known:
-run /                                                      | unknown campaign '/'; known: automatic, drift,
+run /                                                      | unknown campaign '/'; known: automatic, chaos,
 run /dev/null                                              | unknown campaign '/dev/null'; known:
 run sitnikov sitnikov                                      | Got unexpected extra argument(s) (sitnikov)
 run sitnikov --jobs 0                                      | Invalid value for '--jobs': Input should be

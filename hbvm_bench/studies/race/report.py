@@ -121,9 +121,11 @@ def contests(results: Results) -> list[Section]:
 @block
 def terms(results: Results) -> Section:
     """Return by what rules they competed."""
-    families = [f"{family.title}: {family.code}" for family in FAMILIES.values()]
+    races = of(results)
+    ran = {name for race in races for name in race.families}
+    families = [f"{family.title}: {family.code}" for name, family in FAMILIES.items() if name in ran]
     blocks = [
-        Items(rules(of(results)), "numbered"),
+        Items(rules(races), "numbered"),
         "Origin of the machine code:",
         Items(families),
     ]
