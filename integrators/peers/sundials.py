@@ -27,6 +27,7 @@ SUNDIALS = """\
   doi = {10.1145/1089014.1089020}
 }
 """
+UNMOVED = 100  # steps in succession that leave t as it is, after which CVODE would go on for ever
 ENDLESS = 2**31 - 1  # steps of one call, which the watchdog ends instead
 DENSE, SPARSE = 64, 0.1  # a Jacobian of more rows, of which a smaller part is not zero, is a sparse matrix
 
@@ -232,14 +233,22 @@ class CVODEStepper(StepperBase):
         before = self._tn
         end = before + self._sign * self._far(before) if stop is None else stop
         try:
+            # After a time within a step CVODE returns that step once more.
             found = self._solver.step(end, "onestep", stop)
-            if found.t == before and found.success:  # it repeats a step after a time within it
+            for _ in range(UNMOVED):
+                if found.t != before or not found.success:
+                    break
                 found = self._solver.step(end, "onestep", stop)
         except UserError as raised:
             self._broken(raised, before)
             return False
         self._note(found)
         if self._refused(found, before):
+            return False
+        if found.t == before:
+            self._fail(
+                Status.STEP_UNDERFLOW, before, f"CVODE's steps at t = {before!r} are too short to change t."
+            )
             return False
         self._stats.steps += 1
         self._tn, self._yn = float(found.t), np.array(found.y, dtype=np.float64)
