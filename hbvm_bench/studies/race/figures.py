@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hbvm_bench.report.figures.canvas import Picture, log_axis, new, picture, styled
@@ -30,9 +31,9 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
     rows = {row: records for row, records in counted if records}
     if not rows:
         return None
-    figure = new(10.4, 4.6)
-    left, right, side = figure.subplots(1, 3, width_ratios=[1, 1, 0.52])
-    figure.subplots_adjust(left=0.055, right=0.995, top=0.93, bottom=0.11, wspace=0.2)
+    figure = new(7.6, 5.0)  # narrow enough that its labels can be read on a phone
+    left, right = figure.subplots(1, 2)
+    figure.subplots_adjust(left=0.07, right=0.98, top=0.94, bottom=0.31, wspace=0.22)
     panels = [
         _panel(axes, f"{title}, relative", level, key, rows, look)
         for axes, title, level, key in (
@@ -40,7 +41,7 @@ def work_precision(race: Race, look: Mapping[str, Look]) -> Picture | None:
             (right, "position error at the end", race.asked[1], POSITION),
         )
     ]
-    _legend(side, list(dict.fromkeys(row.family for row in rows)), look)
+    _legend(figure, list(dict.fromkeys(row.family for row in rows)), look)
     energy, position = map(power, race.asked)
     return picture(
         figure,
@@ -115,8 +116,7 @@ def _error(record: Record, key: str) -> float:
     return number(record, key) or 0.0
 
 
-def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> None:
-    axes.set_axis_off()
+def _legend(figure: Figure, families: Sequence[str], look: Mapping[str, Look]) -> None:
     handles: list[Line2D] = []
     for family in families:
         for name in ("HBVM", "Gauss") if family == OURS else (family,):
@@ -127,7 +127,7 @@ def _legend(axes: Axes, families: Sequence[str], look: Mapping[str, Look]) -> No
     mark = {"color": MUTED, "marker": "o", "markersize": 5}
     handles.append(Line2D([], [], linestyle="solid", label=FIXED, **mark))
     handles.append(Line2D([], [], linestyle=DOTTED, label=OWN, mfc=PAPER, **mark))
-    axes.legend(handles=handles, loc="center left", borderaxespad=0.0, fontsize=8.5)
+    figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=8.5)
 
 
 def _summary(race: Race) -> str:
