@@ -64,15 +64,15 @@ class J2(CheckedOptions):
 
     def energy(self, q: Any, p: Any, masses: Any, G: Any, m: Any) -> Any:
         """Return the energy that it adds."""
-        axis, found, i = self._axis(), 0.0, self.body
+        axis, total, i = self._axis(), 0.0, self.body
         for j in range(len(masses)):
             if j != i:
                 d = [q[3 * j + c] - q[3 * i + c] for c in range(3)]
                 square = _dot(d, d)
                 height = _dot(axis, d)
                 cubed = square * m.sqrt(square)
-                found = found + masses[j] * (3 * height * height / square - 1) / cubed
-        return G * masses[i] * self.J2 * self.R**2 / 2 * found
+                total = total + masses[j] * (3 * height * height / square - 1) / cubed
+        return G * masses[i] * self.J2 * self.R**2 / 2 * total
 
     def pull(self, d: list[Any], m: Any) -> list[Any]:
         """Return the acceleration at d from the body, for G M = 1."""
@@ -113,19 +113,19 @@ class PostNewtonian(CheckedOptions):
         momenta = [[p[3 * i + c] for c in range(3)] for i in range(n)]
         squares = [_dot(momentum, momentum) for momentum in momenta]
         depth: list[Any] = [0.0] * n
-        found = 0.0
+        total = 0.0
         for a in range(n):
-            found = found - squares[a] * squares[a] / (8 * masses[a] * masses[a] * masses[a])
+            total = total - squares[a] * squares[a] / (8 * masses[a] * masses[a] * masses[a])
             for b in range(a):
                 d = [q[3 * a + c] - q[3 * b + c] for c in range(3)]
                 r = m.sqrt(_dot(d, d))
                 along = _dot(d, momenta[a]) * _dot(d, momenta[b]) / (r * r)
                 own = 3 * (squares[a] * masses[b] / masses[a] + squares[b] * masses[a] / masses[b])
-                found = found - G / r * (own - (7 * _dot(momenta[a], momenta[b]) + along)) / 2
+                total = total - G / r * (own - (7 * _dot(momenta[a], momenta[b]) + along)) / 2
                 depth[a], depth[b] = depth[a] + masses[b] / r, depth[b] + masses[a] / r
         for a in range(n):
-            found = found + G * G * masses[a] * depth[a] * depth[a] / 2
-        return found / self.c**2
+            total = total + G * G * masses[a] * depth[a] * depth[a] / 2
+        return total / self.c**2
 
 
 Force = J2 | PostNewtonian | Callable[..., Any]
@@ -194,8 +194,8 @@ def nbody(
     """
     mass, n = _masses(masses), np.size(masses)
     x, v = (
-        _rows(what, given, n + massless)
-        for what, given in (("positions", positions), ("velocities", velocities))
+        _rows(label, given, n + massless)
+        for label, given in (("positions", positions), ("velocities", velocities))
     )
     for a in range(n + massless):
         same = np.flatnonzero((x[: min(a, n)] == x[a]).all(axis=1))
@@ -271,14 +271,14 @@ def _called(force: Callable[..., Any], given: dict[str, Any], total: int) -> lis
     names = list(inspect.signature(force).parameters)
     if unknown := [name for name in names if name not in given]:
         raise InputError(f"a force has no argument {unknown[0]!r}; it may name t, x, v, masses and m.")
-    found = force(*[given[name] for name in names])
+    components = force(*[given[name] for name in names])
     try:
-        right = len(found) == total and all(len(row) == 3 for row in found)
+        right = len(components) == total and all(len(row) == 3 for row in components)
     except TypeError:
         right = False
     if not right:
         raise InputError(f"a force must return three accelerations for each of the {total} bodies.")
-    return list(found)
+    return list(components)
 
 
 def _momenta(system: System, t: float, q: Array, v: Array, masses: Array) -> Array:
@@ -296,25 +296,25 @@ def _momenta(system: System, t: float, q: Array, v: Array, masses: Array) -> Arr
 
 def _masses(masses: ArrayLike) -> Array:
     try:
-        found = np.array(masses, dtype=np.float64)
+        values = np.array(masses, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.empty((0, 0))
-    if found.ndim != 1 or not found.size or not (np.isfinite(found) & (found > 0.0)).all():
+        values = np.empty((0, 0))
+    if values.ndim != 1 or not values.size or not (np.isfinite(values) & (values > 0.0)).all():
         raise InputError(
             f"masses={shown(masses)} must be a list of positive numbers; bodies without mass come last, "
             "and massless= says how many they are."
         )
-    return found
+    return values
 
 
-def _rows(what: str, rows: ArrayLike, n: int) -> Array:
+def _rows(label: str, rows: ArrayLike, n: int) -> Array:
     try:
-        found = np.array(rows, dtype=np.float64)
+        values = np.array(rows, dtype=np.float64)
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.shape != (n, 3) or not np.isfinite(found).all():
-        raise InputError(f"{what} must be finite numbers of shape ({n}, 3), not {shown(rows)}.")
-    return found
+        values = np.empty(0)
+    if values.shape != (n, 3) or not np.isfinite(values).all():
+        raise InputError(f"{label} must be finite numbers of shape ({n}, 3), not {shown(rows)}.")
+    return values
 
 
 def _dot(a: Sequence[Any], b: Sequence[Any]) -> Any:

@@ -95,12 +95,12 @@ class _File:
 
     def checked(self, owner: str, name: str, value: Any) -> Path:
         try:
-            found = Path(value)
+            path = Path(value)
         except TypeError:
-            found = None
-        if found is None or "\0" in str(found):
+            path = None
+        if path is None or "\0" in str(path):
             raise refusal(owner, name, value, "a path of a file, such as 'pendulum.npz'")
-        return found
+        return path
 
 
 File = Annotated[str | os.PathLike[str], _File()]
@@ -147,11 +147,11 @@ def checked(owner: str, name: str, value: Any, annotation: Any) -> Any:
             return condition.checked(owner, name, value)
     conditions = [condition for condition in conditions if isinstance(condition, Must)]
     words, read = _KINDS.get(kind, ("", lambda value: value))
-    found = read(value)
-    if (words and found is None) or not all(must.holds(found) for must in conditions):
+    result = read(value)
+    if (words and result is None) or not all(must.holds(result) for must in conditions):
         # The narrowest condition is the one that is told.
         raise refusal(owner, name, value, conditions[0].be if conditions else words)
-    return found
+    return result
 
 
 def _allows_everything(annotation: Any) -> bool:
@@ -171,17 +171,17 @@ def number(value: Any) -> float | None:
     """Return a finite number as a float, one of NumPy's too; ``None`` for anything else."""
     try:
         wrong = isinstance(value, bool | np.bool_ | str | bytes) or np.ndim(value)
-        found = math.nan if wrong else float(value)
+        result = math.nan if wrong else float(value)
     except (TypeError, ValueError, OverflowError):
         return None
-    return found if math.isfinite(found) else None
+    return result if math.isfinite(result) else None
 
 
 def numbers(value: Any) -> tuple[float, ...] | None:
     """Return a list, an array or a series of finite numbers as a tuple; ``None`` for anything else."""
     listed = value.tolist() if hasattr(value, "tolist") else value
-    found = [number(each) for each in listed] if isinstance(listed, list | tuple | range) else [None]
-    return None if None in found else tuple(found)  # type: ignore[return-value]
+    results = [number(each) for each in listed] if isinstance(listed, list | tuple | range) else [None]
+    return None if None in results else tuple(results)  # type: ignore[return-value]
 
 
 def whole(value: Any) -> int | None:
@@ -220,9 +220,9 @@ def _one_of(owner: str, name: str, value: Any, known: tuple[Any, ...]) -> Any:
         if not isinstance(value, str) or value not in known:
             raise unknown(f"{name} of {owner}", value, known)
         return value
-    if (found := whole(value)) not in known:
+    if (choice := whole(value)) not in known:
         raise refusal(owner, name, value, f"one of {', '.join(map(str, known))}")
-    return found
+    return choice
 
 
 class Arguments:
@@ -247,10 +247,16 @@ class Arguments:
         self.signature = signature
         self.parameters = signature.parameters
         self._defaults: dict[str, Any] = {}
-        self._by_place = [key for key, one in self.parameters.items() if one.kind is not one.KEYWORD_ONLY]
-        self._by_name = [key for key, one in self.parameters.items() if one.kind is one.KEYWORD_ONLY]
-        self._needed = [key for key, one in self.parameters.items() if one.default is EMPTY]
-        self._free = {key for key, one in self.parameters.items() if _allows_everything(one.annotation)}
+        self._by_place = [
+            key for key, parameter in self.parameters.items() if parameter.kind is not parameter.KEYWORD_ONLY
+        ]
+        self._by_name = [
+            key for key, parameter in self.parameters.items() if parameter.kind is parameter.KEYWORD_ONLY
+        ]
+        self._needed = [key for key, parameter in self.parameters.items() if parameter.default is EMPTY]
+        self._free = {
+            key for key, parameter in self.parameters.items() if _allows_everything(parameter.annotation)
+        }
 
     def check_names(self, values: Sequence[Any], options: Mapping[str, Any]) -> None:
         """Refuse what the signature does not take.
@@ -298,27 +304,27 @@ class Arguments:
 
     def value(self, key: str, value: Any) -> Any:
         """Return the value of one argument in the form in which it is used, or refuse it; see `checked`."""
-        one = self.parameters[key]
-        if value is not one.default:
-            return checked(self.owner, key, value, one.annotation)
+        parameter = self.parameters[key]
+        if value is not parameter.default:
+            return checked(self.owner, key, value, parameter.annotation)
         if key not in self._defaults:  # a default is checked once, not in every call
-            self._defaults[key] = checked(self.owner, key, value, one.annotation)
+            self._defaults[key] = checked(self.owner, key, value, parameter.annotation)
         return self._defaults[key]
 
     @functools.cached_property
     def _unchecked(self) -> dict[str, Any]:
         """The arguments in their order, with the defaults as a call gets them."""
         return {
-            key: EMPTY if one.default is EMPTY else self._used(key, one.default)
-            for key, one in self.parameters.items()
+            key: EMPTY if parameter.default is EMPTY else self._used(key, parameter.default)
+            for key, parameter in self.parameters.items()
         }
 
     def _used(self, key: str, value: Any) -> Any:
         if key in self._free:
             return value
-        found = self.value(key, value)
+        result = self.value(key, value)
         # A call prints as it was made: e=0, not e=0.0.
-        return value if type(value) in (int, float) else found
+        return value if type(value) in (int, float) else result
 
     def bind(self, values: Sequence[Any], options: Mapping[str, Any]) -> dict[str, Any]:
         """Return all arguments of a call by name, defaults included, checked.
@@ -342,7 +348,9 @@ class Arguments:
     def printed(self, values: Mapping[str, Any], first: Iterable[str] = ()) -> dict[str, Any]:
         """Return what a call is printed with: ``first``, then what differs from its default."""
         changed = (
-            key for key, one in self.parameters.items() if one.default is EMPTY or values[key] != one.default
+            key
+            for key, parameter in self.parameters.items()
+            if parameter.default is EMPTY or values[key] != parameter.default
         )
         return {key: values[key] for key in (*first, *changed)}
 
@@ -395,8 +403,8 @@ def readable(described: Described) -> Described:
 
 def _without_types(signature: inspect.Signature) -> inspect.Signature:
     plain = [
-        one.replace(annotation=EMPTY, default={} if one.default is NOTHING else one.default)
-        for one in signature.parameters.values()
+        parameter.replace(annotation=EMPTY, default={} if parameter.default is NOTHING else parameter.default)
+        for parameter in signature.parameters.values()
     ]
     return signature.replace(parameters=plain, return_annotation=EMPTY)
 
@@ -404,7 +412,7 @@ def _without_types(signature: inspect.Signature) -> inspect.Signature:
 class _Readable:
     """What ``help`` shows of a class: its options and their defaults; the docstring has the types."""
 
-    def __get__(self, made: object, cls: type) -> inspect.Signature:
+    def __get__(self, instance: object, cls: type) -> inspect.Signature:
         return _without_types(_signature(cls))
 
 
@@ -447,5 +455,7 @@ def _signature(cls: type) -> inspect.Signature:
 def _of_fields(cls: type[CheckedOptions]) -> Arguments:
     """Return what a dataclass takes; annotations that are text are read where they were written."""
     signature, known = _signature(cls), get_type_hints(cls, include_extras=True)
-    taken = [one.replace(annotation=known[one.name]) for one in signature.parameters.values()]
+    taken = [
+        parameter.replace(annotation=known[parameter.name]) for parameter in signature.parameters.values()
+    ]
     return Arguments(cls.__name__, signature.replace(parameters=taken), "option", cls._owner)

@@ -204,14 +204,14 @@ def _series(x: DD, coefficients: list[Fraction]) -> DD:
 
 @cache
 def _inverse_factorials(first: int, step: int, n: int, alternate: bool) -> list[Fraction]:
-    found: list[Fraction] = []
+    inverses: list[Fraction] = []
     factorial, at = 1, 0
     for k in range(n):
         for i in range(at + 1, first + k * step + 1):
             factorial *= i
         at = first + k * step
-        found.append(Fraction(-1 if alternate and k % 2 else 1, factorial))
-    return found
+        inverses.append(Fraction(-1 if alternate and k % 2 else 1, factorial))
+    return inverses
 
 
 def _reduced(a: DD, step: Fraction) -> tuple[DD, Array]:

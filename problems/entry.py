@@ -120,7 +120,7 @@ def entry(
                 raise unknown(f"argument of {name} in shows", key, taken.parameters)
 
         @functools.wraps(make)
-        def made(*values: P.args, **options: P.kwargs) -> Problem:
+        def factory(*values: P.args, **options: P.kwargs) -> Problem:
             call = taken.bind(values, options)
             problem = make(**call)  # type: ignore[call-arg]
             if not isinstance(problem, Problem):
@@ -133,7 +133,7 @@ def entry(
                 notes=words.notes,
             )
 
-        vars(made)["entry"] = words
-        return made
+        vars(factory)["entry"] = words
+        return factory
 
     return decorate

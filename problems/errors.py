@@ -67,11 +67,11 @@ def shown(value: object, longest: int = 80) -> str:
 
 def _brief(longest: int) -> reprlib.Repr:
     """Return what makes a text that begins as ``repr`` does and is not much longer than ``longest``."""
-    made = reprlib.Repr()
-    made.maxlist = made.maxtuple = made.maxdict = made.maxset = made.maxfrozenset = longest
-    made.maxdeque = made.maxarray = longest
-    made.maxstring = made.maxlong = made.maxother = 10 * longest
-    return made
+    printer = reprlib.Repr()
+    printer.maxlist = printer.maxtuple = printer.maxdict = printer.maxset = printer.maxfrozenset = longest
+    printer.maxdeque = printer.maxarray = longest
+    printer.maxstring = printer.maxlong = printer.maxother = 10 * longest
+    return printer
 
 
 def large(number: int) -> str:

@@ -51,12 +51,12 @@ def limit(name: str) -> float:
     return value
 
 
-def check(what: str, name: str, size: float, hint: str = "make it smaller") -> None:
+def check(label: str, name: str, size: float, hint: str = "make it smaller") -> None:
     """Refuse what would become larger than a limit.
 
     Parameters
     ----------
-    what : str
+    label : str
         What it is, as a user wrote it: ``"fput(n=100000000)"``.
     name : str
         Of the limit, see `LIMITS`.
@@ -73,7 +73,7 @@ def check(what: str, name: str, size: float, hint: str = "make it smaller") -> N
     most = limit(name)
     if size > most:
         raise InputError(
-            f"{what} has {_shown(size)} {LIMITS[name][1]}, and the limit is {most:,.15g}; {hint}, "
+            f"{label} has {_shown(size)} {LIMITS[name][1]}, and the limit is {most:,.15g}; {hint}, "
             f"or raise the limit with the environment variable {PREFIX}{name}."
         )
 

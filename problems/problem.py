@@ -296,16 +296,16 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names) if names else "nothing"
 
 
-def _numbers(what: str, value: ArrayLike | None, size: int | None) -> Array:
+def _numbers(label: str, value: ArrayLike | None, size: int | None) -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{what} must be numbers, not {shown(value)}.") from error
+        raise InputError(f"{label} must be numbers, not {shown(value)}.") from error
     if array.ndim != 1 or (size is not None and array.size != size):
         wanted = "a flat list" if size is None else f"a flat list of length {size}"
-        raise InputError(f"{what} must be {wanted}, not an array of shape {array.shape}.")
+        raise InputError(f"{label} must be {wanted}, not an array of shape {array.shape}.")
     if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite, not {shown(array.tolist())}.")
+        raise InputError(f"{label} must be finite, not {shown(array.tolist())}.")
     return array
 
 

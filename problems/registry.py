@@ -31,12 +31,12 @@ def _entries() -> "dict[str, list[EntryPoint]]":
     from importlib.metadata import EntryPoint, entry_points  # which takes long to import
 
     own = [EntryPoint(name, f"{catalogue.__name__}.{name}:{name}", GROUP) for name in built_in()]
-    found: dict[str, list[EntryPoint]] = {}
+    points_of: dict[str, list[EntryPoint]] = {}
     for point in (*own, *entry_points(group=GROUP)):
-        offered = found.setdefault(point.name, [])
+        offered = points_of.setdefault(point.name, [])
         if all(point.value != other.value for other in offered):
             offered.append(point)
-    return found
+    return points_of
 
 
 def built_in() -> list[str]:

@@ -20,7 +20,7 @@ FUNCTIONS = {
 
 @checked_arguments
 def from_sympy(
-    what: Any,
+    expression: Any,
     q: Sequence[Any] = (),
     p: Sequence[Any] = (),
     *,
@@ -32,7 +32,7 @@ def from_sympy(
 
     Parameters
     ----------
-    what : sympy.Expr, or a LagrangesMethod or KanesMethod
+    expression : sympy.Expr, or a LagrangesMethod or KanesMethod
         A Hamiltonian in the symbols ``q`` and ``p``; or a system of `sympy.physics.mechanics` whose equations
         have been formed. Their mass matrix is inverted symbolically, by ``rhs()``.
     q, p : sequence of sympy.Symbol
@@ -76,22 +76,22 @@ def from_sympy(
             raise InputError(f"the parameter {text!r} must be named as a variable is; rename the symbol.")
     times = {sympy.Symbol("t") if t is None else t}
     defaults = {text: float(values[symbol]) for symbol, text in names.items()}
-    if hasattr(what, "rhs") and hasattr(what, "u"):
-        state = [*what.q, *what.u]
-        right = [sympy.sympify(component) for component in what.rhs()]
+    if hasattr(expression, "rhs") and hasattr(expression, "u"):
+        state = [*expression.q, *expression.u]
+        right = [sympy.sympify(component) for component in expression.rhs()]
         places: dict[Any, Callable[..., Any]] = {x: _component("y", i) for i, x in enumerate(state)}
         formulas = [_Formula(sympy, e, places, names, times) for e in right]
         return VectorField(
             lambda t, y, par, m: [f({"t": t, "y": y, "par": par, "m": m}) for f in formulas],
             dim=len(state), parameters=defaults, name=name,
         )  # fmt: skip
-    if not isinstance(what, sympy.Expr) or not q or len(q) != len(p):
+    if not isinstance(expression, sympy.Expr) or not q or len(q) != len(p):
         raise InputError(
-            f"{shown(what)} needs as many q as p, and must be an expression of SymPy; or give a "
+            f"{shown(expression)} needs as many q as p, and must be an expression of SymPy; or give a "
             "LagrangesMethod or KanesMethod whose equations have been formed."
         )
     places = {x: _component(which, i) for which, listed in (("q", q), ("p", p)) for i, x in enumerate(listed)}
-    energy = _Formula(sympy, what, places, names, times)
+    energy = _Formula(sympy, expression, places, names, times)
 
     def H(t, q, p, par, m):
         return energy({"t": t, "q": q, "p": p, "par": par, "m": m})
@@ -99,7 +99,7 @@ def from_sympy(
     def at_rest(q, p, par, m):
         return energy({"q": q, "p": p, "par": par, "m": m})
 
-    timeless = not any(time in what.free_symbols for time in times)
+    timeless = not any(time in expression.free_symbols for time in times)
     return Hamiltonian(at_rest if timeless else H, dof=len(q), parameters=defaults, name=name)
 
 
@@ -123,12 +123,12 @@ class _Formula:
 
     def __call__(self, given: Mapping[str, Any]) -> Any:
         """Return its value."""
-        found: dict[Any, Any] = {}
+        values: dict[Any, Any] = {}
 
         def value(e: Any) -> Any:
-            if e not in found:
-                found[e] = self._evaluated(e, value, given)
-            return found[e]
+            if e not in values:
+                values[e] = self._evaluated(e, value, given)
+            return values[e]
 
         return value(self._expression)
 

@@ -171,7 +171,7 @@ class HBVMProgram(Compiled):
             self.implicit()
         self.compile_seconds = binary.clock() - started
 
-    def _sweeps(self, what: emit.What, rows: int, lanes: int) -> binary.Native | None:
+    def _sweeps(self, what: emit.Quantity, rows: int, lanes: int) -> binary.Native | None:
         """Return whole sweeps for a system with a few rows, if they can be compiled with its field."""
         if rows > fused.ROWS or self.constants.route not in (8, 16) or not self.lanes:
             return None

@@ -176,11 +176,11 @@ def _along(function: Function, par: Array, states: DD, t: ArrayLike | None) -> l
 def invariants(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
     """Return the invariants along states, see `problems.problem.Problem.invariants`."""
     states = _states(system, y)
-    found: dict[str, Array] = {}
+    quantities: dict[str, Array] = {}
     for name, function in system.invariants.items():
         values = [value.rounded() for value in _along(function, par, states, t)]
-        found[name] = np.stack(values, axis=1) if system.is_vector(name) else values[0]
-    return found
+        quantities[name] = np.stack(values, axis=1) if system.is_vector(name) else values[0]
+    return quantities
 
 
 def errors(
@@ -191,7 +191,7 @@ def errors(
 
     states, begin = _states(system, y), _states(system, start[1])
     t0, y0 = start[0], begin.hi[0]
-    found: dict[str, Array] = {}
+    by_name: dict[str, Array] = {}
     for name, function in system.invariants.items():
         first = _along(function, par, begin, t0)
         values = _along(function, par, states, t)
@@ -210,8 +210,8 @@ def errors(
             before = before or wide.evaluate(function, t0, y0, par)
             for i in np.flatnonzero(again):
                 errors[i] = wide.relative(wide.evaluate(function, float(times[i]), states.hi[i], par), before)
-        found[name] = errors
-    return found
+        by_name[name] = errors
+    return by_name
 
 
 def guards(system: System, par: Array, y: ArrayLike, t: ArrayLike | None) -> dict[str, Array]:
@@ -242,8 +242,8 @@ def momentum(system: System, par: Array, t: float, q: Array, v: Array) -> Array:
     """Return the momenta p = v/c of a separable system, or dL/dv of a Lagrangian, each rounded once."""
     if isinstance(system, Lagrangian):
         state = np.concatenate([q, v])[:, np.newaxis]
-        found = evaluate(system.momentum, t, state, par)
-        return np.array([float(p.rounded()[0]) for p in found])
+        components = evaluate(system.momentum, t, state, par)
+        return np.array([float(p.rounded()[0]) for p in components])
     if not system.separable:
         raise InputError(f"v0= needs constant masses, which {system.name} does not have; give p0=.")
     scale = _scale(system, par)

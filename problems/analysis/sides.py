@@ -27,18 +27,19 @@ def sides(field: Function) -> Function | None:
         vanishes on one surface and is smooth beside it; on those of a loop, and on those that are left, one
         of them vanishes that is of the size of the smallest. ``None`` where the field has no such surface.
     """
-    found = [
+    conditions = [
         node
         for node in reachable(field.roots)
         if (has_kink(node) or node.op == "table")
         and node.args[0].flags & (STATE | T if node.op == "round" else STATE)
     ]
-    if not found:
+    if not conditions:
         return None
     terms = tuple(
-        Term(_side(node) * (1.0 + GOLDEN * (i + 1) % 1.0), i) for i, node in enumerate(dict.fromkeys(found))
+        Term(_side(node) * (1.0 + GOLDEN * (i + 1) % 1.0), i)
+        for i, node in enumerate(dict.fromkeys(conditions))
     )
-    distances = list(dict.fromkeys(_distance(node) for node in found))
+    distances = list(dict.fromkeys(_distance(node) for node in conditions))
     if len(distances) > MOST:
         last = [_inverse_square(node) for node in distances[MOST - 1 :]]
         distances[MOST - 1 :] = [_smallest(sum(last[1:], last[0]))]

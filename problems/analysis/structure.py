@@ -37,8 +37,8 @@ def degree(system: System, par: ArrayLike | None = None) -> int | None:
     root = _energy(system)
     for node in reachable([root]):
         known[node.id] = _degree(node, known, values)
-    found = known[root.id]
-    return None if found is None else int(max(found, 0))
+    total = known[root.id]
+    return None if total is None else int(max(total, 0))
 
 
 _ZERO = float("-inf")  # the degree of the polynomial 0

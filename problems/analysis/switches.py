@@ -63,14 +63,14 @@ class Switches:
 
     def _solved(self, par: NDArray[np.float64]) -> NDArray[np.float64]:
         pieces = _Evaluation(par).pieces
-        found = [np.empty(0)]
+        crossings = [np.empty(0)]
         for node in self._nodes:
             levels = np.array(node.data.knots if node.op == "table" else [0.0])
             for slope, offset in pieces(node.args[0]) or ():
                 slope, offset = np.broadcast_arrays(np.atleast_1d(slope), offset)
                 with np.errstate(all="ignore"):
-                    found.append(((levels[:, None] - offset) / slope).ravel())
-        times = np.concatenate(found)
+                    crossings.append(((levels[:, None] - offset) / slope).ravel())
+        times = np.concatenate(crossings)
         return np.unique(times[np.isfinite(times)]) + 0.0  # no negative zero
 
 
@@ -85,10 +85,10 @@ class _Evaluation:
         """Return a node's affine pieces; ``None`` where it is not made of a few."""
         for inner in reachable([node]):
             if inner.id not in self._known:
-                self._known[inner.id] = self._found(inner)
+                self._known[inner.id] = self._pieces(inner)
         return self._known[node.id]
 
-    def _found(self, node: Node) -> Pieces | None:
+    def _pieces(self, node: Node) -> Pieces | None:
         with np.errstate(all="ignore"):
             if not node.args:
                 return [self._leaf(node)]
@@ -97,10 +97,10 @@ class _Evaluation:
                 return self._chosen(node, args)
             combined = []
             for chosen in product(*(arg or () for arg in args)):
-                made = _applied(node, chosen)
-                if made is None:
+                applied = _applied(node, chosen)
+                if applied is None:
                     return None
-                combined += made
+                combined += applied
             return combined if 0 < len(combined) <= MOST_PIECES else None
 
     def _leaf(self, node: Node) -> tuple[Any, Any]:

@@ -53,10 +53,10 @@ def forward(
     """
     rule = Rule(Graph(function.graph.dof), size, directions, parameters)
     outputs = len(function.outputs)
-    found: list[tuple[Term, ...]] = [()] * (outputs * directions)
+    products: list[tuple[Term, ...]] = [()] * (outputs * directions)
     for i, terms in enumerate(function.outputs):
         for direction in range(directions):
-            found[outputs * direction + i] = tuple(
+            products[outputs * direction + i] = tuple(
                 Term(node, term.key)
                 for term in terms
                 if (node := rule.slope(term.node, direction)) is not None
@@ -71,7 +71,7 @@ def forward(
                     moved.append(LoopTerm(entry.index.shifted(outputs * direction), node))
         if moved:
             loops.append((rule.graph.loop(loop.rows), tuple(moved)))
-    return Function(rule.graph, tuple(found), tuple(loops), name)
+    return Function(rule.graph, tuple(products), tuple(loops), name)
 
 
 class Rule:
@@ -112,11 +112,11 @@ class Rule:
                 self.slopes[node.id, direction] = self._slope(node, direction)
         return self.slopes[root.id, direction]
 
-    def _symbol(self, node: Node, by: int) -> Node:
+    def _symbol(self, node: Node, shift: int) -> Node:
         """Return a symbol whose place is moved."""
         space, place = node.data
-        if by:
-            place = place.shifted(by) if isinstance(place, Affine) else place + by
+        if shift:
+            place = place.shifted(shift) if isinstance(place, Affine) else place + shift
         loop = None if node.loop is None else self.graph.loop(node.loop.rows)
         return self.graph.symbol(space, place, flags=node.flags, loop=loop)
 

@@ -136,9 +136,9 @@ def stacked(functions: Sequence[Function], name: str = "") -> Function:
 
 def joined(parts: Iterable[tuple[int, Loops]]) -> Loops:
     """Join summands in loops, each part moved by some places, so that each loop runs once."""
-    found: dict[Loop, list[LoopTerm]] = {}
-    for by, loops in parts:
+    entries_of: dict[Loop, list[LoopTerm]] = {}
+    for shift, loops in parts:
         for loop, entries in loops:
-            moved = (LoopTerm(entry.index.shifted(by), entry.node) for entry in entries)
-            found.setdefault(loop, []).extend(moved)
-    return tuple((loop, tuple(entries)) for loop, entries in found.items())
+            moved = (LoopTerm(entry.index.shifted(shift), entry.node) for entry in entries)
+            entries_of.setdefault(loop, []).extend(moved)
+    return tuple((loop, tuple(entries)) for loop, entries in entries_of.items())

@@ -88,11 +88,11 @@ class _Entries:
 
     def of_term(self, row: int, node: Node) -> None:
         """Enter the derivatives of a summand of one output."""
-        found = gradient(node, self.size)
-        for column, terms in enumerate(found.outputs):
+        slopes = gradient(node, self.size)
+        for column, terms in enumerate(slopes.outputs):
             if terms:
                 self.plain.setdefault((row, column), []).extend(term.node for term in terms)
-        for loop, terms in found.loops:
+        for loop, terms in slopes.loops:
             for term in terms:
                 self._enter(loop, _constant(loop, row), term.index, term.node)
 
@@ -128,11 +128,11 @@ class _Entries:
         if inner.op == "symbol":
             self._enter(loop, row, _constant(loop, inner.data[1]), slope)
             return
-        found = gradient(inner, self.size)
-        for column, terms in enumerate(found.outputs):
+        slopes = gradient(inner, self.size)
+        for column, terms in enumerate(slopes.outputs):
             for term in terms:
                 self._enter(loop, row, _constant(loop, column), slope * term.node)
-        for other, terms in found.loops:
+        for other, terms in slopes.loops:
             self._product(loop, row, slope, other, terms)
 
     def _product(self, loop: Loop, row: Affine, slope: Node, other: Loop, terms: Sequence[LoopTerm]) -> None:

@@ -54,10 +54,10 @@ def reverse(function: Function, *, variables: Variables, count: int, name: str) 
         inside = graph.loop(loop.rows)
         for entry in entries:
             weight = graph.symbol("y", entry.index, flags=PAR, loop=inside)
-            total = total + graph.sum(weight * copy.of(entry.node), inside)
+            total = total + graph.sum(weight * copy.of_node(entry.node), inside)
     for i, terms in enumerate(function.outputs):
         for term in terms:
-            total = total + graph.symbol("y", i, flags=PAR) * copy.of(term.node)
+            total = total + graph.symbol("y", i, flags=PAR) * copy.of_node(term.node)
     if variables == "state":
         return gradient(total, weights + count).part(weights, weights + count).named(name)
     return gradient(total, count).named(name)
@@ -71,7 +71,7 @@ class _Copy:
         # What a gradient is taken with respect to has the flags of a state.
         self._flags = {"t": T, "y": Q, "par": PAR} if variables == "state" else {"t": T, "y": PAR, "par": Q}
 
-    def of(self, root: Node) -> Node:
+    def of_node(self, root: Node) -> Node:
         """Return the copy of a node."""
         for node in reachable([root]):
             if node.id not in self._done:
@@ -94,8 +94,8 @@ class _Copy:
     def _symbol(self, node: Node) -> Node:
         space, place = node.data
         if space == "y":
-            by = self._weights
-            place = place.shifted(by) if isinstance(place, Affine) else place + by
+            shift = self._weights
+            place = place.shifted(shift) if isinstance(place, Affine) else place + shift
         loop = None if node.loop is None else self._loop(node.loop)
         return self.graph.symbol(space, place, flags=self._flags[space], loop=loop)
 

@@ -90,13 +90,13 @@ class Formula:
             column = self._columns[min(offset, len(self._columns) - 1)]
         return self._refuse(column, "this is not a formula; write products with *")
 
-    def _refuse(self, where: int | ast.expr, what: str) -> NoReturn:
+    def _refuse(self, where: int | ast.expr, reason: str) -> NoReturn:
         """Raise an error that names the column, given or that of a node."""
         if isinstance(where, ast.expr):
             where = self._columns[min(where.col_offset, len(self._columns) - 1)]
         shown = " ".join(self.text.split())
         shown = shown if len(shown) <= 120 else shown[:117] + "..."
-        raise InputError(f"cannot read the formula {shown!r}: {what} (column {where}).")
+        raise InputError(f"cannot read the formula {shown!r}: {reason} (column {where}).")
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -73,10 +73,10 @@ def hamiltonian(
             return par.m[i] * par.m[j] / m.sqrt(squared)
 
         potential = m.sum(attraction, pairs)
-        found = m.sum(kinetic, range(n)) - (potential if G is None else par.G * potential)
+        total = m.sum(kinetic, range(n)) - (potential if G is None else par.G * potential)
         for term in more:
-            found = found + term(q, p, par.m, 1.0 if G is None else par.G, m)
-        return found
+            total = total + term(q, p, par.m, 1.0 if G is None else par.G, m)
+        return total
 
     def momentum(p, m):
         return [m.sum(lambda i, c=c: p[dimension * i + c], range(n)) for c in axes]

@@ -64,7 +64,7 @@ class Source:
     sha256: str
 
 
-What = str | Function | Jacobian
+Quantity = str | Function | Jacobian
 """One of a system's functions, a Jacobian, or one of the names that `System.function` knows."""
 
 _texts: WeakKeyDictionary[System, dict[tuple[Function, str, int | None], Source]] = WeakKeyDictionary()
@@ -72,14 +72,14 @@ _fingerprints: WeakKeyDictionary[System, str] = WeakKeyDictionary()
 _compiled: dict[tuple[str, str], Any] = {}
 
 
-def source(system: System, what: What, backend: str, *, limit: int | None = SMALL) -> Source:
+def source(system: System, quantity: Quantity, backend: str, *, limit: int | None = SMALL) -> Source:
     """Return the source of one of a system's functions.
 
     Parameters
     ----------
     system : System
         The traced system.
-    what : str, Function or Jacobian
+    quantity : str, Function or Jacobian
         A function of the system, such as ``system.invariants["energy"]``, or what `System.jacobian`
         returns; ``"field"``, ``"force"``, ``"velocity_scale"`` and ``"hamiltonian"`` by name.
     backend : {"numpy", "numba", "jax", "heyoka"}
@@ -99,7 +99,7 @@ def source(system: System, what: What, backend: str, *, limit: int | None = SMAL
         raise unknown("backend", backend, BACKENDS)
     if backend == "heyoka":
         limit = None
-    function = _function(system, what)
+    function = _function(system, quantity)
     texts = _texts.setdefault(system, {})
     key = (function, backend, limit)
     if key not in texts:
@@ -108,15 +108,15 @@ def source(system: System, what: What, backend: str, *, limit: int | None = SMAL
     return texts[key]
 
 
-def _function(system: System, what: What) -> Function:
+def _function(system: System, quantity: Quantity) -> Function:
     if not isinstance(system, System):
         raise InputError(f"a system is needed, such as problem.system, not {shown(system)}.")
-    match what:
+    match quantity:
         case Function():
-            return what
+            return quantity
         case Jacobian():
-            return what.function
-    return system.function(what)
+            return quantity.function
+    return system.function(quantity)
 
 
 def _written(function: Function, name: str, backend: str, limit: int | None) -> Source:
@@ -131,31 +131,31 @@ def fingerprint(system: System) -> str:
     """
     if system not in _fingerprints:
         if isinstance(system, Foreign):
-            found = code_digest(system.f, system.dim, system.name)
+            digest = code_digest(system.f, system.dim, system.name)
         else:
-            made = source(system, "field", "numba")
-            body = made.text.replace(made.name, "field")
+            emitted = source(system, "field", "numba")
+            body = emitted.text.replace(emitted.name, "field")
             head = f"{system.kind} {system.dim} {system.dof}\n"
-            found = hashlib.sha256((head + body).encode()).hexdigest()
-        _fingerprints[system] = found
+            digest = hashlib.sha256((head + body).encode()).hexdigest()
+        _fingerprints[system] = digest
     return _fingerprints[system]
 
 
-def _executed(made: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
-    code = compile(made.text, f"<{made.name}>", "exec")
+def _executed(emitted: Source, namespace: dict[str, Any]) -> Callable[..., Any]:
+    code = compile(emitted.text, f"<{emitted.name}>", "exec")
     exec(code, namespace)  # noqa: S102 -- text made by this package from a graph, never from the user's text
-    return namespace[made.name]
+    return namespace[emitted.name]
 
 
-def numpy(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
+def numpy(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> Callable[..., np.ndarray]:
     """Return ``f(t, y, par) -> ndarray`` on numpy arrays.
 
     ``y`` is (dim,) or (dim, n), the result (m,) or (m, n), of long doubles if ``y`` is of these.
     Division by zero and the like give inf and nan, in silence, as in compiled code. ``limit`` as in `source`.
     """
-    if isinstance(system, Foreign) and what == "field":
+    if isinstance(system, Foreign) and quantity == "field":
         return partial(_foreign_on_arrays, system)
-    function = _function(system, what)
+    function = _function(system, quantity)
     return _on_arrays(source(system, function, "numpy", limit=limit), len(function.outputs))
 
 
@@ -166,9 +166,9 @@ def numpy_of(function: Function, name: str, *, limit: int | None = SMALL) -> Cal
 
 def numba_of(function: Function, name: str) -> tuple[str, Callable[..., Any]]:
     """Return the source of such a function for numba, and it as a Python function that numba can compile."""
-    made = _written(function, name, "numba", SMALL)
+    emitted = _written(function, name, "numba", SMALL)
     namespace: dict[str, Any] = {"np": np, **{name: getattr(math, name) for name in _MATHEMATICS}}
-    return made.text, _executed(made, namespace)
+    return emitted.text, _executed(emitted, namespace)
 
 
 def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
@@ -182,10 +182,10 @@ def _foreign_on_arrays(system: Foreign, t: Any, y: Any, par: Any) -> np.ndarray:
     return out[0] if states.ndim == 1 else np.ascontiguousarray(out.T)
 
 
-def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
-    key = ("numpy", made.sha256)
+def _on_arrays(emitted: Source, n_out: int) -> Callable[..., np.ndarray]:
+    key = ("numpy", emitted.sha256)
     if key not in _compiled:
-        inner = _executed(made, {"np": np, **_SPECIAL})
+        inner = _executed(emitted, {"np": np, **_SPECIAL})
 
         def evaluate(t: Any, y: Any, par: Any) -> np.ndarray:
             y = np.asarray(y)
@@ -198,7 +198,7 @@ def _on_arrays(made: Source, n_out: int) -> Callable[..., np.ndarray]:
                 inner(t, y, par, out)
             return out
 
-        evaluate.__name__ = made.name
+        evaluate.__name__ = emitted.name
         _compiled[key] = evaluate
     return _compiled[key]
 
@@ -215,19 +215,19 @@ def _special(name: str) -> Callable[[Any], Any]:
 _SPECIAL = {f.numpy: _special(f.numpy) for f in FUNCTIONS.values() if "." not in f.numpy}
 
 
-def numba(system: System, what: What, *, limit: int | None = SMALL) -> Any:
+def numba(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> Any:
     """Return a numba function ``f(t, y, par, out)`` on arrays, cached on disk.
 
     No fastmath: no reordering, no contraction. ``y``, ``par`` and ``out`` must not
     overlap. ``limit`` as in `source`. The field of a `Foreign` system is a plain Python
     function.
     """
-    if isinstance(system, Foreign) and what == "field":
+    if isinstance(system, Foreign) and quantity == "field":
         return system.evaluate
-    function = _function(system, what)
+    function = _function(system, quantity)
     cost = compilable(system, function)
-    made = source(system, function, "numba", limit=limit)
-    key = ("numba", made.sha256)
+    emitted = source(system, function, "numba", limit=limit)
+    key = ("numba", emitted.sha256)
     if key not in _compiled:
         if cost >= LONG:
             warnings.warn(
@@ -236,14 +236,14 @@ def numba(system: System, what: What, *, limit: int | None = SMALL) -> Any:
                 "which takes about one.",
                 stacklevel=2,
             )
-        cut = made.text.index(f"def {made.name}(")
+        cut = emitted.text.index(f"def {emitted.name}(")
         decorator = '@numba.njit(cache=True, error_model="numpy")\n'
-        text = _NUMBA_HEAD + made.text[:cut] + "\n" + decorator + made.text[cut:]
-        _compiled[key] = getattr(cache.module(text, made.name), made.name)
+        text = _NUMBA_HEAD + emitted.text[:cut] + "\n" + decorator + emitted.text[cut:]
+        _compiled[key] = getattr(cache.module(text, emitted.name), emitted.name)
     return _compiled[key]
 
 
-def compilable(system: System, what: What) -> int:
+def compilable(system: System, quantity: Quantity) -> int:
     """Return the operations of a function; refuse one that would be compiled for minutes.
 
     See `problems.limits`. Operations in a loop count once; a sine or an exponential as `SLOW`.
@@ -253,7 +253,7 @@ def compilable(system: System, what: What) -> int:
     problems.errors.InputError
         For too many operations, or too many that wait for one another.
     """
-    function = _function(system, what)
+    function = _function(system, quantity)
     nodes = reachable(function.roots)
     cost = sum(_COST.get(node.op, 1) for node in nodes)
     name = f"the {function.name} of {system.name}"
@@ -265,7 +265,7 @@ def compilable(system: System, what: What) -> int:
     return cost
 
 
-def jax(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..., Any]:
+def jax(system: System, quantity: Quantity, *, limit: int | None = SMALL) -> Callable[..., Any]:
     """Return ``f(t, y, par)`` on JAX arrays; y is (dim,); switches JAX to double precision.
 
     ``limit`` as in `source`.
@@ -281,15 +281,15 @@ def jax(system: System, what: What, *, limit: int | None = SMALL) -> Callable[..
     except ImportError as error:
         raise _missing("jax") from error
     library.config.update("jax_enable_x64", True)
-    made = source(system, what, "jax", limit=limit)
-    key = ("jax", made.sha256)
+    emitted = source(system, quantity, "jax", limit=limit)
+    key = ("jax", emitted.sha256)
     if key not in _compiled:
         special = {name: getattr(library.scipy.special, name) for name in _SPECIAL}
-        _compiled[key] = _executed(made, {"np": np, "jnp": jnp, **special})
+        _compiled[key] = _executed(emitted, {"np": np, "jnp": jnp, **special})
     return _compiled[key]
 
 
-def heyoka(system: System, what: What = "field") -> list[Any]:
+def heyoka(system: System, quantity: Quantity = "field") -> list[Any]:
     """Return heyoka expressions: pairs of variable and right-hand side for ``"field"``.
 
     Variables are ``q0.., p0..`` (``y0..`` for a vector field), parameters
@@ -301,8 +301,8 @@ def heyoka(system: System, what: What = "field") -> list[Any]:
     problems.errors.MissingLibraryError
         If heyoka is not installed.
     """
-    variables, expressions = _for_heyoka(system, source(system, what, "heyoka"))
-    right_hand_side = what == "field" or what is system.field
+    variables, expressions = _for_heyoka(system, source(system, quantity, "heyoka"))
+    right_hand_side = quantity == "field" or quantity is system.field
     return list(zip(variables, expressions, strict=True)) if right_hand_side else expressions
 
 
@@ -311,7 +311,7 @@ def heyoka_of(system: System, function: Function) -> Any:
     return _for_heyoka(system, _written(function, "function", "heyoka", None))[1][0]
 
 
-def _for_heyoka(system: System, made: Source) -> tuple[list[Any], list[Any]]:
+def _for_heyoka(system: System, emitted: Source) -> tuple[list[Any], list[Any]]:
     """Return a system's variables, and a function of them as expressions."""
     try:
         import heyoka as hy
@@ -323,7 +323,7 @@ def _for_heyoka(system: System, made: Source) -> tuple[list[Any], list[Any]]:
     else:
         names = [f"{x}{i:0{width}d}" for x in "qp" for i in range(system.dof)]
     variables = list(hy.make_vars(*names)) if len(names) > 1 else [hy.make_vars(*names)]
-    expressions = _executed(made, {})(hy.time, variables, hy.par, hy)
+    expressions = _executed(emitted, {})(hy.time, variables, hy.par, hy)
     return variables, [e if isinstance(e, hy.expression) else hy.expression(e) for e in expressions]
 
 
@@ -336,8 +336,8 @@ def _missing(library: str) -> MissingLibraryError:
 __all__ = [
     "BACKENDS",
     "SMALL",
+    "Quantity",
     "Source",
-    "What",
     "compilable",
     "fingerprint",
     "heyoka",

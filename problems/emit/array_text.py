@@ -18,8 +18,8 @@ class _ArrayPrinter(Printer):
         self._library = library
 
     def find(self, place: str, knots: str, x: str, n: int) -> None:
-        found = f'{self._library}.searchsorted({knots}, {x}, side="right") - 1'
-        self.line(f"{place} = {self._library}.clip({found}, 0, {n - 1})")
+        interval = f'{self._library}.searchsorted({knots}, {x}, side="right") - 1'
+        self.line(f"{place} = {self._library}.clip({interval}, 0, {n - 1})")
 
     def _table(self, values: np.ndarray) -> str:
         return self.table(f"np.array({values.tolist()})")

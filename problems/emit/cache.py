@@ -112,14 +112,14 @@ def module(text: str, stem: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    sys.modules[name] = made
+    result = importlib.util.module_from_spec(spec)
+    sys.modules[name] = result
     try:
-        spec.loader.exec_module(made)
+        spec.loader.exec_module(result)
     except BaseException:
         del sys.modules[name]
         raise
-    return made
+    return result
 
 
 def _written(name: str, text: str) -> Path:

@@ -104,18 +104,18 @@ def index_text(affine: Affine, variables: Sequence[str]) -> str:
 def ranges(loop: Loop) -> list[Range] | None:
     """Cut a list into arithmetic progressions; ``None`` if that takes too many."""
     rows = loop.rows
-    found: list[Range] = []
+    result: list[Range] = []
     at = 0
     while at < len(rows):
-        if len(found) == _SEGMENTS:
+        if len(result) == _SEGMENTS:
             return None
         step = rows[at + 1] - rows[at] if at + 1 < len(rows) else np.zeros_like(rows[at])
         expected = rows[at] + np.arange(len(rows) - at)[:, np.newaxis] * step
         same = (rows[at:] == expected).all(axis=1)
         n = int(np.argmin(same)) if not same.all() else len(same)
-        found.append(Range(rows[at], step, n))
+        result.append(Range(rows[at], step, n))
         at += n
-    return found
+    return result
 
 
 def nest(loop: Loop) -> Nest | None:

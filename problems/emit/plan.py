@@ -155,15 +155,15 @@ class _Expansion:
 def written_out(function: Function) -> list[Node]:
     """Return the outputs of a function as nodes, its declared sums written out; one without summands is 0."""
     expansion = _Expansion(function.graph, None, function.roots)
-    found: list[list[Node]] = [[] for _ in function.outputs]
+    terms_of: list[list[Node]] = [[] for _ in function.outputs]
     for loop, entries in function.loops:
         places = [entry.index.values(loop) for entry in entries]
         for k, nodes in enumerate(expansion.written_out([entry.node for entry in entries], loop)):
             for place, node in zip(places, nodes, strict=True):
-                found[int(place[k])].append(node)
-    for nodes, terms in zip(found, function.outputs, strict=True):
+                terms_of[int(place[k])].append(node)
+    for nodes, terms in zip(terms_of, function.outputs, strict=True):
         nodes.extend(expansion.done[term.node.id] for term in terms)
-    return [sum(nodes[1:], nodes[0]) if nodes else function.graph.const(0.0) for nodes in found]
+    return [sum(nodes[1:], nodes[0]) if nodes else function.graph.const(0.0) for nodes in terms_of]
 
 
 def make_plan(function: Function, *, limit: int | None = SMALL) -> Plan:

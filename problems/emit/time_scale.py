@@ -31,10 +31,10 @@ def time_scale(field: Function, parameters: int) -> Function:
         Two outputs, ``w^4`` and ``w'/w`` along the field; ``par`` holds the parameters, then ``w_0^4``.
     """
     graph, f = field.graph, written_out(field)
-    dof, zero, one = len(f) // 2, graph.const(0.0), graph.const(1.0)
+    dof, zero, unity = len(f) // 2, graph.const(0.0), graph.const(1.0)
     total = graph.symbol("par", parameters, flags=PAR)
     for j in range(dof):
-        column = _along(f, _along(f, [one if i == j else zero for i in range(2 * dof)]))
+        column = _along(f, _along(f, [unity if i == j else zero for i in range(2 * dof)]))
         for entry in column[:dof]:
             total = total + entry * entry
     (slope,) = _along([total], f)
@@ -59,5 +59,5 @@ class _Along(Rule):
     def _slope(self, node: Node, direction: int) -> Node | None:
         if node.op != "symbol":
             return super()._slope(node, direction)
-        found = self._directions[node.data[1]] if node.data[0] == "y" else None
-        return None if found is None or (found.op == "const" and found.data == 0.0) else found
+        slope = self._directions[node.data[1]] if node.data[0] == "y" else None
+        return None if slope is None or (slope.op == "const" and slope.data == 0.0) else slope

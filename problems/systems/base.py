@@ -177,34 +177,34 @@ class System:
         self, invariants: Mapping[str, Callable[..., Any]], guards: Mapping[str, Callable[..., Any]]
     ) -> None:
         for key, function in invariants.items():
-            what = f"invariant {key!r}"
-            value = self._call(function, what)
+            label = f"invariant {key!r}"
+            value = self._call(function, label)
             if arguments.is_list(value):
                 self._vectors.add(key)
             else:
                 value = [value]
-            nodes = [self._node(v, function, what) for v in value]
+            nodes = [self._node(v, function, label) for v in value]
             if not nodes:
-                raise InputError(f"{what} returns an empty list; return a number or a list of numbers.")
+                raise InputError(f"{label} returns an empty list; return a number or a list of numbers.")
             self._write(f"invariant:{key}", nodes)
         for key, function in guards.items():
             self._write(f"guard:{key}", [self._scalar(function, f"guard {key!r}")])
         energy = ["energy"] if self.kind != "vector_field" and "invariant:energy" in self._written else []
         self._list([*energy, *invariants], guards)
 
-    def _call(self, function: Callable[..., Any], what: str) -> Any:
-        return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, what=what)
+    def _call(self, function: Callable[..., Any], label: str) -> Any:
+        return arguments.call(function, graph=self._graph, dim=self.dim, layout=self._layout, label=label)
 
-    def _node(self, value: Any, function: Callable[..., Any], what: str) -> Node:
-        return arguments.scalar(value, graph=self._graph, function=function, what=what)
+    def _node(self, value: Any, function: Callable[..., Any], label: str) -> Node:
+        return arguments.scalar(value, graph=self._graph, function=function, label=label)
 
-    def _scalar(self, function: Callable[..., Any], what: str) -> Node:
-        return self._node(self._call(function, what), function, what)
+    def _scalar(self, function: Callable[..., Any], label: str) -> Node:
+        return self._node(self._call(function, label), function, label)
 
     def trace(
         self,
         function: Callable[..., Any],
-        what: str,
+        label: str,
         outputs: int | None = None,
         *,
         data: tuple[int, ...] | None = None,
@@ -215,7 +215,7 @@ class System:
         ----------
         function : callable
             Returns one number; its arguments are among ``t, q, p, y, par, m``.
-        what : str
+        label : str
             What it is, for messages.
         outputs : int, optional
             So many numbers, in a list, and not one.
@@ -229,15 +229,21 @@ class System:
         """
         graph = Graph(self.dof)
         more = None if data is None else {"data": lambda: arguments.further(graph, "data", self.n_par, data)}
-        value = arguments.call(function, graph=graph, dim=self.dim, layout=self._layout, what=what, more=more)
+        value = arguments.call(
+            function, graph=graph, dim=self.dim, layout=self._layout, label=label, more=more
+        )
         if outputs is None:
             values = [value]
         elif arguments.is_list(value) and len(value) == outputs:
             values = list(value)
         else:
-            raise InputError(f"{what} must return a list of {outputs} numbers, the new state.")
+            raise InputError(f"{label} must return a list of {outputs} numbers, the new state.")
         return function_of(
-            graph, [arguments.scalar(one, graph=graph, function=function, what=what) for one in values]
+            graph,
+            [
+                arguments.scalar(component, graph=graph, function=function, label=label)
+                for component in values
+            ],
         )
 
     @property
@@ -281,20 +287,20 @@ class System:
             If the system has no such function.
         """
         attribute = "energy" if name == "hamiltonian" else name
-        found = getattr(self, attribute) if name in _NAMED else None
-        if found is None:
+        stored = getattr(self, attribute) if name in _NAMED else None
+        if stored is None:
             raise unknown(f"function of {self.name}", name, [function.name for function in self.functions])
-        return found
+        return stored
 
     @cached_property
     def _components(self) -> Mapping[str, Mapping[str, Function]]:
-        found: dict[str, Mapping[str, Function]] = {}
+        components: dict[str, Mapping[str, Function]] = {}
         for name, whole in self.invariants.items():
             n = len(whole.outputs)
             parts = {f"{name}[{i}]": whole.part(i, i + 1).named(f"{whole.name}[{i}]") for i in range(n)}
-            found |= {part: {part: function} for part, function in parts.items()}
-            found[name] = parts if n > 1 else {name: whole}
-        return found
+            components |= {part: {part: function} for part, function in parts.items()}
+            components[name] = parts if n > 1 else {name: whole}
+        return components
 
     def components(self, invariant: str) -> Mapping[str, Function]:
         """Return the scalars that an invariant consists of.
@@ -355,12 +361,12 @@ class System:
             self._together[functions] = stacked(functions)
         return self._together[functions]
 
-    def jacobian(self, what: str = "field") -> Jacobian | None:
+    def jacobian(self, function: str = "field") -> Jacobian | None:
         """Return the Jacobian of the field, or of the force, or ``None`` where none is written down.
 
         Parameters
         ----------
-        what : {"field", "force"}
+        function : {"field", "force"}
             The field with respect to the state, or (separable systems) the force with
             respect to the positions.
 
@@ -375,19 +381,19 @@ class System:
         problems.errors.InputError
             For another name, or a system that has no such function.
         """
-        if what not in ("field", "force"):
-            raise unknown("Jacobian", what, ("field", "force"))
-        if what not in self._jacobians:
-            name = "jacobian" if what == "field" else f"jacobian_{what}"
-            self._jacobians[what] = jacobian(self.function(what), name) if self.traced else None
-        return self._jacobians[what]
+        if function not in ("field", "force"):
+            raise unknown("Jacobian", function, ("field", "force"))
+        if function not in self._jacobians:
+            name = "jacobian" if function == "field" else f"jacobian_{function}"
+            self._jacobians[function] = jacobian(self.function(function), name) if self.traced else None
+        return self._jacobians[function]
 
-    def tangent(self, what: str, directions: int, *, parameters: bool = False) -> Function:
+    def tangent(self, name: str, directions: int, *, parameters: bool = False) -> Function:
         """Return the derivatives of a function along directions; see `problems.calculus.forward`.
 
         Parameters
         ----------
-        what : {"field", "force", "velocity_scale"}
+        name : {"field", "force", "velocity_scale"}
             The function.
         directions : int
             Their number, n >= 1.
@@ -399,13 +405,13 @@ class System:
         problems.errors.InputError
             For another name, or a system that has no such function.
         """
-        key = what, directions, parameters
+        key = name, directions, parameters
         if key not in self._tangents:
-            function = self.function(what)
+            function = self.function(name)
             self._tangents[key] = forward(
-                function, size={"field": self.dim, "force": len(function.outputs)}.get(what, 0),
+                function, size={"field": self.dim, "force": len(function.outputs)}.get(name, 0),
                 directions=directions, parameters=self.n_par if parameters else None,
-                name=f"{what}_along_{directions}",
+                name=f"{name}_along_{directions}",
             )  # fmt: skip
         return self._tangents[key]
 
@@ -482,10 +488,10 @@ def _layout(parameters: Mapping[str, Value]) -> tuple[dict[str, tuple[int, int |
 def _parameter(name: str, value: Any) -> Value:
     if not name.isidentifier() or name.startswith("__"):
         raise InputError(f"the parameter name {name!r} must be an identifier, such as 'mass'.")
-    found = number(value)
-    found = numbers(value) if found is None else found
-    if found is None or found == ():
+    result = number(value)
+    result = numbers(value) if result is None else result
+    if result is None or result == ():
         raise InputError(
             f"parameter {name!r} is {shown(value)}; give one finite number or a flat list of them."
         )
-    return found
+    return result

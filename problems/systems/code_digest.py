@@ -87,12 +87,12 @@ def _used(value: Any, names: list[str], within: tuple[Any, ...] = ()) -> Any:
 
 def _imported(code: CodeType) -> dict[str, Any]:
     """Return the modules that code imports itself, by name; what cannot be imported is left out."""
-    found = {}
+    modules = {}
     for step in dis.get_instructions(code):
         if step.opname == "IMPORT_NAME":
             with suppress(Exception):  # whatever the module raises; the function will, too
-                found[step.argval] = import_module(step.argval)
-    return found
+                modules[step.argval] = import_module(step.argval)
+    return modules
 
 
 def _of_a_library(value: ModuleType | type) -> bool:

@@ -66,7 +66,7 @@ class Lagrangian(Hamiltonian):
         System.__init__(self, L, 2 * dof, dof, parameters, invariants, guards, name)
         self._line = line_of_function(L)
         # In L the places of the momenta hold the velocities.
-        value = arguments.call(L, graph=self._graph, dim=self.dim, layout=self._layout, what="L", second="v")
+        value = arguments.call(L, graph=self._graph, dim=self.dim, layout=self._layout, label="L", second="v")
         lagrangian = self._node(value, L, "L")
         momenta = self._slopes(lagrangian)
         self._write("momentum", momenta)
@@ -89,15 +89,15 @@ class Lagrangian(Hamiltonian):
     def _slopes(self, node: Node) -> list[Node]:
         """Return the derivatives with respect to the velocities."""
         dof = self.dim // 2
-        found = gradient(node, self.dim)
-        for loop, entries in found.loops:
+        whole = gradient(node, self.dim)
+        for loop, entries in whole.loops:
             if any((entry.index.values(loop) >= dof).any() for entry in entries):
                 raise InputError(
                     f"{self._line}: a velocity stands in m.sum; write the kinetic energy in Python, such as "
                     "sum(v[i]**2 for i in range(n)), or the system as a Hamiltonian."
                 )
         slopes = []
-        for terms in found.outputs[dof:]:
+        for terms in whole.outputs[dof:]:
             total = self._graph.const(0.0)
             for term in terms:
                 total = total + term.node

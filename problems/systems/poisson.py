@@ -88,14 +88,14 @@ class Poisson(System):
         return self._written["structure"]
 
     def _energy_slope(self, energy: Node, H: Callable[..., Any]) -> list[Node]:
-        found = gradient(energy, self.dim)
-        if found.loops:
+        slopes = gradient(energy, self.dim)
+        if slopes.loops:
             raise InputError(
                 f"{line_of_function(H)}: H of a Poisson system uses m.sum; write the sum in Python, "
                 "such as sum(y[i]**2 for i in range(n))."
             )
         slope = []
-        for terms in found.outputs:
+        for terms in slopes.outputs:
             total = self._graph.const(0.0)
             for term in terms:
                 total = total + term.node

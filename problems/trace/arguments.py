@@ -213,7 +213,7 @@ def call(
     graph: Graph,
     dim: int,
     layout: Layout,
-    what: str,
+    label: str,
     second: str = "p",
     more: Mapping[str, Callable[[], Any]] | None = None,
 ) -> Any:
@@ -229,7 +229,7 @@ def call(
         Length of the state.
     layout : mapping
         Offset and length of each parameter in ``par``.
-    what : str
+    label : str
         What the function is, for messages: ``"H"``, ``"invariant 'L'"``.
     second : {"p", "v"}
         What the second half of the state is called: momenta, or velocities in a Lagrangian.
@@ -242,7 +242,7 @@ def call(
         For an unknown argument, or anything that cannot be traced, with the line.
     """
     if not callable(function):
-        raise InputError(f"{what} must be a function, not {shown(function)}.")
+        raise InputError(f"{label} must be a function, not {shown(function)}.")
     offered: dict[str, Callable[[], Any]] = {
         "t": lambda: graph.symbol("t", 0, flags=T),
         "y": lambda: Vector(graph, "y", "y", 0, dim),
@@ -260,7 +260,7 @@ def call(
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         raise InputError(
-            f"{what} must be a function whose arguments have names, not {shown(function)}; "
+            f"{label} must be a function whose arguments have names, not {shown(function)}; "
             "put it into one, as in lambda q: abs(q[0])."
         ) from None
     arguments: list[Any] = []
@@ -279,7 +279,7 @@ def call(
                 else "name those it needs among " + ", ".join(sorted(offered))
             )
             place = line_of_function(function)
-            raise InputError(f"{place}: {what} asks for an argument {parameter.name!r}; {remedy}.")
+            raise InputError(f"{place}: {label} asks for an argument {parameter.name!r}; {remedy}.")
         if parameter.kind is parameter.POSITIONAL_ONLY:
             arguments.append(value)
         else:
@@ -304,12 +304,12 @@ def call(
         ) from error
     except Exception as error:
         line = line_of_traceback(error.__traceback__) or line_of_function(function)
-        raise InputError(f"{line}: {what} failed with {type(error).__name__}: {error}") from error
+        raise InputError(f"{line}: {label} failed with {type(error).__name__}: {error}") from error
     finally:
         graph.limit = None
 
 
-def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str) -> Node:
+def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], label: str) -> Node:
     """Return what a function returned as one node, or raise when it is not one number."""
     if value is None:
         wrong = "nothing; end it with a return statement"
@@ -323,4 +323,4 @@ def scalar(value: Any, *, graph: Graph, function: Callable[..., Any], what: str)
             wrong = "a symbol of an m.sum's term; return the sum itself"
         except InputError:
             wrong = f"{value!r}, which is not a number"
-    raise InputError(f"{line_of_function(function)}: {what} returns {wrong}.")
+    raise InputError(f"{line_of_function(function)}: {label} returns {wrong}.")

@@ -96,16 +96,16 @@ class Elementary:
         """Return the derivatives with respect to each argument of a node of this function."""
         if self.derivative is None:
             return (Slope(factor=Fraction(0)),) * self.arity
-        found = self.derivative(node) if self.of_value else self.derivative(*node.args)
-        return found if isinstance(found, tuple) else (found,)
+        result = self.derivative(node) if self.of_value else self.derivative(*node.args)
+        return result if isinstance(result, tuple) else (result,)
 
 
-def _of(name: str, x: Any) -> Any:
+def _applied(name: str, x: Any) -> Any:
     return x.graph.call(name, x)
 
 
 def _by_one_minus_square(x: Any, factor: Fraction) -> Slope:
-    return Slope(over=_of("sqrt", (1.0 - x) * (1.0 + x)), factor=factor)
+    return Slope(over=_applied("sqrt", (1.0 - x) * (1.0 + x)), factor=factor)
 
 
 def _of_angle(y: Any, x: Any) -> tuple[Slope, Slope]:
@@ -127,13 +127,13 @@ _RECORDS = (
     Elementary(
         name="sin",
         value=math.sin,
-        derivative=lambda x: Slope(_of("cos", x)),
+        derivative=lambda x: Slope(_applied("cos", x)),
         double_double=double_double.sin,
     ),
     Elementary(
         name="cos",
         value=math.cos,
-        derivative=lambda x: Slope(_of("sin", x), factor=-ONE),
+        derivative=lambda x: Slope(_applied("sin", x), factor=-ONE),
         double_double=double_double.cos,
     ),
     Elementary(
@@ -163,7 +163,7 @@ _RECORDS = (
     Elementary(
         name="abs",
         value=math.fabs,
-        derivative=lambda x: Slope(_of("sign", x)),
+        derivative=lambda x: Slope(_applied("sign", x)),
         double_double=double_double.absolute,
         numba="fabs",
         heyoka="(hy.relu({0}) + hy.relu(-({0})))",
@@ -203,14 +203,14 @@ _RECORDS = (
         name="sinh",
         value=math.sinh,
         domain=(-710.4758600739439, 710.4758600739439),
-        derivative=lambda x: Slope(_of("cosh", x)),
+        derivative=lambda x: Slope(_applied("cosh", x)),
         double_double=double_double.sinh,
     ),
     Elementary(
         name="cosh",
         value=math.cosh,
         domain=(-710.4758600739439, 710.4758600739439),
-        derivative=lambda x: Slope(_of("sinh", x)),
+        derivative=lambda x: Slope(_applied("sinh", x)),
         double_double=double_double.cosh,
     ),
     Elementary(
@@ -246,7 +246,7 @@ _RECORDS = (
     Elementary(
         name="erf",
         value=math.erf,
-        derivative=lambda x: Slope(_of("exp", -(x * x)), factor=_TWO_OVER_SQRT_PI),
+        derivative=lambda x: Slope(_applied("exp", -(x * x)), factor=_TWO_OVER_SQRT_PI),
         double_double=double_double.erf,
         numpy="erf",
         jax="erf",
@@ -255,7 +255,7 @@ _RECORDS = (
     Elementary(
         name="erfc",
         value=math.erfc,
-        derivative=lambda x: Slope(_of("exp", -(x * x)), factor=-_TWO_OVER_SQRT_PI),
+        derivative=lambda x: Slope(_applied("exp", -(x * x)), factor=-_TWO_OVER_SQRT_PI),
         double_double=double_double.erfc,
         numpy="erfc",
         jax="erfc",

@@ -94,9 +94,9 @@ class Affine:
         """Return the index of every term, shape (n,)."""
         return loop.rows @ np.array(self.coefficients, dtype=np.int64) + self.offset
 
-    def shifted(self, by: int) -> "Affine":
+    def shifted(self, shift: int) -> "Affine":
         """Return the index plus a constant."""
-        return Affine(self.coefficients, self.offset + by)
+        return Affine(self.coefficients, self.offset + shift)
 
 
 @dataclass(frozen=True)
@@ -346,9 +346,9 @@ class Graph:
         flags: int = 0,
         loop: Loop | None = None,
     ) -> Node:
-        found = self._table.get(key := _key(op, args, data, loop))
-        if found is not None:
-            return found
+        known = self._table.get(key := _key(op, args, data, loop))
+        if known is not None:
+            return known
         for arg in args:
             flags |= arg.flags
             if arg.loop is not None and arg.loop is not loop:
@@ -399,8 +399,8 @@ class Graph:
 
     def sum(self, body: Node, loop: Loop) -> Node:
         """Return the node of a declared sum of ``body`` over ``loop``, in the loop's order."""
-        found = self._table.get(_key("sum", (body,), loop, None))
-        return self.keep("sum", (body,), loop, body.flags, None) if found is None else found
+        node = self._table.get(_key("sum", (body,), loop, None))
+        return self.keep("sum", (body,), loop, body.flags, None) if node is None else node
 
     def node(self, value: Any) -> Node:
         """Return ``value``, a number or a node of this graph, as a node."""

@@ -36,12 +36,12 @@ def users_line() -> str:
 
 def line_of_traceback(traceback: TracebackType | None) -> str:
     """Return the innermost line of the user's in a traceback (empty when there is none)."""
-    found = ""
+    line = ""
     while traceback is not None:
         if _is_users(traceback.tb_frame):
-            found = _describe(traceback.tb_frame.f_code.co_filename, traceback.tb_lineno)
+            line = _describe(traceback.tb_frame.f_code.co_filename, traceback.tb_lineno)
         traceback = traceback.tb_next
-    return found
+    return line
 
 
 def line_of_function(function: Callable[..., Any]) -> str:
@@ -50,15 +50,15 @@ def line_of_function(function: Callable[..., Any]) -> str:
     return _describe(code.co_filename, code.co_firstlineno) if code is not None else shown(function)
 
 
-def refuse(what: str, remedy: str) -> NoReturn:
+def refuse(reason: str, remedy: str) -> NoReturn:
     """Raise `InputError` for the user's line now running.
 
     Parameters
     ----------
-    what : str
+    reason : str
         What the line does, as the start of a sentence: ``"this branches on a symbol"``.
     remedy : str
         What to write instead.
     """
-    joint = " " if what.endswith("?") else "; "
-    raise InputError(f"{users_line()}: {what}{joint}{remedy}.")
+    joint = " " if reason.endswith("?") else "; "
+    raise InputError(f"{users_line()}: {reason}{joint}{remedy}.")

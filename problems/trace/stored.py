@@ -26,7 +26,7 @@ _ARGUMENTS = {
 _LARGEST = 2**53  # of an index, up to which doubles and 64-bit integers are exact alike
 
 
-def refuse(what: str) -> NoReturn:
+def refuse(reason: str) -> NoReturn:
     """Refuse what is stored.
 
     Raises
@@ -34,26 +34,26 @@ def refuse(what: str) -> NoReturn:
     problems.errors.InputError
         Always.
     """
-    raise InputError(f"a stored formula is damaged: {what}; make the file again.")
+    raise InputError(f"a stored formula is damaged: {reason}; make the file again.")
 
 
-def integer(value: Any, low: int, high: int, what: str) -> int:
+def integer(value: Any, low: int, high: int, label: str) -> int:
     """Return a whole number with ``low <= value < high``, or refuse it."""
     if type(value) is not int or not low <= value < high:
-        refuse(f"{what} is {shown(value)}")
+        refuse(f"{label} is {shown(value)}")
     return value
 
 
-def items(value: Any, what: str, size: int | None = None) -> list[Any]:
+def items(value: Any, label: str, size: int | None = None) -> list[Any]:
     """Return a list (of a size), or refuse it."""
     if not isinstance(value, list | tuple) or (size is not None and len(value) != size):
-        refuse(f"{what} is {shown(value)}")
+        refuse(f"{label} is {shown(value)}")
     return list(value)
 
 
-def _number(value: Any, what: str) -> float:
+def _number(value: Any, label: str) -> float:
     if type(value) not in (int, float) or not math.isfinite(value):
-        refuse(f"{what} is {shown(value)}")
+        refuse(f"{label} is {shown(value)}")
     return float(value)
 
 
@@ -156,26 +156,26 @@ class StoredGraph:
             refuse("a symbol in a loop is of positions and momenta at once")
         return P, {loop}
 
-    def places(self, affine: Any, loop: int | None, what: str) -> NDArray[np.int64]:
+    def places(self, affine: Any, loop: int | None, label: str) -> NDArray[np.int64]:
         """Return the places of an affine index in each term of a loop."""
-        coefficients, offset = items(affine, what, 2)
+        coefficients, offset = items(affine, label, 2)
         if loop is None:
-            refuse(f"{what} is outside of a loop")
+            refuse(f"{label} is outside of a loop")
         rows = self.loops[loop]
-        whole = [integer(c, -_LARGEST, _LARGEST, what) for c in items(coefficients, what, rows.shape[1])]
-        integer(offset, -_LARGEST, _LARGEST, what)
+        whole = [integer(c, -_LARGEST, _LARGEST, label) for c in items(coefficients, label, rows.shape[1])]
+        integer(offset, -_LARGEST, _LARGEST, label)
         factors = np.array(whole, dtype=np.int64)
         reach = np.abs(rows.astype(np.float64)) @ np.abs(factors.astype(np.float64)) + abs(offset)
         if reach.max() >= _LARGEST:
-            refuse(f"{what} is too large")
+            refuse(f"{label} is too large")
         return rows @ factors + offset
 
     def node(self, i: Any) -> _Known:
         """Return what is known of a node that is used, which is among those that came before."""
-        found = self.nodes[integer(i, 0, len(self.nodes), "the number of an operation")]
-        if not found.usable:
+        node = self.nodes[integer(i, 0, len(self.nodes), "the number of an operation")]
+        if not node.usable:
             refuse(f"operation {i} belongs to no function")
-        return found
+        return node
 
     def check_function(self, plain: Any, name: str, size: int | None) -> None:
         """Check what ``Function.plain`` returns; ``None``: for any number of outputs above 0."""

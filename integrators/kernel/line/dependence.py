@@ -15,7 +15,7 @@ NEARLY = 0.1  # the first of the invariants is taken whose rest is no smaller th
 
 
 def independent(
-    system: System, what: emit.What, metric: Array, y: Array, par: Array, t: float
+    system: System, what: emit.Quantity, metric: Array, y: Array, par: Array, t: float
 ) -> NDArray[np.bool_]:
     """Tell which invariants to keep so that all are kept, one gradient orthogonalized after another.
 

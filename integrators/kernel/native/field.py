@@ -18,7 +18,7 @@ Arguments = list[tuple[Any, str]]
 SOURCES = ("simd", "native")
 
 
-def compile_field(system: System, what: emit.What, lanes: int) -> binary.Native:
+def compile_field(system: System, what: emit.Quantity, lanes: int) -> binary.Native:
     """Compile one of a system's functions for stage memory, or load it.
 
     Parameters
@@ -56,7 +56,7 @@ def build(function: Any, lanes: int) -> tuple[str, bytes]:
         return ONE_BY_ONE, build_one_by_one(function, lanes)
 
 
-def assembly(system: System, what: emit.What, lanes: int) -> str:
+def assembly(system: System, what: emit.Quantity, lanes: int) -> str:
     """Return the machine code of a field, as text; the arguments are those of `compile_field`.
 
     Raises

@@ -22,7 +22,7 @@ _made: WeakKeyDictionary[Foreign, dict[int, tuple[int, Any]]] = WeakKeyDictionar
 """The address of each field by lanes, and what keeps it alive: as long as its system is there."""
 
 
-def field_of(system: System, what: emit.What, lanes: int) -> binary.Native:
+def field_of(system: System, what: emit.Quantity, lanes: int) -> binary.Native:
     """Return one of a system's functions for stage memory; see `field.compile_field`.
 
     Raises

@@ -39,7 +39,7 @@ ROWS = 4
 """Components of a stage up to which whole sweeps are compiled with the field."""
 
 
-def compile_sweeps(system: System, what: emit.What, lanes: int, rows: int) -> binary.Native:
+def compile_sweeps(system: System, what: emit.Quantity, lanes: int, rows: int) -> binary.Native:
     """Compile ``void(context, count, after)``, or load it: for a field on lanes, and factors in the matrix.
 
     It does ``count`` sweeps. With ``after`` = `MEASURE`, for one sweep or more, `Context.old_stages` then
