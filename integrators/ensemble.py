@@ -60,6 +60,9 @@ class Solutions(Trajectories):
         Empty where none were looked for.
     reduced : dict of str to ndarray
         What the reductions of `integrators.reduce` amount to, by name.
+    directions : tuple of ndarray, or None
+        The tangent vectors at the start of each trajectory, their parts in the state, (n, dim, k), and in the
+        parameters, (n, n_par, k), where ``variations`` were asked for.
 
     Examples
     --------
@@ -81,6 +84,7 @@ class Solutions(Trajectories):
     method: MethodBase
     events: list[dict[str, Occurrences]] = field(default_factory=list)
     reduced: Mapping[str, Array] = field(default_factory=dict)
+    directions: tuple[Array, Array] | None = None
 
     def __len__(self) -> int:
         return len(self.status)
@@ -124,6 +128,7 @@ class Solutions(Trajectories):
             method=self.method,
             events=self.events[i] if self.events else {},
             variations=None if self.variations is None else self.variations[i][there],
+            directions=None if self.directions is None else (self.directions[0][i], self.directions[1][i]),
         )
 
     def _some(self, numbers: NDArray[np.int64]) -> "Solutions":
@@ -139,6 +144,9 @@ class Solutions(Trajectories):
             par=self.par[numbers],
             compile_seconds=self.compile_seconds,
             variations=None if self.variations is None else self.variations[numbers],
+            directions=None
+            if self.directions is None
+            else (self.directions[0][numbers], self.directions[1][numbers]),
             from_cache=self.from_cache,
             problem=self.problem,
             method=self.method,
@@ -319,8 +327,9 @@ class Solutions(Trajectories):
             for key in ("t", "y", "direction", *(["after"] if acts else [])):
                 parts = [getattr(hits, key) for hits in found if hits is not None]
                 arrays[f"event_{key}:{name}"] = np.concatenate(parts)
-        if self.variations is not None:
+        if self.variations is not None and self.directions is not None:
             arrays["variations"] = self.variations
+            arrays["directions_state"], arrays["directions_parameters"] = self.directions
         arrays |= {f"reduced:{name}": np.asarray(values) for name, values in self.reduced.items()}
         words = {
             "kind": KIND,
@@ -398,8 +407,22 @@ def _from_file(words: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]], pro
         events=[] if words["events"] is None else _events(words["events"], arrays, n, dim),
         reduced={name: _numbers(arrays[f"reduced:{of_type(str, name)}"]) for name in words["reduced"]},
         extra=extra,
-        variations=_numbers(arrays["variations"]) if "variations" in arrays else None,
+        **_variations(arrays, (n, m, dim, problem.system.n_par)),
     )
+
+
+def _variations(arrays: Mapping[str, NDArray[Any]], shape: tuple[int, int, int, int]) -> dict[str, Any]:
+    """Return tangent vectors at the times and at the starts, which a file has both or none of."""
+    if "variations" not in arrays:
+        return {}
+    n, m, dim, n_par = shape
+    vectors, state = arrays["variations"], arrays["directions_state"]
+    k = vectors.shape[-1]
+    parameters = doubles(arrays["directions_parameters"], (n, n_par, k), "directions_parameters")
+    return {
+        "variations": doubles(vectors, (n, m, dim, k), "variations"),
+        "directions": (doubles(state, (n, dim, k), "directions_state"), parameters),
+    }
 
 
 def _numbers(values: NDArray[Any]) -> NDArray[Any]:

@@ -38,7 +38,8 @@ from integrators.running.pieces import (
     integrate_with,
     joined,
 )
-from integrators.running.variations import follow as follow_vectors
+from integrators.running.variations import check as check_vectors
+from integrators.running.variations import directions_of_each
 from integrators.running.watch import SOON, Bar, Progress, Report, Watch, identity, read
 from problems.checks import NOTHING, File, Named, Word, at_least, checked_arguments
 from problems.errors import InputError, shown, unknown
@@ -111,9 +112,9 @@ def integrate_many(
     reduce : mapping of str to Reduction, optional
         What to keep in place of the states, by name: see `integrators.reduce`. Of the states only the last
         ones are kept. A mean depends on ``piece`` in its last digits; nothing depends on threads or workers.
-    variations : array_like, shape (dim, k), or str, or sequence of str, optional
-        As for `integrate`, at the start of each trajectory: ``variations`` of the result has the shape
-        (n, m, dim, k). Trajectories then go one by one, or one in each thread.
+    variations : array_like, shape (dim, k) or (n, dim, k), or str, or sequence of str, optional
+        As for `integrate`, at the start of each trajectory, or tangent vectors of each: ``variations`` of
+        the result has the shape (n, m, dim, k). Trajectories then go one by one, or one in each thread.
     executor : concurrent.futures.Executor, optional
         Who integrates: a ``ProcessPoolExecutor``, ``dask.distributed.Client().get_executor()``, ... A piece
         whose worker dies is sent once more; if that fails, its trajectories are ``INTERRUPTED``.
@@ -168,17 +169,17 @@ def integrate_many(
     program: Any = _program(system, method, backend)
     if method.precision != "double":
         raise InputError(f"{method!r} integrates one trajectory at a time: use integrate.")
+    directions = None
     if variations is not None:  # what cannot be is said before anything is integrated
-        follow_vectors(
-            program.start(problem.y0, problem.par, problem.t0), method, problem, variations, sample
-        )
+        check_vectors(program.start(problem.y0, problem.par, problem.t0), method, sample)
+        directions = directions_of_each(problem, variations, rows, par)
     start = started_with_events(program, method, problem, looked_for) if looked_for else None
     reducer = Reducer(system, reduce) if reduce else None
     belongs = identity(problem, method, grid, sample, looked_for, variations) | {
         "start": digest(rows), "parameters": digest(par),
         "reduce": ", ".join(f"{name} {one.digest}" for name, one in reduce.items()),
     }  # fmt: skip
-    gathered = Gathered(problem, method, rows, par, grid, sample, reducer)
+    gathered = Gathered(problem, method, rows, par, grid, sample, reducer, directions)
     path = None if checkpoint is None else Path(checkpoint)
     earlier = None if resume is None else Path(resume)
     if earlier is not None and (earlier != path or earlier.exists()):
@@ -189,20 +190,24 @@ def integrate_many(
     def given(numbers: NDArray[np.int64]) -> tuple[Array, Array, Array]:
         return rows[numbers], par[numbers], grid if grid.ndim == 1 else grid[numbers]
 
+    def along(numbers: NDArray[np.int64]) -> tuple[Array, Array] | None:
+        return None if directions is None else (directions[0][numbers], directions[1][numbers])
+
     def here(numbers: NDArray[np.int64]) -> tuple[Trajectories, Any]:
         if start is None:
-            return integrate_with(program, *given(numbers), problem.t0, threads, sample, variations), None
+            vectors = along(numbers)
+            return integrate_with(program, *given(numbers), problem.t0, threads, sample, vectors), None
         members = follow(start, *given(numbers), problem.t0, threads)
         return joined([one for one, _ in members], grid), [happened for _, happened in members]
 
     if executor is not None:
         pieces = [
-            (numbers, (*given(numbers), problem.t0, threads, sample, variations))
+            (numbers, (*given(numbers), problem.t0, threads, sample, along(numbers)))
             for numbers in gathered.missing(cast("int", size))
         ]
         made = Remote(executor, problem, method, integrate_piece).run(pieces)
     else:
-        batches = start is None and variations is None and in_batches(program, grid, sample)
+        batches = start is None and directions is None and in_batches(program, grid, sample)
         few = program.piece if offers(program, PieceSize) else FIRST * threads
         soon = SOON if progress or checkpoint is not None else UNWATCHED
         made = _local(here, gathered, few if batches else threads, size, soon)

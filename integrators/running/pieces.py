@@ -30,7 +30,6 @@ from integrators.protocol import (
 )
 from integrators.reduce import Reducer
 from integrators.running.integrate import prepared
-from integrators.running.variations import directions
 from integrators.solution import Occurrences
 from problems.errors import InputError, shown
 from problems.problem import Problem
@@ -49,7 +48,7 @@ def alone(
     t0: float,
     threads: int,
     sample: str | None,
-    variations: Any = None,
+    directions: tuple[Array, Array] | None = None,
 ) -> Trajectories:
     """Integrate trajectories one by one as `integrate` does, or as many at once as there are threads.
 
@@ -67,8 +66,8 @@ def alone(
         How many.
     sample : str or None
         As for `integrate`; with ``"steps"`` the times are those of each trajectory's steps.
-    variations : array_like, or str, or sequence of str, optional
-        As for `integrate`, at the start of each trajectory.
+    directions : pair of ndarray, shapes (n, dim, k), (n, n_par, k), optional
+        Tangent vectors at the start of each trajectory.
 
     Returns
     -------
@@ -78,7 +77,8 @@ def alone(
     stop = threading.Event()
 
     def one(i: int) -> Trajectories:
-        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop, variations)
+        along = None if directions is None else (directions[0][i], directions[1][i])
+        return _one(program, starts[i], par[i], own_times(times, i), t0, sample, stop, along)
 
     if threads == 1 or len(starts) == 1:
         members = [one(i) for i in range(len(starts))]
@@ -134,7 +134,7 @@ def _one(
     t0: float,
     sample: str | None,
     stop: threading.Event,
-    variations: Any = None,
+    along: tuple[Array, Array] | None,
 ) -> Trajectories:
     try:
         stepper: Any = program.start(y0, par, t0)
@@ -147,11 +147,8 @@ def _one(
         stepper.stop = stop
     if offers(stepper, Destination):
         stepper.destination = float(times[-1])
-    if variations is not None:
-        parameters: Any = program.system.unpack(par)
-        end = float(times[-1]) if times[-1] != t0 else t0 + 1.0
-        member = Problem(program.system, y0=y0, parameters=parameters, t0=t0, t_end=end)
-        stepper.follow(*directions(member, variations))
+    if along is not None:
+        stepper.follow(*along)
     if sample == "steps":
         samples = stepper.advance(np.array([t0, times[-1]]) if times[0] == t0 else times[-1:], sample=sample)
         t, y = samples.t, samples.y[np.newaxis]
@@ -161,7 +158,7 @@ def _one(
         y[0, : samples.t.size] = samples.y
     end = times[-1] if samples.status is Status.FINISHED else stepper.t
     steps = np.array([stepper.stats.steps])
-    vectors = None if variations is None else stepper.variations[np.newaxis]
+    vectors = None if along is None else stepper.variations[np.newaxis]
     made = Trajectories(t, y, [samples.status], [samples.reason], np.array([end]), steps, variations=vectors)
     made.extra[0] = telling(stepper.stats)
     return made
@@ -180,11 +177,11 @@ def integrate_with(
     t0: float,
     threads: int,
     sample: str | None,
-    variations: Any = None,
+    directions: tuple[Array, Array] | None = None,
 ) -> Trajectories:
     """Integrate some trajectories: in lanes where the program can and the times are those of all."""
-    if variations is not None or not in_batches(program, times, sample):
-        return alone(program, starts, par, times, t0, threads, sample, variations)
+    if directions is not None or not in_batches(program, times, sample):
+        return alone(program, starts, par, times, t0, threads, sample, directions)
     options = {"threads": threads} if offers(program, Threads) and program.threaded else {}
     return program.batch(starts, par, times=times, t0=t0, **options)
 
@@ -209,20 +206,24 @@ class Gathered:
         With ``"steps"`` each trajectory has times of its own.
     reducer : Reducer or None
         What goes through the states, of which only the last ones are kept then.
+    directions : pair of ndarray, or None
+        Tangent vectors at the starts; see `alone`.
     """
 
     def __init__(
         self, problem: Problem, method: MethodBase, starts: Array, par: Array, times: Array,
-        sample: str | None, reducer: Reducer | None,
+        sample: str | None, reducer: Reducer | None, directions: tuple[Array, Array] | None,
     ):  # fmt: skip
         n = len(starts)
         self._problem, self._method, self._starts, self._par = problem, method, starts, par
-        self._times, self._reducer = times, reducer
+        self._times, self._reducer, self._directions = times, reducer, directions
         width = 0 if sample == "steps" else times.shape[-1] if reducer is None else 1
         nothing: tuple[Array, Array] = np.empty(0), np.empty((0, starts.shape[1]))
         self._rows = [nothing] * n if sample == "steps" else None
         self._y = np.full((n, width, starts.shape[1]), np.nan)
         self._variations: Array | None = None
+        if directions is not None:
+            self._variations = np.full((*self._y.shape, directions[0].shape[2]), np.nan)
         self._status = [Status.INTERRUPTED] * n
         self._reason = ["Ctrl-C was pressed before it was at its end."] * n
         self._stop, self._steps = np.full(n, problem.t0), np.zeros(n, dtype=np.int64)
@@ -263,10 +264,7 @@ class Gathered:
                 self._rows[i] = t[there], y[there]
         else:
             self._y[numbers, : found.y.shape[1]] = found.y
-        if found.variations is not None:
-            count = found.variations.shape[-1]
-            if self._variations is None:
-                self._variations = np.full((*self._y.shape, count), np.nan)
+        if self._variations is not None and found.variations is not None:
             self._variations[numbers, : found.variations.shape[1]] = found.variations
         for i, status, reason in zip(chosen, found.status, found.reason, strict=True):
             self._status[i], self._reason[i] = status, reason
@@ -306,7 +304,7 @@ class Gathered:
             problem=self._problem, method=self._method, extra=self._extra,
             events=[self._events.get(i, {}) for i in range(n)] if events else [],
             reduced={} if self._reducer is None else self._reducer.results(n),
-            variations=self._variations,
+            variations=self._variations, directions=self._directions,
         )  # fmt: skip
 
 

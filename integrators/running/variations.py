@@ -9,7 +9,7 @@ from integrators.protocol import Array, MethodBase, Variations, offers
 from integrators.refusals import as_numbers
 from problems import emit
 from problems.errors import InputError, shown, unknown
-from problems.problem import Problem
+from problems.problem import Problem, System
 
 START, TIME = "y0", "t0"
 
@@ -30,16 +30,9 @@ def directions(problem: Problem, wanted: Any) -> tuple[Array, Array]:
         For vectors of another length, and names of nothing.
     """
     system = problem.system
-    names = [wanted] if isinstance(wanted, str) else wanted
-    if not (isinstance(names, Sequence) and names and all(isinstance(name, str) for name in names)):
-        vectors = as_numbers("variations", wanted)
-        if vectors.ndim != 2 or vectors.shape[0] != system.dim or vectors.shape[1] == 0:
-            raise InputError(
-                f"variations of shape {vectors.shape} must be vectors of {system.dim} components each, "
-                f"({system.dim}, n), or names such as ['y0']."
-            )
-        if not np.isfinite(vectors).all():
-            raise InputError(f"variations={shown(wanted)} must be finite.")
+    names = _names(wanted)
+    if names is None:
+        vectors = _vectors(system, wanted)
         return vectors, np.zeros((system.n_par, vectors.shape[1]))
     if not system.traced:
         raise InputError(f"variations of {system.name} need a formula; its field is code.")
@@ -51,7 +44,7 @@ def directions(problem: Problem, wanted: Any) -> tuple[Array, Array]:
         if name == START:
             state, parameter = np.eye(system.dim), np.zeros((system.n_par, system.dim))
         elif name == TIME:
-            slope = emit.numpy(system, "field")(problem.t0, problem.y0, problem.par)
+            slope = _slope(problem, problem.y0, problem.par)
             state, parameter = -slope[:, np.newaxis], np.zeros((system.n_par, 1))
         else:
             parameter = np.eye(system.n_par)[:, known[name]]
@@ -59,6 +52,66 @@ def directions(problem: Problem, wanted: Any) -> tuple[Array, Array]:
         states.append(state)
         parameters.append(parameter)
     return np.concatenate(states, axis=1), np.concatenate(parameters, axis=1)
+
+
+def directions_of_each(problem: Problem, wanted: Any, starts: Array, par: Array) -> tuple[Array, Array]:
+    """Return the same of many trajectories, shapes (count, dim, n) and (count, n_par, n).
+
+    Parameters
+    ----------
+    problem : Problem
+        Of which trajectories they are.
+    wanted : array_like, shape (dim, n) or (count, dim, n), or str, or sequence of str
+        The vectors of all or of each, or names, as for `directions`.
+    starts, par : ndarray, shapes (count, dim), (count, n_par)
+        Where the trajectories start, and their parameters.
+
+    Raises
+    ------
+    problems.errors.InputError
+        As `directions`, and for vectors of another number of trajectories.
+    """
+    system, count, names = problem.system, len(starts), _names(wanted)
+    if names is None and as_numbers("variations", wanted).ndim == 3:
+        vectors = _vectors(system, wanted, count)
+        return vectors, np.zeros((count, system.n_par, vectors.shape[2]))
+    state, parameters = directions(problem, wanted)
+    states = np.tile(state, (count, 1, 1))
+    if names is not None and TIME in names:  # all else is the same wherever it starts
+        widths = [directions(problem, name)[0].shape[1] for name in names]
+        ends = np.cumsum(widths)
+        slopes = np.array([_slope(problem, *each) for each in zip(starts, par, strict=True)])
+        for name, end in zip(names, ends.tolist(), strict=True):
+            if name == TIME:
+                states[:, :, end - 1] = -slopes
+    return states, np.tile(parameters, (count, 1, 1))
+
+
+def _names(wanted: Any) -> list[str] | None:
+    """Return names that are given, or ``None`` for vectors."""
+    names = [wanted] if isinstance(wanted, str) else wanted
+    given = isinstance(names, Sequence) and names and all(isinstance(name, str) for name in names)
+    return list(names) if given else None
+
+
+def _vectors(system: System, wanted: Any, *count: int) -> Array:
+    """Return vectors that are given, of one trajectory, or of each of ``count``."""
+    vectors = as_numbers("variations", wanted)
+    shape = (*count, system.dim)
+    if vectors.ndim != len(shape) + 1 or vectors.shape[:-1] != shape or vectors.shape[-1] == 0:
+        whose = f" of {count[0]} trajectories" if count else ""
+        raise InputError(
+            f"variations of shape {vectors.shape} must be vectors of {system.dim} components each{whose}, "
+            f"({', '.join(map(str, shape))}, n), or names such as ['y0']."
+        )
+    if not np.isfinite(vectors).all():
+        raise InputError(f"variations={shown(wanted)} must be finite.")
+    return vectors
+
+
+def _slope(problem: Problem, y0: Array, par: Array) -> Array:
+    """Return the field at the start, shape (dim,)."""
+    return emit.numpy(problem.system, "field")(problem.t0, y0, par)
 
 
 def places(problem: Problem) -> dict[str, slice]:
@@ -80,12 +133,23 @@ def follow(
     problems.errors.InputError
         If the method cannot, and as `directions`.
     """
+    check(stepper, method, sample)
+    state, parameters = directions(problem, wanted)
+    stepper.follow(state, parameters)
+    return state, parameters
+
+
+def check(stepper: Any, method: MethodBase, sample: str | None) -> None:
+    """Refuse a method whose steppers have no variations, and samples that have none.
+
+    Raises
+    ------
+    problems.errors.InputError
+        With what to use.
+    """
     if not offers(stepper, Variations):
         raise InputError(
             f"{method!r} has no variations: it does not offer the stages of its steps; use Gauss or HBVM."
         )
     if sample == "dense":
         raise InputError("variations are those of solved steps, which sample='dense' is not; use 'partial'.")
-    state, parameters = directions(problem, wanted)
-    stepper.follow(state, parameters)
-    return state, parameters

@@ -323,10 +323,39 @@ def test_an_ensemble_has_those_of_each_trajectory(tmp_path):
     assert np.array_equal(made.variations[2], alone.variations)
     assert np.array_equal(made[2].variations, alone.variations)
     assert np.array_equal(made[1:].variations, made.variations[1:])
+    assert np.array_equal(made[2].variations_at(1.7), alone.variations_at(1.7))
     with pytest.raises(InputError, match="leave out backend"):
         integrate_many(problem, method, **asked, variations="y0", sample="steps")
     with pytest.raises(InputError, match="unknown variation"):
         integrate_many(problem, method, **asked, variations="y1")
+
+
+def test_each_trajectory_of_an_ensemble_has_vectors_of_its_own(tmp_path):
+    """The bits of single trajectories, also from a file and after a break."""
+    problem, method, times = SYSTEMS["masses"](), Gauss(s=4, h=0.1), [1.0, 2.55]
+    rng = np.random.default_rng(5)
+    starts = problem.y0 * rng.uniform(0.9, 1.1, (3, 1))
+    vectors = rng.standard_normal((3, 4, 2))
+    asked = {"starts": starts, "times": times, "variations": vectors, "checkpoint": tmp_path / "kept"}
+
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    broken = integrate_many(problem, method, **asked, piece=2, progress=stop)
+    assert [str(status) for status in broken.status] == ["finished", "finished", "interrupted"]
+    assert np.isnan(broken.variations[2]).all()
+    made = integrate_many(problem, method, **asked, resume=asked["checkpoint"])
+    made.save(tmp_path / "made.npz")
+    for found in (made, load(tmp_path / "made.npz"), integrate_many(problem, method, **asked, threads=2)):
+        for i in range(3):
+            one = integrate(problem.replace(y0=starts[i]), method, times, variations=vectors[i])
+            assert np.array_equal(found.y[i], one.y)
+            assert np.array_equal(found[i].variations, one.variations)
+            assert np.array_equal(found[i].directions[0], vectors[i])
+    with pytest.raises(InputError, match=r"\(2, 4, 2\) must be vectors .* of 3 trajectories"):
+        integrate_many(problem, method, **asked | {"variations": vectors[:2]})
+    with pytest.raises(InputError, match="variations"):
+        integrate_many(problem, method, **asked | {"variations": vectors + 1.0}, resume=asked["checkpoint"])
 
 
 @pytest.mark.parametrize(
